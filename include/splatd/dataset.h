@@ -1,0 +1,60 @@
+/* A packed dataset (NAME.spld), mapped read-only. api/format.md documents the file byte by byte.
+ *
+ * Threads: open and close on any one thread; between them every call below may run on any thread at once.
+ * The map stays valid when the file is renamed over; a file truncated in place is outside the contract. */
+#ifndef SPLATD_DATASET_H
+#define SPLATD_DATASET_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <splatd/camera.h>
+#include <splatd/error.h>
+
+struct spl_dataset;
+
+enum spl_attribute {
+    SPL_ATTRIBUTE_POSITION,
+    SPL_ATTRIBUTE_RADIUS,
+    SPL_ATTRIBUTE_NORMAL,
+    SPL_ATTRIBUTE_COLOR,
+    SPL_ATTRIBUTE_CLASS,
+    SPL_ATTRIBUTE_UNCERTAINTY,
+    SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
+    SPL_ATTRIBUTE_COUNT
+};
+
+struct spl_dataset_info {
+    char id[128];              /* the file's stem */
+    uint64_t version;          /* XXH3 over the section table: changes whenever any content does */
+    uint64_t file_bytes;
+    uint64_t page_bytes;       /* bytes that become resident on the GPU when everything is */
+    uint64_t points;           /* read from the sources, before duplicates were dropped */
+    uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
+    uint64_t splats;           /* leaf splats plus those of the inner levels */
+    uint32_t levels;           /* depth of the octree, 1 = a single node */
+    uint32_t nodes, chunks, pages;
+    double bounds_min[3], bounds_max[3]; /* of the leaf positions, world */
+    double default_eye[3], default_target[3], default_up[3], default_fov; /* a view that shows the dataset */
+    double splat_radius;       /* median radius of the leaf splats */
+    bool has_color, has_class, has_uncertainty;
+    uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
+};
+
+/* Maps `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
+ * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
+int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
+
+/* NULL-safe. */
+void spl_dataset_close(struct spl_dataset *dataset);
+
+/* Borrowed until close. */
+const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
+
+/* The default view as a camera of the given size. */
+int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
+                                   struct spl_camera *camera, struct spl_error *err);
+
+const char *spl_attribute_name(enum spl_attribute attribute);
+
+#endif

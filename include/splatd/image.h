@@ -1,0 +1,71 @@
+/* Pixels of one rendered layer, and their encodings. */
+#ifndef SPLATD_IMAGE_H
+#define SPLATD_IMAGE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <splatd/error.h>
+
+enum spl_layer {
+    SPL_LAYER_COLOR,    /* RGBA8, straight alpha, sRGB */
+    SPL_LAYER_DEPTH,    /* F32, linear depth along the viewing axis, dataset's unit; NaN = nothing there */
+    SPL_LAYER_RANGE,    /* F32, length of the ray to the surface; NaN = nothing */
+    SPL_LAYER_NORMAL,   /* F32X3, unit, world axes; (0,0,0) = nothing */
+    SPL_LAYER_ID,       /* U32, index of the nearest splat in the dataset; UINT32_MAX = nothing */
+    SPL_LAYER_COVERAGE, /* F32, share of the pixel's samples that hit a surface, 0..1 */
+    SPL_LAYER_COUNT
+};
+
+enum spl_pixel_type { SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32X3, SPL_PIXEL_U32 };
+
+struct spl_image {
+    enum spl_layer layer;
+    enum spl_pixel_type type;
+    uint32_t width, height;
+    void *pixels;       /* row-major, top row first, rows packed; owned by whoever holds the struct */
+};
+
+enum spl_format {
+    SPL_FORMAT_JPEG, /* color; float layers through a colour map, a picture for people */
+    SPL_FORMAT_PNG,  /* color RGBA8; depth and range 16 bit grey, `depth_scale` steps per unit, 0 = nothing; normal RGB8;
+                        id RGBA8 (little-endian bytes of the id); coverage 8 bit grey */
+    SPL_FORMAT_NPY,  /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
+    SPL_FORMAT_RAW,  /* the same bytes without a header, little-endian */
+    SPL_FORMAT_COUNT
+};
+
+struct spl_encode_options {
+    enum spl_format format;
+    int quality;          /* JPEG, 1..100; 0 = 90 */
+    double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
+};
+
+struct spl_encoded {
+    uint8_t *bytes;       /* owned by the receiver, release with spl_encoded_finish() */
+    size_t length;
+    const char *media_type; /* static: "image/jpeg", … */
+    uint64_t saturated;   /* 16 bit depth: pixels beyond the scale's range, stored as 65535 */
+    float near, far;      /* JPEG of a float layer: the values at the ends of the colour map, 0 otherwise */
+};
+
+uint32_t spl_pixel_bytes(enum spl_pixel_type type);
+
+/* Releases `image->pixels` and zeroes the struct. */
+void spl_image_finish(struct spl_image *image);
+
+/* Encodes `image` into `out`. Any thread; blocks for the encoding only. SPL_E_UNSUPPORTED where the format cannot hold
+ * the layer; SPL_E_LIMIT above the format's largest side (JPEG 65535). On failure `out` is zeroed. */
+int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                     struct spl_error *err);
+
+/* NULL-safe. */
+void spl_encoded_finish(struct spl_encoded *encoded);
+
+/* "color" <-> SPL_LAYER_COLOR and "jpeg", "jpg" <-> SPL_FORMAT_JPEG; lookups return -1 for an unknown name. */
+const char *spl_layer_name(enum spl_layer layer);
+int spl_layer_from_name(const char *name);
+const char *spl_format_name(enum spl_format format);
+int spl_format_from_name(const char *name);
+
+#endif

@@ -1,0 +1,101 @@
+/* Frames from datasets, on one GPU device. A renderer and everything made from it belongs to one thread. */
+#ifndef SPLATD_RENDER_H
+#define SPLATD_RENDER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <splatd/camera.h>
+#include <splatd/dataset.h>
+#include <splatd/error.h>
+#include <splatd/image.h>
+
+struct spl_renderer;
+
+enum spl_method {
+    SPL_METHOD_SPLAT,   /* oriented discs, blended within a margin behind the first surface */
+    SPL_METHOD_POINTS,  /* one pixel each */
+    SPL_METHOD_COUNT
+};
+const char *spl_method_name(enum spl_method method);
+int spl_method_from_name(const char *name);  /* -1 for an unknown name */
+
+struct spl_view {
+    struct spl_camera camera;
+    enum spl_method method;
+    uint32_t layers;            /* bit per enum spl_layer, at least one */
+    double lod;                 /* wanted spacing of splats, pixels; 1 = one splat a pixel, 0 = every leaf splat */
+    uint32_t supersample;       /* samples per pixel side: 1, 2 or 4 */
+    uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
+    double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
+    uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
+};
+
+/* Fills everything but the camera with defaults: splat, color, lod 1, supersample 1, opaque black. */
+void spl_view_init(struct spl_view *view);
+
+/* Checks ranges; the field at fault is named as in the HTTP interface. */
+int spl_view_check(const struct spl_view *view, struct spl_error *err);
+
+struct spl_frame_stats {
+    uint64_t splats_drawn, chunks_drawn, nodes_drawn, pages_loaded;
+    uint32_t tiles;
+    bool complete;              /* every chosen page was resident; else coarser nodes stood in */
+    double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
+                                   the device has timestamps, else host times */
+};
+
+struct spl_frame {
+    struct spl_image images[SPL_LAYER_COUNT];  /* pixels NULL for layers that were not asked for */
+    struct spl_frame_stats stats;
+};
+void spl_frame_finish(struct spl_frame *frame);
+
+enum { SPL_DEVICE_NAME_MAX = 256 };
+
+struct spl_device_info {
+    char backend[16];           /* "vulkan", "egl" */
+    uint32_t index;             /* within the backend */
+    char name[SPL_DEVICE_NAME_MAX];
+    char driver[SPL_DEVICE_NAME_MAX];
+    uint8_t uuid[16];           /* zero when the driver has none */
+    bool software;
+    char unusable[SPL_DEVICE_NAME_MAX]; /* why it cannot be used; "" = usable */
+};
+
+/* Lists devices of every backend built in, unusable ones with their reason. Writes at most `capacity`, returns how many
+ * there are. */
+size_t spl_device_list(struct spl_device_info *devices, size_t capacity);
+
+struct spl_renderer_options {
+    const char *device;         /* NULL or "auto"; "vulkan", "egl", "vulkan:1", a UUID, or part of a name */
+    bool require_gpu;           /* refuse software devices */
+    bool debug;                 /* validation layers, GL debug output */
+    uint64_t memory_limit;      /* bytes of device memory, 0 = 3/4 of what the device reports */
+    uint64_t scratch_samples;   /* largest tile in samples, 0 = 4 Mi */
+};
+
+int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err);
+void spl_renderer_destroy(struct spl_renderer *renderer);   /* NULL-safe; datasets must have been removed or are let go */
+const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
+
+/* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the memory
+ * limit. Refuses with both sizes when not even one frame's worth fits. */
+int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
+
+/* Loads every page that fits, so that the first frame is as fast as the others. */
+int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+
+/* Renders one frame; blocks at most until the view's deadline. On success the caller owns `frame` (spl_frame_finish), on
+ * failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */
+int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err);
+
+uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer);  /* device bytes held */
+
+/* Fault injection for tests: the next submit reports a lost device. */
+void spl_renderer_inject_loss(struct spl_renderer *renderer);
+
+#endif

@@ -1,0 +1,13 @@
+/* Everything of libsplatd's public API. */
+#ifndef SPLATD_SPLATD_H
+#define SPLATD_SPLATD_H
+
+#include <splatd/camera.h>
+#include <splatd/dataset.h>
+#include <splatd/error.h>
+#include <splatd/image.h>
+#include <splatd/pack.h>
+#include <splatd/render.h>
+#include <splatd/synth.h>
+
+#endif

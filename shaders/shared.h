@@ -1,0 +1,94 @@
+/* Structs and constants that C and GLSL share. C includes it from shaders/shared_c.h users only through
+ * "shared.h"; GLSL includes it as it is. Only 4-byte scalars, so that std430 and C agree without padding; sizes are
+ * asserted on the C side here and on the GLSL side by the layout test in tests/gpu. */
+#ifndef SPL_SHARED_H
+#define SPL_SHARED_H
+
+#ifdef GL_core_profile
+#define SPL_GLSL 1
+#elif defined(VULKAN)
+#define SPL_GLSL 1
+#endif
+
+#ifdef SPL_GLSL
+#define SPL_U32 uint
+#define SPL_F32 float
+#else
+#include <stdint.h>
+#define SPL_U32 uint32_t
+#define SPL_F32 float
+#endif
+
+/* A chunk: the unit of culling and decoding. Its splats lie in pruning order: the first n are an even subsample. */
+#define SPL_CHUNK_SPLATS 128
+/* A draw-list entry is a dense group of splats of one chunk: chunk index << 4 | group. */
+#define SPL_GROUP_SPLATS 8
+#define SPL_GROUP_BITS 4
+#define SPL_WORKGROUP 64
+
+/* Binding numbers are unique over uniform and storage buffers, so that one numbering serves Vulkan and OpenGL. */
+#define SPL_BIND_FRAME 0   /* uniform: struct spl_frame_params */
+#define SPL_BIND_DRAW 1    /* storage: uint[], draw-list entries of this dispatch's page, front to back */
+#define SPL_BIND_CHUNKS 2  /* storage: struct spl_draw_chunk[] */
+#define SPL_BIND_PAGE 3    /* storage: uint[], one page of the dataset as it lies in the file */
+#define SPL_BIND_DEPTH 4   /* storage: uint[] or uint64[], one per sample */
+#define SPL_BIND_SUMS 5    /* storage: uint[], per sample: r g b weight [nx ny nz depth] */
+#define SPL_BIND_OUTPUT 6  /* storage: uint[], requested layers one after the other, one word a pixel */
+#define SPL_BIND_ID 7      /* storage: uint[], id of the nearest splat, one per sample */
+#define SPL_BIND_COUNT 8
+
+#define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
+
+/* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */
+struct spl_draw_chunk {
+    SPL_F32 origin_x, origin_y, origin_z; /* view space: R (chunk origin - eye), computed in doubles */
+    SPL_F32 step;                         /* metres per position unit, all axes */
+    SPL_F32 radius_min, radius_step;      /* metres, already scaled for the drawn fraction (prune and scale) */
+    SPL_U32 geometry_word;                /* offset in the page, 32-bit words */
+    SPL_U32 color_word;
+    SPL_U32 geometry_bits;                /* SPL_GEOMETRY_*: widths of x y z u v radius, and the normals' axis */
+    SPL_U32 color_bits;                   /* SPL_COLOR_*: widths of y u v and the base of y */
+    SPL_U32 color_base;                   /* int16 base of u (low half) and v (high half) */
+    SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
+    SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
+    SPL_U32 count;                        /* splats of the chunk that are drawn, 1..SPL_CHUNK_SPLATS */
+};
+
+/* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
+ * axis 27..29: index of the axis that is the octahedron's +z (0 x, 1 y, 2 z), bit 29 its sign (1 = negative). */
+#define SPL_GEOMETRY_X 0
+#define SPL_GEOMETRY_Y 5
+#define SPL_GEOMETRY_Z 10
+#define SPL_GEOMETRY_U 15
+#define SPL_GEOMETRY_V 19
+#define SPL_GEOMETRY_RADIUS 23
+#define SPL_GEOMETRY_AXIS 27
+/* color_bits: y 0..3, u 4..7, v 8..11 (0..9 bits each), base of y 16..23. Colour is the reversible transform of 8 bit
+ * RGB: u = b - g, v = r - g, y = g + floor((u + v) / 4); decoding: g = y - floor((u + v) / 4), b = u + g, r = v + g. */
+#define SPL_COLOR_Y 0
+#define SPL_COLOR_U 4
+#define SPL_COLOR_V 8
+#define SPL_COLOR_BASE_Y 16
+
+/* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
+struct spl_frame_params {
+    SPL_F32 rotation[12];                 /* world -> camera, three rows of (x, y, z, 0) */
+    SPL_F32 fx, fy, cx, cy;               /* samples, of this tile */
+    SPL_F32 near, far;
+    SPL_F32 low_pass;                     /* radius in samples within which a splat always covers */
+    SPL_F32 margin;                       /* blend margin as a multiple of the splat's radius */
+    SPL_U32 width, height;                /* tile, samples */
+    SPL_U32 supersample;                  /* samples per pixel side: 1, 2 or 4 */
+    SPL_U32 entries;                      /* draw-list entries of this dispatch */
+    SPL_U32 first_entry;
+    SPL_U32 weight_max;                   /* largest fragment weight; chosen so that no sum can wrap */
+    SPL_U32 background;                   /* RGBA8 */
+    SPL_U32 layers;                       /* bit per enum spl_layer */
+};
+
+#ifndef SPL_GLSL
+_Static_assert(sizeof(struct spl_draw_chunk) == 64, "spl_draw_chunk is 64 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 112, "spl_frame_params is 112 bytes on both sides");
+#endif
+
+#endif

@@ -1,0 +1,79 @@
+/* The one table of errors, and the record that carries them. Reentrant; no global state. */
+#include "base/error.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct spl_code_info table[] = {
+    [-SPL_OK] = {"ok", 200, 0, false},
+    [-SPL_E_NOMEM] = {"out-of-memory", 503, 1, true},
+    [-SPL_E_IO] = {"io", 500, 1, false},
+    [-SPL_E_INPUT] = {"input", 400, 2, false},
+    [-SPL_E_USAGE] = {"usage", 400, 2, false},
+    [-SPL_E_UNSUPPORTED] = {"unsupported", 501, 2, false},
+    [-SPL_E_CORRUPT] = {"corrupt", 500, 2, false},
+    [-SPL_E_NOT_FOUND] = {"not-found", 404, 2, false},
+    [-SPL_E_LIMIT] = {"limit", 413, 2, false},
+    [-SPL_E_BUSY] = {"busy", 503, 1, true},
+    [-SPL_E_TIMEOUT] = {"timeout", 503, 1, true},
+    [-SPL_E_NO_DEVICE] = {"no-device", 503, 1, false},
+    [-SPL_E_DEVICE_LOST] = {"device-lost", 503, 1, true},
+    [-SPL_E_CANCELLED] = {"cancelled", 503, 1, true},
+    [-SPL_E_INTERNAL] = {"internal", 500, 1, false},
+};
+
+const struct spl_code_info *spl_code_get_info(int code)
+{
+    if (code > 0 || code < SPL_E_INTERNAL)
+        code = SPL_E_INTERNAL;
+    return &table[-code];
+}
+
+static int fill(struct spl_error *err, int code, const char *field, const char *format, va_list args)
+{
+    if (!err || err->code != SPL_OK)
+        return code;
+    err->code = code;
+    snprintf(err->field, sizeof err->field, "%s", field);
+    vsnprintf(err->message, sizeof err->message, format, args);
+    return code;
+}
+
+int spl_fail(struct spl_error *err, int code, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fill(err, code, "", format, args);
+    va_end(args);
+    return code;
+}
+
+int spl_fail_field(struct spl_error *err, int code, const char *field, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fill(err, code, field, format, args);
+    va_end(args);
+    return code;
+}
+
+int spl_fail_errno(struct spl_error *err, int errno_value, const char *format, ...)
+{
+    if (!err || err->code != SPL_OK)
+        return SPL_E_IO;
+    va_list args;
+    va_start(args, format);
+    fill(err, SPL_E_IO, "", format, args);
+    va_end(args);
+    size_t used = strlen(err->message);
+    snprintf(err->message + used, sizeof err->message - used, ": %s", strerror(errno_value));
+    return SPL_E_IO;
+}
+
+void spl_assert_failed(const char *condition, const char *file, int line)
+{
+    fprintf(stderr, "splatd: bug: %s does not hold at %s:%d\n", condition, file, line);
+    abort();
+}

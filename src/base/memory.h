@@ -1,0 +1,23 @@
+/* Checked allocation. Sizes are multiplied with overflow checks; a refusal is an error, never an abort.
+ * Tests inject failures with spl_memory_fail_after(). */
+#ifndef SPL_BASE_MEMORY_H
+#define SPL_BASE_MEMORY_H
+
+#include <stddef.h>
+
+#include "base/error.h"
+
+/* `count` zeroed elements of `size` bytes, owned by the caller, released with free(); NULL and SPL_E_NOMEM on failure.
+ * count == 0 gives a valid pointer. Any thread. */
+void *spl_alloc(size_t count, size_t size, struct spl_error *err);
+
+/* The same without zeroing, for large arrays that are filled at once. */
+void *spl_alloc_raw(size_t count, size_t size, struct spl_error *err);
+
+/* Grows `old` (may be NULL) to `count` elements; on failure returns NULL and `old` stays valid. */
+void *spl_realloc(void *old, size_t count, size_t size, struct spl_error *err);
+
+/* Fault injection: the n-th allocation from now (1 = the next) fails, once; 0 switches it off. Tests only. */
+void spl_memory_fail_after(long n);
+
+#endif

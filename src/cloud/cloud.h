@@ -1,0 +1,67 @@
+/* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
+ *
+ * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to one
+ * reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
+#ifndef SPL_CLOUD_CLOUD_H
+#define SPL_CLOUD_CLOUD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+
+enum spl_cloud_attribute {
+    SPL_CLOUD_COLOR = 1 << 0,     /* measured colour, or intensity as grey when the file has no colour */
+    SPL_CLOUD_NORMAL = 1 << 1,
+    SPL_CLOUD_CLASS = 1 << 2,
+    SPL_CLOUD_STATION = 1 << 3,   /* batch.station indexes info.stations */
+};
+
+struct spl_cloud_options {
+    const char *columns;  /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
+};
+
+struct spl_cloud_info {
+    const char *format;           /* static: "PLY", "LAS", "PTX", "PTS", "text" */
+    uint32_t attributes;          /* enum spl_cloud_attribute, known at open */
+    uint64_t points_expected;     /* as the header says (already checked against the file's size), 0 = unknown */
+    uint64_t file_bytes;
+    uint32_t station_count;       /* grows while a PTX is read; final at the end */
+    double (*stations)[16];       /* row-major station-to-world; borrowed until the next read or destroy */
+    uint64_t points_skipped;      /* non-finite, or PTX "no return" cells */
+};
+
+/* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
+struct spl_point_batch {
+    size_t capacity, count;
+    double (*position)[3];        /* exact: LAS integers × scale + offset, PTX transformed to world */
+    uint8_t (*color)[3];          /* sRGB; 16 bit sources that use more than 8 bits are scaled down, rounded */
+    float (*normal)[3];           /* unit; zero where the file has none or it is degenerate */
+    uint8_t *classification;
+    uint16_t *station;
+};
+
+struct spl_cloud;
+
+int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
+void spl_point_batch_finish(struct spl_point_batch *batch);
+
+/* Opens and checks the header. LAZ, COPC and E57 give SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
+ * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */
+int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
+                   struct spl_error *err);
+
+const struct spl_cloud_info *spl_cloud_get_info(const struct spl_cloud *cloud);
+
+/* Bytes of the file consumed so far, for progress. */
+uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
+
+/* Fills the next batch (overwriting it): 1 = batch.count > 0 points, 0 = end, negative = error. Points with a non-finite
+ * coordinate are skipped and counted. A file with no usable point ends with 0 at once: the caller decides. */
+int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
+
+/* NULL-safe. */
+void spl_cloud_destroy(struct spl_cloud *cloud);
+
+#endif

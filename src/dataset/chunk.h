@@ -1,0 +1,57 @@
+/* Quantisation of one chunk, both ways. The shader's decode (shaders/common/decode.glsl) is the third copy of the same
+ * arithmetic: tests/gpu compares all of them. Pure functions; any thread. */
+#ifndef SPL_DATASET_CHUNK_H
+#define SPL_DATASET_CHUNK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+#include "dataset/format.h"
+
+/* A splat relative to its node's origin. */
+struct spl_splat {
+    float position[3];    /* metres from the node's origin; the encoder takes them as doubles, see below */
+    float normal[3];      /* unit */
+    float radius;         /* metres, > 0 */
+    float uncertainty;    /* eq. 21, >= 0 */
+    uint8_t color[3];     /* sRGB */
+    uint8_t classification;
+};
+
+struct spl_chunk_options {
+    double position_error;   /* mean error as a share of the splat radius; default 0.016 */
+    double normal_error;     /* mean error, radians; default 1 degree */
+    double radius_error;     /* largest relative error; default 0.05 */
+    bool has_class, has_uncertainty;
+};
+
+struct spl_chunk_error {     /* what quantisation did to one chunk, sums over its splats */
+    double position_over_radius, normal_radians;
+};
+
+/* Words that `chunk`'s streams take; the place of one stream is the sum of those before it. */
+uint32_t spl_chunk_words(const struct spl_chunk *chunk);
+uint32_t spl_chunk_geometry_width(const struct spl_chunk *chunk); /* bits a splat */
+uint32_t spl_chunk_color_width(const struct spl_chunk *chunk);
+uint32_t spl_chunk_color_word(const struct spl_chunk *chunk);     /* offset in the page */
+uint32_t spl_chunk_class_word(const struct spl_chunk *chunk);
+uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk);
+
+/* Largest number of words a chunk can need. */
+enum { SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + 4 };
+
+/* Chooses widths and codes for `count` splats (1..128) whose order is kept, writes `words` (zeroed by the call, room for
+ * SPL_CHUNK_WORDS_MAX) and everything in *chunk but geometry_word and first_id. Positions are refined to doubles by
+ * `position` (count × 3, relative to the node's origin), which overrides splats[].position. `error` may be NULL. Returns
+ * the number of words. Every splat must be finite with radius > 0 (an assertion: the packer has cleaned them). */
+uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
+                          const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
+                          struct spl_chunk_error *error);
+
+/* Decodes splat `i` (< chunk->count) of a chunk whose page starts at `page`. Same arithmetic as the shader, in floats:
+ * position = origin + step * code. */
+void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat);
+
+#endif

@@ -1,0 +1,24 @@
+/* What the renderer sees of a mapped dataset beyond the public header. Everything is borrowed until close. */
+#ifndef SPL_DATASET_DATASET_H
+#define SPL_DATASET_DATASET_H
+
+#include <splatd/dataset.h>
+
+#include <jansson.h>
+
+#include "dataset/format.h"
+
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);
+const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
+
+/* The bytes of page `index` (< info.pages), 64 KiB-aligned in the file. */
+const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
+
+/* META's keys, written by pack and read by open (all required unless said):
+ *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
+ *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,
+ *   "uncertainty": bool}, "bits" {attribute name: int}, "sources" [string], "pack" {...} (free: settings, statistics),
+ *   "stations" [[16 reals: row-major station-to-world]] (optional). */
+
+#endif

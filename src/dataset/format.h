@@ -1,0 +1,83 @@
+/* The structs of a .spld file as they lie on disk: little-endian, natural alignment, no padding. api/format.md is the
+ * prose. A reader skips section types it does not know. */
+#ifndef SPL_DATASET_FORMAT_H
+#define SPL_DATASET_FORMAT_H
+
+#include <stdint.h>
+
+#include "shared.h" /* SPL_CHUNK_SPLATS */
+
+#define SPL_FILE_MAGIC "SPLD\r\n\x1a\n"
+#define SPL_FILE_VERSION 1u
+#define SPL_FILE_ALIGNMENT 65536u        /* of pages; other sections start on 64 bytes */
+#define SPL_PAGE_BYTES (16u << 20)       /* target; a page is at most SPL_PAGE_BYTES_MAX */
+#define SPL_PAGE_BYTES_MAX (64u << 20)
+#define SPL_NODE_CHUNKS_MAX 4096u
+
+struct spl_file_header {          /* at offset 0 */
+    char magic[8];
+    uint32_t version;
+    uint32_t header_bytes;        /* sizeof(struct spl_file_header) */
+    uint64_t file_bytes;
+    uint64_t table_offset;        /* section table */
+    uint32_t section_count;
+    uint32_t reserved;            /* 0 */
+    uint64_t table_hash;          /* XXH3-64 of the section table */
+    uint64_t header_hash;         /* XXH3-64 of the bytes before this field */
+};
+
+#define SPL_FOURCC(a, b, c, d) ((uint32_t)(a) | (uint32_t)(b) << 8 | (uint32_t)(c) << 16 | (uint32_t)(d) << 24)
+#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')  /* JSON: sources, counts, statistics, default view */
+#define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E') /* struct spl_node[], breadth first, node 0 is the root */
+#define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* struct spl_chunk[] */
+#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')  /* chunk data; `index` is the page's number */
+
+struct spl_section {
+    uint32_t type;
+    uint32_t index;               /* number among the sections of its type */
+    uint64_t offset, bytes;
+    uint64_t hash;                /* XXH3-64 of the section's bytes */
+};
+
+/* An octree node: splats that represent its cube at the node's spacing. A leaf holds the originals. A cut through the
+ * tree (each leaf under exactly one drawn node) represents everything. */
+struct spl_node {
+    double origin[3];             /* least corner of the cube, world */
+    float size;                   /* edge of the cube */
+    float spacing;                /* median distance of neighbouring splats, metres: median radius / SPL_RADIUS_SPACING */
+    float box_min[3], box_max[3]; /* of its splats' and all descendants' discs, relative to origin */
+    uint32_t first_child;         /* children are consecutive; 0 and count 0 for a leaf */
+    uint32_t child_count;         /* 0..8 */
+    uint32_t first_chunk, chunk_count;
+    uint32_t page;                /* all chunks of a node lie in one page */
+    uint32_t depth;               /* root = 0 */
+};
+
+/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream
+ * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
+ * the other from the low bits up. */
+struct spl_chunk {
+    float origin[3];              /* relative to the node's origin; position = origin + step * code */
+    float step;
+    float radius_min, radius_step;
+    float radius_mean;            /* of the chunk's splats: what level selection and prune-and-scale use */
+    float normal_u, normal_v, normal_step;
+    uint32_t geometry_word;       /* in the node's page, 32-bit words; the other streams follow in order */
+    uint32_t geometry_bits;       /* as in shared.h */
+    uint32_t color_bits;          /* as in shared.h */
+    uint32_t color_base;
+    uint32_t extra_bits;          /* class: width 0..3, base 8..15; uncertainty: width 4..7 */
+    float uncertainty_max;        /* uncertainty = max * 2^-(code / 2), code 2^width - 1 = 0 */
+    uint32_t first_id;            /* dataset-wide index of its first splat */
+    uint32_t count;
+};
+
+/* r = 2 sqrt(area of a splat's share / pi): on a square grid of spacing h, eq. 20 gives r = 1.128 h. */
+#define SPL_RADIUS_SPACING 1.128379f
+
+_Static_assert(sizeof(struct spl_file_header) == 56, "on disk");
+_Static_assert(sizeof(struct spl_section) == 32, "on disk");
+_Static_assert(sizeof(struct spl_node) == 80, "on disk");
+_Static_assert(sizeof(struct spl_chunk) == 72, "on disk");
+
+#endif

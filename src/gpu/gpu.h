@@ -1,0 +1,103 @@
+/* The GPU layer: Vulkan 1.3 or EGL/OpenGL 4.5 compute behind one table. gpu.c validates every call once; the backends
+ * (vulkan/, egl/, same file names) trust their input. A backend that is not built in is a stub whose list is empty.
+ *
+ * Threads: a struct spl_gpu and everything made from it belong to the thread that opened it.
+ * Waits take an absolute deadline of base/clock.h. After SPL_E_DEVICE_LOST every call but destroy and close fails with
+ * the same code; close and open anew. */
+#ifndef SPL_GPU_GPU_H
+#define SPL_GPU_GPU_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <splatd/render.h> /* struct spl_device_info */
+
+#include "base/error.h"
+#include "shared.h" /* SPL_BIND_COUNT */
+
+struct spl_gpu;
+struct spl_gpu_buffer;
+struct spl_gpu_kernel;
+
+struct spl_gpu_options {
+    const char *device;      /* as spl_renderer_options.device */
+    bool require_gpu;
+    bool debug;
+    uint64_t memory_limit;   /* 0 = 3/4 of the device's */
+    const char *cache_dir;   /* pipeline cache; NULL = $XDG_CACHE_HOME/splatd or ~/.cache/splatd; "" = none */
+};
+
+struct spl_gpu_limits {          /* 0 = cannot */
+    uint64_t memory_bytes;       /* what may be allocated in all: the limit or the device's */
+    uint64_t buffer_bytes;       /* largest buffer */
+    uint64_t binding_bytes;      /* largest range a storage binding sees */
+    uint32_t workgroups;         /* largest dispatch, in x */
+    uint32_t subgroup;           /* lanes */
+    bool atomics_64;             /* 64 bit integer atomics on storage buffers */
+    bool timestamps;
+};
+
+/* Opens the device that options->device names, else the first usable one: GPUs before software, Vulkan before EGL. Runs
+ * the self-test kernel. On failure the message names every device and why it was not used. */
+int spl_gpu_open(const struct spl_gpu_options *options, struct spl_gpu **out, struct spl_error *err);
+void spl_gpu_close(struct spl_gpu *gpu); /* NULL-safe; waits (bounded) for what runs; buffers and kernels must be gone */
+
+const struct spl_device_info *spl_gpu_get_device(const struct spl_gpu *gpu);
+const struct spl_gpu_limits *spl_gpu_get_limits(const struct spl_gpu *gpu);
+uint64_t spl_gpu_get_memory(const struct spl_gpu *gpu); /* bytes of all live buffers */
+
+/* Every device of every backend, unusable ones with a reason; returns how many there are, writes at most capacity. */
+size_t spl_gpu_list(struct spl_device_info *devices, size_t capacity);
+
+enum spl_gpu_buffer_kind {
+    SPL_GPU_DEVICE,    /* storage on the device; filled by spl_gpu_copy/_fill */
+    SPL_GPU_UPLOAD,    /* mapped for writing; usable as storage or uniform binding and as copy source */
+    SPL_GPU_READBACK,  /* mapped for reading after a wait; storage binding or copy target */
+};
+
+/* Refused with SPL_E_LIMIT and both numbers before anything is taken when it exceeds limits or the memory budget.
+ * bytes is rounded up to 16. Content is undefined. */
+int spl_gpu_buffer_create(struct spl_gpu *gpu, enum spl_gpu_buffer_kind kind, uint64_t bytes,
+                          struct spl_gpu_buffer **out, struct spl_error *err);
+void spl_gpu_buffer_destroy(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer); /* NULL-safe; must not be in use */
+void *spl_gpu_buffer_map(struct spl_gpu_buffer *buffer); /* UPLOAD and READBACK: mapped for the buffer's whole life */
+uint64_t spl_gpu_buffer_get_bytes(const struct spl_gpu_buffer *buffer);
+
+/* Kernels are embedded at build time under their file's stem ("depth" for shaders/depth.comp, its 64-bit-atomics variant
+ * is "depth64"). Specialisation constants are 32 bit with ids 0..count-1. */
+enum { SPL_GPU_CONSTANTS_MAX = 8 };
+int spl_gpu_kernel_create(struct spl_gpu *gpu, const char *name, const uint32_t *constants, size_t constant_count,
+                          struct spl_gpu_kernel **out, struct spl_error *err);
+void spl_gpu_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel); /* NULL-safe */
+
+/* What a dispatch sees: slot i is binding i of shared.h; buffer NULL = unused. Slot 0 is the uniform block. */
+struct spl_gpu_binding {
+    struct spl_gpu_buffer *buffer;
+    uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
+};
+
+/* Recording. One list at a time: begin … submit. Errors of recording (bad ranges are our bugs: assertions) surface at
+ * submit. */
+int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
+void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
+                      const struct spl_gpu_binding bindings[SPL_BIND_COUNT], uint32_t workgroups);
+void spl_gpu_barrier(struct spl_gpu *gpu);   /* everything before is visible to everything after (and to the host) */
+void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
+                  uint64_t to_offset, uint64_t bytes);
+void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes, uint32_t word);
+enum { SPL_GPU_TIMESTAMPS_MAX = 32 };
+void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot); /* no effect without limits.timestamps */
+
+/* Ends recording and starts it. One submission may be in flight while the next is recorded; a third begin waits. */
+int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);
+bool spl_gpu_poll(struct spl_gpu *gpu, uint64_t ticket);    /* done? never blocks; true once the device is lost */
+/* SPL_E_TIMEOUT once deadline_ns has passed, which also marks the device lost. */
+int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err);
+/* Nanoseconds of slot `slot` in the last waited submission, on the device's own clock; 0 where it was not written. */
+uint64_t spl_gpu_get_timestamp_ns(struct spl_gpu *gpu, uint32_t slot);
+
+/* Fault injection for tests: the next submit marks the device lost. */
+void spl_gpu_inject_loss(struct spl_gpu *gpu);
+
+#endif

@@ -1,0 +1,46 @@
+/* The subcommand table; nothing else. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cmd/cmd.h"
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *help;
+} commands[] = {
+#define COMMAND(name, help) {#name, spl_cmd_##name, help},
+#include "cmd/commands.def"
+#undef COMMAND
+};
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: splatd COMMAND [ARGUMENT…]\n\n");
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].help);
+    fprintf(out, "\n'splatd COMMAND --help' teaches each by example. A first picture:\n"
+                 "  splatd synth courtyard -o scan && splatd pack scan/courtyard.ptx -o courtyard.spld\n"
+                 "  splatd render courtyard.spld -o view.jpg\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        usage(stderr);
+        return 2;
+    }
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        if (!strcmp(argv[1], commands[i].name))
+            return commands[i].run(argc - 1, argv + 1);
+    if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) {
+        usage(stdout);
+        return 0;
+    }
+    if (!strcmp(argv[1], "--version")) {
+        puts("splatd " SPLATD_VERSION);
+        return 0;
+    }
+    fprintf(stderr, "splatd: unknown command '%s'; 'splatd --help' lists them\n", argv[1]);
+    return 2;
+}
