@@ -1,0 +1,122 @@
+#!/usr/bin/env bash
+# Everything a change must pass, on a bare Debian 12: packages, then one build a row below, each with its suites of tests.
+# The last line is "N passed, N failed, N skipped" over all of them; a build that fails counts as a failed test.
+#
+# usage: tests/run.sh [--quick|--full]
+#   --quick   the normal build alone
+#   --full    also fuzzes every target for a minute
+set -euo pipefail
+
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+mode=${1-}
+case $mode in
+'' | --quick | --full) ;;
+-h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+*) echo "usage: tests/run.sh [--quick|--full]" >&2; exit 2 ;;
+esac
+
+out=$PWD/build-tests
+mkdir -p "$out"
+passed=0 failed=0 skipped=0
+finish() { echo "$passed passed, $failed failed, $skipped skipped"; [ "$failed" = 0 ]; }
+
+# name, compiler, meson options -> build-tests/NAME; a broken build is shown and counted
+build() {
+    local name=$1 compiler=$2 log=$out/$1.log
+    shift 2
+    local begin=$SECONDS setup=(meson setup "$out/$name" -Dwerror=true "$@")
+    [ ! -f "$out/$name/build.ninja" ] || setup+=(--reconfigure)
+    if CC=$compiler "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" >>"$log" 2>&1; then
+        printf '%-10s %-8s built in %d s\n' "$name" "" $((SECONDS - begin))
+    else
+        tail -60 "$log"
+        printf '%-10s %-8s DOES NOT BUILD (%s)\n' "$name" "" "$log"
+        failed=$((failed + 1))
+        return 1
+    fi
+}
+
+# name, suites…: runs them one after the other; what failed is shown with its output
+suites() {
+    local name=$1 suite log=$out/$1/meson-logs/testlog counts
+    shift
+    for suite in "$@"; do
+        local begin=$SECONDS
+        rm -f "$log".{json,txt}
+        ${run_under-} meson test -C "$out/$name" --no-rebuild --suite "$suite" --print-errorlogs \
+            --timeout-multiplier "${timeouts:-1}" >"$out/$name-$suite.log" 2>&1 || true
+        counts=$(python3 - "$log.json" <<'PY'
+import json, os, sys
+passed = failed = skipped = 0
+if os.path.exists(sys.argv[1]):
+    for line in open(sys.argv[1], encoding="utf-8"):
+        result = json.loads(line)["result"]
+        passed += result in ("OK", "EXPECTEDFAIL")
+        skipped += result == "SKIP"
+        failed += result not in ("OK", "EXPECTEDFAIL", "SKIP")
+print(passed, failed, skipped)
+PY
+        )
+        read -r p f s <<<"$counts"
+        # Meson says so itself when a folder holds no tests; any other silence is a failure.
+        if [ $((p + f + s)) = 0 ] && ! grep -q 'No suitable tests' "$out/$name-$suite.log"; then
+            f=1
+        fi
+        [ "$f" = 0 ] || cat "$out/$name-$suite.log"
+        passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
+        printf '%-10s %-8s %d passed, %d failed, %d skipped in %d s\n' "$name" "$suite" "$p" "$f" "$s" \
+            $((SECONDS - begin))
+    done
+}
+
+# Does a program built with this sanitiser start here? Containers without ptrace cannot look for leaks, and kernels with
+# much address space randomisation stop this TSan.
+sanitiser_runs() {
+    local sanitiser=$1
+    shift
+    printf 'int main(void) { return 0; }\n' >"$out/probe.c"
+    gcc -fsanitize="$sanitiser" "$out/probe.c" -o "$out/probe" && "$@" "$out/probe" >/dev/null 2>&1
+}
+
+deploy/install-packages.sh build run test
+
+if build normal gcc; then
+    suites normal rules unit gpu golden fuzz http fault
+fi
+if [ "$mode" = --quick ]; then
+    finish
+    exit
+fi
+
+sanitised=(-Dbuildtype=debugoptimized -Doptimization=1 -Db_lundef=false)
+leaks=1
+sanitiser_runs address env || leaks=0
+[ $leaks = 1 ] || echo "note: no leak check, this container does not let LeakSanitizer work"
+export ASAN_OPTIONS=detect_leaks=$leaks:abort_on_error=1:allocator_may_return_null=1
+export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
+export LSAN_OPTIONS=suppressions=$PWD/tests/lsan.supp:print_suppressions=0
+export TSAN_OPTIONS=suppressions=$PWD/tests/tsan.supp:halt_on_error=1:second_deadlock_stack=1
+
+if build asan gcc "${sanitised[@]}" -Db_sanitize=address,undefined; then
+    timeouts=6 suites asan unit gpu golden fuzz http fault
+fi
+if build tsan gcc "${sanitised[@]}" -Db_sanitize=thread; then
+    if sanitiser_runs thread env; then
+        timeouts=10 suites tsan http
+    elif sanitiser_runs thread setarch -R; then
+        timeouts=10 run_under="setarch -R" suites tsan http
+    else
+        echo "note: no thread check, TSan does not start on this kernel"
+        skipped=$((skipped + 1))
+    fi
+fi
+if build no-vulkan gcc -Dvulkan=disabled -Doptimization=1; then
+    suites no-vulkan unit gpu
+fi
+if build no-egl gcc -Degl=disabled -Doptimization=1; then
+    suites no-egl unit gpu
+fi
+if build clang clang; then
+    suites clang unit gpu
+fi
+finish
