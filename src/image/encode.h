@@ -1,0 +1,34 @@
+/* The encoders behind spl_image_encode(): each takes an image that was checked and fills `out`, whose bytes are
+ * released with free(). Inside src/image only; any thread. */
+#ifndef SPL_IMAGE_ENCODE_H
+#define SPL_IMAGE_ENCODE_H
+
+#include <splatd/image.h>
+
+#include "base/error.h"
+
+int spl_encode_jpeg(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err);
+int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err);
+int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
+int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
+
+/* ---- 8 bit pictures of the layers that are no picture yet (convert.c) ----
+ * `count` pixels each; outputs hold 3 bytes a pixel, coverage 1. */
+
+/* Depth or range through the colour map, nothing = black. near and far get the values at the map's ends: the 1st and
+ * 99th percentile to within 1 % of their value, 0 and 0 where nothing is. */
+int spl_convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
+                         struct spl_error *err);
+
+/* round((n + 1) / 2 * 255); nothing (zero or not a number) = 0, 0, 0. */
+void spl_convert_normal(const float *normals, size_t count, uint8_t *rgb);
+
+/* A colour by hash of the id, never black; nothing = black. */
+void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb);
+
+void spl_convert_coverage(const float *values, size_t count, uint8_t *grey);
+
+/* round(value * scale) in 1..65535, nothing (negative or not a number) = 0. Returns how many were beyond 65535. */
+uint64_t spl_convert_depth16(const float *values, size_t count, double scale, uint16_t *grey);
+
+#endif

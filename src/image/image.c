@@ -1,0 +1,118 @@
+/* The front of the encoders: names, checks, and one switch over formats.
+ *
+ * Every image passes check() first, so the encoders trust type, size and pointer. Options that are out of range are the
+ * caller's error and carry the field's name of the HTTP interface. No state; any thread. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "image/encode.h"
+
+enum { DEFAULT_QUALITY = 90 };
+static const double default_depth_scale = 1000;
+
+static const struct {
+    const char *name;
+    enum spl_pixel_type type;
+} layers[SPL_LAYER_COUNT] = {
+    [SPL_LAYER_COLOR] = {"color", SPL_PIXEL_RGBA8},   [SPL_LAYER_DEPTH] = {"depth", SPL_PIXEL_F32},
+    [SPL_LAYER_RANGE] = {"range", SPL_PIXEL_F32},     [SPL_LAYER_NORMAL] = {"normal", SPL_PIXEL_F32X3},
+    [SPL_LAYER_ID] = {"id", SPL_PIXEL_U32},           [SPL_LAYER_COVERAGE] = {"coverage", SPL_PIXEL_F32},
+};
+
+static const char *const formats[SPL_FORMAT_COUNT] = {
+    [SPL_FORMAT_JPEG] = "jpeg",
+    [SPL_FORMAT_PNG] = "png",
+    [SPL_FORMAT_NPY] = "npy",
+    [SPL_FORMAT_RAW] = "raw",
+};
+
+const char *spl_layer_name(enum spl_layer layer)
+{
+    return (unsigned)layer < SPL_LAYER_COUNT ? layers[layer].name : "unknown";
+}
+
+int spl_layer_from_name(const char *name)
+{
+    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+        if (!strcmp(name, layers[i].name))
+            return i;
+    return -1;
+}
+
+const char *spl_format_name(enum spl_format format)
+{
+    return (unsigned)format < SPL_FORMAT_COUNT ? formats[format] : "unknown";
+}
+
+int spl_format_from_name(const char *name)
+{
+    for (int i = 0; i < SPL_FORMAT_COUNT; i++)
+        if (!strcmp(name, formats[i]))
+            return i;
+    return strcmp(name, "jpg") ? -1 : SPL_FORMAT_JPEG;
+}
+
+uint32_t spl_pixel_bytes(enum spl_pixel_type type)
+{
+    return type == SPL_PIXEL_F32X3 ? 12 : 4;
+}
+
+void spl_image_finish(struct spl_image *image)
+{
+    if (!image)
+        return;
+    free(image->pixels);
+    memset(image, 0, sizeof *image);
+}
+
+void spl_encoded_finish(struct spl_encoded *encoded)
+{
+    if (!encoded)
+        return;
+    free(encoded->bytes);
+    memset(encoded, 0, sizeof *encoded);
+}
+
+static int check(const struct spl_image *image, const struct spl_encode_options *options, struct spl_error *err)
+{
+    if ((unsigned)options->format >= SPL_FORMAT_COUNT)
+        return spl_fail_field(err, SPL_E_UNSUPPORTED, "format", "image format %d does not exist", (int)options->format);
+    if (options->quality < 0 || options->quality > 100)
+        return spl_fail_field(err, SPL_E_USAGE, "quality", "quality %d is not in 1..100", options->quality);
+    if (!isfinite(options->depth_scale) || options->depth_scale < 0)
+        return spl_fail_field(err, SPL_E_USAGE, "depth_scale", "%g is not a positive number of steps per unit",
+                              options->depth_scale);
+    if ((unsigned)image->layer >= SPL_LAYER_COUNT || image->type != layers[image->layer].type)
+        return spl_fail_field(err, SPL_E_UNSUPPORTED, "layer", "layer %s does not have pixels of type %d",
+                              spl_layer_name(image->layer), (int)image->type);
+    if (!image->width || !image->height || !image->pixels)
+        return spl_fail(err, SPL_E_USAGE, "an image of %u x %u pixels has nothing to encode", image->width,
+                        image->height);
+    return SPL_OK;
+}
+
+int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                     struct spl_error *err)
+{
+    memset(out, 0, sizeof *out);
+    int rc = check(image, options, err);
+    if (rc)
+        return rc;
+    switch (options->format) {
+    case SPL_FORMAT_JPEG:
+        rc = spl_encode_jpeg(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
+        break;
+    case SPL_FORMAT_PNG:
+        rc = spl_encode_png(image, options->depth_scale > 0 ? options->depth_scale : default_depth_scale, out, err);
+        break;
+    case SPL_FORMAT_NPY:
+        rc = spl_encode_npy(image, out, err);
+        break;
+    default:
+        rc = spl_encode_raw(image, out, err);
+    }
+    if (rc)
+        spl_encoded_finish(out);
+    return rc;
+}

@@ -1,0 +1,107 @@
+/* PNG by libspng, fast rather than small: a frame is encoded while a client waits.
+ *
+ * libspng and zlib allocate through our checked allocator, so its refusals are errors like any other and the buffer it
+ * hands over is released with free(). Any thread. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <spng.h>
+
+#include "base/memory.h"
+#include "image/encode.h"
+
+struct shape {
+    uint8_t color_type, bit_depth;
+    const void *pixels;
+    size_t pixel_bytes;
+};
+
+static void *allocate(size_t size)
+{
+    return spl_alloc_raw(size, 1, NULL);
+}
+
+static void *reallocate(void *old, size_t size)
+{
+    return spl_realloc(old, size, 1, NULL);
+}
+
+static void *allocate_zeroed(size_t count, size_t size)
+{
+    return spl_alloc(count, size, NULL);
+}
+
+/* What the numbers of a depth image mean travels with the file. */
+static int describe_depth(spng_ctx *ctx, double depth_scale)
+{
+    char text[96];
+    int length = snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther",
+                          depth_scale);
+    struct spng_text note = {.keyword = "Depth-Scale", .type = SPNG_TEXT, .length = (size_t)length, .text = text};
+    return spng_set_text(ctx, &note, 1);
+}
+
+static int compress(const struct spl_image *image, const struct shape *shape, double depth_scale,
+                    struct spl_encoded *out, struct spl_error *err)
+{
+    struct spng_alloc allocator = {allocate, reallocate, allocate_zeroed, free};
+    spng_ctx *ctx = spng_ctx_new2(&allocator, SPNG_CTX_ENCODER);
+    if (!ctx)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory: no PNG encoder could be made");
+    struct spng_ihdr header = {.width = image->width, .height = image->height, .bit_depth = shape->bit_depth,
+                               .color_type = shape->color_type};
+    size_t bytes = (size_t)image->width * image->height * shape->pixel_bytes;
+    int status = spng_set_option(ctx, SPNG_ENCODE_TO_BUFFER, 1);
+    if (!status)
+        status = spng_set_option(ctx, SPNG_IMG_COMPRESSION_LEVEL, 1);
+    if (!status)
+        status = spng_set_option(ctx, SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_SUB);
+    if (!status)
+        status = spng_set_ihdr(ctx, &header);
+    if (!status && image->layer == SPL_LAYER_COLOR)
+        status = spng_set_srgb(ctx, 0);
+    if (!status && shape->bit_depth == 16)
+        status = describe_depth(ctx, depth_scale);
+    if (!status)
+        status = spng_encode_image(ctx, shape->pixels, bytes, SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE);
+    if (!status)
+        out->bytes = spng_get_png_buffer(ctx, &out->length, &status);
+    spng_ctx_free(ctx);
+    if (!status)
+        return SPL_OK;
+    if (status == SPNG_EMEM || status == SPNG_EZLIB_INIT)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory while a PNG of %u x %u pixels was encoded", image->width,
+                        image->height);
+    if (status == SPNG_EWIDTH || status == SPNG_EHEIGHT || status == SPNG_EOVERFLOW)
+        return spl_fail_field(err, SPL_E_LIMIT, status == SPNG_EHEIGHT ? "height" : "width",
+                              "%u x %u pixels are more than a PNG holds", image->width, image->height);
+    return spl_fail(err, SPL_E_INTERNAL, "PNG encoding failed: %s", spng_strerror(status));
+}
+
+int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err)
+{
+    out->media_type = "image/png";
+    struct shape shape = {SPNG_COLOR_TYPE_TRUECOLOR_ALPHA, 8, image->pixels, 4};
+    if (image->layer == SPL_LAYER_COLOR || image->layer == SPL_LAYER_ID)
+        return compress(image, &shape, depth_scale, out, err);
+
+    size_t count = (size_t)image->width * image->height;
+    shape.color_type = image->layer == SPL_LAYER_NORMAL ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_GRAYSCALE;
+    shape.pixel_bytes = image->layer == SPL_LAYER_NORMAL ? 3 : image->layer == SPL_LAYER_COVERAGE ? 1 : 2;
+    void *picture = spl_alloc_raw(count, shape.pixel_bytes, err);
+    if (!picture)
+        return SPL_E_NOMEM;
+    if (image->layer == SPL_LAYER_NORMAL) {
+        spl_convert_normal(image->pixels, count, picture);
+    } else if (image->layer == SPL_LAYER_COVERAGE) {
+        spl_convert_coverage(image->pixels, count, picture);
+    } else {
+        shape.bit_depth = 16;
+        out->saturated = spl_convert_depth16(image->pixels, count, depth_scale, picture);
+    }
+    shape.pixels = picture;
+    int rc = compress(image, &shape, depth_scale, out, err);
+    free(picture);
+    return rc;
+}
