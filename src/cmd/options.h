@@ -1,0 +1,24 @@
+/* Values of command line options. Each fails with SPL_E_USAGE, naming the option, what it takes and what it got. */
+#ifndef SPL_CMD_OPTIONS_H
+#define SPL_CMD_OPTIONS_H
+
+#include <stdint.h>
+
+#include "base/error.h"
+
+/* Finite and within [min, max]. */
+int spl_cmd_parse_real(const char *option, const char *text, double min, double max, double *out,
+                       struct spl_error *err);
+
+/* A whole decimal number within [min, max]. */
+int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint64_t max, uint64_t *out,
+                        struct spl_error *err);
+
+/* "X,Y,Z" */
+int spl_cmd_parse_vector(const char *option, const char *text, double out[3], struct spl_error *err);
+
+/* "WxH", both at least 1; upper limits are the renderer's. */
+int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height,
+                       struct spl_error *err);
+
+#endif
