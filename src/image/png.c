@@ -1,7 +1,6 @@
 /* PNG by libspng, fast rather than small: a frame is encoded while a client waits.
  *
- * libspng and zlib allocate through our checked allocator, so its refusals are errors like any other and the buffer it
- * hands over is released with free(). Any thread. */
+ * libspng and zlib allocate through our checked allocator, so that a refusal is an error like any other. Any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,14 +31,41 @@ static void *allocate_zeroed(size_t count, size_t size)
     return spl_alloc(count, size, NULL);
 }
 
-/* What the numbers of a depth image mean travels with the file. */
-static int describe_depth(spng_ctx *ctx, double depth_scale)
+/* libspng's own output buffer leaks when it cannot grow (0.7.3), so the bytes go to ours. */
+struct sink {
+    uint8_t *bytes;
+    size_t length, capacity;
+    bool refused;           /* libspng forgets why a write failed */
+};
+
+static int append(spng_ctx *ctx, void *user, void *bytes, size_t length)
 {
-    char text[96];
-    int length = snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther",
-                          depth_scale);
-    struct spng_text note = {.keyword = "Depth-Scale", .type = SPNG_TEXT, .length = (size_t)length, .text = text};
-    return spng_set_text(ctx, &note, 1);
+    (void)ctx;
+    struct sink *sink = user;
+    if (length > sink->capacity - sink->length) {
+        size_t capacity = 2 * sink->capacity + length;
+        uint8_t *grown = spl_realloc(sink->bytes, capacity, 1, NULL);
+        if (!grown) {
+            sink->refused = true;
+            return SPNG_IO_ERROR;
+        }
+        sink->bytes = grown;
+        sink->capacity = capacity;
+    }
+    memcpy(sink->bytes + sink->length, bytes, length);
+    sink->length += length;
+    return SPNG_OK;
+}
+
+static int fail(const struct spl_image *image, int status, struct spl_error *err)
+{
+    if (status == SPNG_EMEM || status == SPNG_EZLIB_INIT)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory while a PNG of %u x %u pixels was encoded", image->width,
+                        image->height);
+    if (status == SPNG_EWIDTH || status == SPNG_EHEIGHT || status == SPNG_EOVERFLOW)
+        return spl_fail_field(err, SPL_E_LIMIT, status == SPNG_EHEIGHT ? "height" : "width",
+                              "%u x %u pixels are more than a PNG holds", image->width, image->height);
+    return spl_fail(err, SPL_E_INTERNAL, "PNG encoding failed: %s", spng_strerror(status));
 }
 
 static int compress(const struct spl_image *image, const struct shape *shape, double depth_scale,
@@ -48,11 +74,18 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
     struct spng_alloc allocator = {allocate, reallocate, allocate_zeroed, free};
     spng_ctx *ctx = spng_ctx_new2(&allocator, SPNG_CTX_ENCODER);
     if (!ctx)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory: no PNG encoder could be made");
+        return fail(image, SPNG_EMEM, err);
+    struct sink sink = {0};
     struct spng_ihdr header = {.width = image->width, .height = image->height, .bit_depth = shape->bit_depth,
                                .color_type = shape->color_type};
     size_t bytes = (size_t)image->width * image->height * shape->pixel_bytes;
-    int status = spng_set_option(ctx, SPNG_ENCODE_TO_BUFFER, 1);
+    /* what the numbers of a depth image mean travels with the file; libspng borrows the text until it is encoded */
+    char text[96];
+    int length = snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther",
+                          depth_scale);
+    struct spng_text note = {.keyword = "Depth-Scale", .type = SPNG_TEXT, .length = (size_t)length, .text = text};
+
+    int status = spng_set_png_stream(ctx, append, &sink);
     if (!status)
         status = spng_set_option(ctx, SPNG_IMG_COMPRESSION_LEVEL, 1);
     if (!status)
@@ -62,21 +95,13 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
     if (!status && image->layer == SPL_LAYER_COLOR)
         status = spng_set_srgb(ctx, 0);
     if (!status && shape->bit_depth == 16)
-        status = describe_depth(ctx, depth_scale);
+        status = spng_set_text(ctx, &note, 1);
     if (!status)
         status = spng_encode_image(ctx, shape->pixels, bytes, SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE);
-    if (!status)
-        out->bytes = spng_get_png_buffer(ctx, &out->length, &status);
     spng_ctx_free(ctx);
-    if (!status)
-        return SPL_OK;
-    if (status == SPNG_EMEM || status == SPNG_EZLIB_INIT)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory while a PNG of %u x %u pixels was encoded", image->width,
-                        image->height);
-    if (status == SPNG_EWIDTH || status == SPNG_EHEIGHT || status == SPNG_EOVERFLOW)
-        return spl_fail_field(err, SPL_E_LIMIT, status == SPNG_EHEIGHT ? "height" : "width",
-                              "%u x %u pixels are more than a PNG holds", image->width, image->height);
-    return spl_fail(err, SPL_E_INTERNAL, "PNG encoding failed: %s", spng_strerror(status));
+    out->bytes = sink.bytes;
+    out->length = sink.length;
+    return status ? fail(image, sink.refused ? SPNG_EMEM : status, err) : SPL_OK;
 }
 
 int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err)

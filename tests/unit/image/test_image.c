@@ -388,7 +388,8 @@ static void every_failed_allocation_is_reported(void **state)
                                       &out, &err);
                 spl_memory_fail_after(0);
                 assert_int_equal(rc, err.code);
-                assert_true(rc == SPL_OK || rc == SPL_E_NOMEM);
+                if (rc && rc != SPL_E_NOMEM)
+                    fail_msg("format %d, layer %d, allocation %ld: %s", format, layer, attempt, err.message);
                 assert_true(!rc == !!out.bytes);
                 spl_encoded_finish(&out);
             }
