@@ -32,10 +32,25 @@
 #define SPL_BIND_CHUNKS 2  /* storage: struct spl_draw_chunk[] */
 #define SPL_BIND_PAGE 3    /* storage: uint[], one page of the dataset as it lies in the file */
 #define SPL_BIND_DEPTH 4   /* storage: uint[] or uint64[], one per sample */
-#define SPL_BIND_SUMS 5    /* storage: uint[], per sample: r g b weight [nx ny nz depth] */
+#define SPL_BIND_SUMS 5    /* storage: uint[], four words a sample, see splat_shade.comp */
 #define SPL_BIND_OUTPUT 6  /* storage: uint[], requested layers one after the other, one word a pixel */
 #define SPL_BIND_ID 7      /* storage: uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
+
+/* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */
+#define SPL_SUMS_COLOR 0
+#define SPL_SUMS_DEPTH 1  /* layers depth and range */
+#define SPL_SUMS_NORMAL 2
+#define SPL_SUMS_ID 3
+#define SPL_SUMS_COUNT 4
+
+/* Layers of the resolve pass, the values of enum spl_layer. */
+#define SPL_RESOLVE_COLOR 0
+#define SPL_RESOLVE_DEPTH 1
+#define SPL_RESOLVE_RANGE 2
+#define SPL_RESOLVE_NORMAL 3
+#define SPL_RESOLVE_ID 4
+#define SPL_RESOLVE_COVERAGE 5
 
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
@@ -83,7 +98,7 @@ struct spl_frame_params {
     SPL_U32 first_entry;
     SPL_U32 weight_max;                   /* largest fragment weight; chosen so that no sum can wrap */
     SPL_U32 background;                   /* RGBA8 */
-    SPL_U32 layers;                       /* bit per enum spl_layer */
+    SPL_U32 output_word;                  /* resolve: where the layer's pixels start in the output buffer */
 };
 
 #ifndef SPL_GLSL

@@ -1,0 +1,60 @@
+/* Method points: each splat's centre covers the one sample that it falls on; the nearest wins, the least payload among
+ * equals. With 64 bit atomics one pass keeps depth << 32 | payload; without, pass 0 finds the depth and pass 1 the
+ * payload. The payload (constant 0) is what the requested layer needs: colour, octahedral normal or id. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#ifdef SPL_ATOMICS_64
+#extension GL_EXT_shader_atomic_int64 : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+#include "common/splat.glsl"
+#include "common/octahedral.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
+layout(constant_id = 1) const uint PASS = 0;
+
+#ifdef SPL_ATOMICS_64
+layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint64_t depth[]; };
+#else
+layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint payloads[]; };
+#endif
+
+uint payload(splat s)
+{
+    if (GROUP == SPL_SUMS_COLOR) {
+        uvec3 c = load_color(s);
+        return c.x | c.y << 8 | c.z << 16;
+    }
+    if (GROUP == SPL_SUMS_NORMAL)
+        return pack_normal(s.normal);
+    return draw_chunks[s.chunk].first_id + s.index;
+}
+
+void main()
+{
+    uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
+    splat s;
+    if (entry >= frame.entries ||
+        !load_splat(entry, gl_GlobalInvocationID.x % SPL_GROUP_SPLATS, GROUP != SPL_SUMS_NORMAL, s))
+        return;
+    vec3 p = s.position;
+    if (!(p.z >= frame.near && p.z <= frame.far))
+        return;
+    precise vec2 center = vec2(frame.fx * (p.x / p.z) + frame.cx, frame.fy * (p.y / p.z) + frame.cy);
+    if (!(center.x >= 0.0 && center.y >= 0.0 && center.x < float(frame.width) && center.y < float(frame.height)))
+        return;
+    uint at = sample_index(ivec2(center)), bits = floatBitsToUint(p.z);
+#ifdef SPL_ATOMICS_64
+    if (bits <= uint(depth[at] >> 32))
+        atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload(s)));
+#else
+    if (PASS == 0) {
+        if (bits < depth[at])
+            atomicMin(depth[at], bits);
+    } else if (bits == depth[at]) {
+        atomicMin(payloads[at], payload(s));
+    }
+#endif
+}

@@ -1,0 +1,144 @@
+/* Resolve pass: sums or winners of the samples become one word a pixel of one layer (constant 0), for method splat
+ * (constant 1 = 0) or points (1). A pixel is the box average of its supersample^2 samples:
+ *   color     RGBA8, straight alpha over the background
+ *   depth     float, mean over the samples within 1 % of the nearest one, so that an edge gives no depth in between
+ *   range     the same along the ray
+ *   normal    octahedral word of the mean, world axes; SPL_NOTHING = none
+ *   id        that of the nearest sample, the least among equals
+ *   coverage  float, share of the samples that hold something */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#ifdef SPL_ATOMICS_64
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+#include "common/frame.glsl"
+#include "common/octahedral.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
+layout(constant_id = 1) const uint POINTS = 0;
+
+#ifdef SPL_ATOMICS_64
+layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint64_t depth[]; };
+#else
+layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
+#endif
+layout(std430, binding = SPL_BIND_ID) readonly buffer id_buffer { uint ids[]; };
+layout(std430, binding = SPL_BIND_SUMS) readonly buffer sums_buffer { uvec4 sums[]; };
+layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
+
+uint depth_word(uint at)
+{
+#ifdef SPL_ATOMICS_64
+    return uint(depth[at] >> 32);
+#else
+    return depth[at];
+#endif
+}
+
+uint payload(uint at)
+{
+#ifdef SPL_ATOMICS_64
+    return uint(depth[at] & 0xffffffffUL);
+#else
+    return ids[at];
+#endif
+}
+
+/* View depth of a covered sample. */
+float sample_depth(uint at)
+{
+    float first = uintBitsToFloat(depth_word(at));
+    if (POINTS != 0u)
+        return first;
+    uvec4 sum = sums[at];
+    precise float offset = (float(sum.y) * 512.0 + float(sum.x)) / float(sum.w);
+    precise float z = first - first * (offset * (1.0 / 262144.0));
+    return z;
+}
+
+vec3 sample_normal(uint at)
+{
+    if (POINTS != 0u)
+        return unpack_normal(payload(at));
+    uvec4 sum = sums[at];
+    return normalize(vec3(sum.xyz) / float(sum.w) - 127.5);
+}
+
+uvec3 sample_color(uint at)
+{
+    if (POINTS != 0u)
+        return (uvec3(payload(at)) >> uvec3(0u, 8u, 16u)) & 255u;
+    uvec4 sum = sums[at];
+    return (sum.xyz + sum.w / 2u) / max(sum.w, 1u);
+}
+
+void main()
+{
+    uint side = frame.supersample, width = frame.width / side, pixel = gl_GlobalInvocationID.x;
+    if (pixel >= width * (frame.height / side))
+        return;
+    ivec2 corner = ivec2(pixel % width, pixel / width) * int(side);
+    uint covered = 0u, nearest = SPL_NOTHING, id = SPL_NOTHING;
+    uvec3 color = uvec3(0u);
+    vec3 normal = vec3(0.0);
+    for (int y = 0; y < int(side); y++) {
+        for (int x = 0; x < int(side); x++) {
+            uint at = sample_index(corner + ivec2(x, y)), bits = depth_word(at);
+            if (bits == SPL_NOTHING)
+                continue;
+            covered++;
+            if (LAYER == SPL_RESOLVE_COLOR)
+                color += sample_color(at);
+            if (LAYER == SPL_RESOLVE_NORMAL)
+                normal += sample_normal(at);
+            if (LAYER == SPL_RESOLVE_ID && bits <= nearest)
+                id = bits == nearest ? min(id, payload(at)) : payload(at);
+            nearest = min(nearest, bits);
+        }
+    }
+
+    uint value = SPL_NOTHING;
+    if (LAYER == SPL_RESOLVE_COLOR) {
+        uint total = side * side, back_alpha = frame.background >> 24, back_weight = back_alpha * (total - covered);
+        uvec3 back = (uvec3(frame.background) >> uvec3(0u, 8u, 16u)) & 255u;
+        uint weight = 255u * covered + back_weight;
+        uvec3 rgb = weight == 0u ? uvec3(0u) : (255u * color + back_weight * back + weight / 2u) / weight;
+        value = rgb.x | rgb.y << 8 | rgb.z << 16 | ((weight + total / 2u) / total) << 24;
+    } else if (LAYER == SPL_RESOLVE_DEPTH || LAYER == SPL_RESOLVE_RANGE) {
+        float sum = 0.0, count = 0.0;
+        float limit = uintBitsToFloat(nearest) * 1.01;
+        for (int y = 0; y < int(side) && covered != 0u; y++) {
+            for (int x = 0; x < int(side); x++) {
+                uint at = sample_index(corner + ivec2(x, y)), bits = depth_word(at);
+                if (bits == SPL_NOTHING || uintBitsToFloat(bits) > limit)
+                    continue;
+                sum += sample_depth(at);
+                count += 1.0;
+            }
+        }
+        if (covered != 0u) {
+            precise float z = sum / count;
+            if (LAYER == SPL_RESOLVE_RANGE) {
+                precise vec2 center = vec2(corner) + 0.5 * float(side);
+                precise vec2 ray = vec2((center.x - frame.cx) / frame.fx, (center.y - frame.cy) / frame.fy);
+                precise float range = z * sqrt(1.0 + ray.x * ray.x + ray.y * ray.y);
+                z = range;
+            }
+            value = floatBitsToUint(z);
+        }
+    } else if (LAYER == SPL_RESOLVE_NORMAL) {
+        if (covered != 0u) {
+            vec3 world = vec3(frame.rotation[0] * normal.x + frame.rotation[4] * normal.y + frame.rotation[8] * normal.z,
+                              frame.rotation[1] * normal.x + frame.rotation[5] * normal.y + frame.rotation[9] * normal.z,
+                              frame.rotation[2] * normal.x + frame.rotation[6] * normal.y + frame.rotation[10] * normal.z);
+            float length_squared = dot(world, world);
+            value = pack_normal(length_squared > 0.0 ? world : vec3(0.0, 0.0, 1.0));
+        }
+    } else if (LAYER == SPL_RESOLVE_ID) {
+        value = id;
+    } else {
+        value = floatBitsToUint(float(covered) / float(side * side));
+    }
+    pixels[frame.output_word + pixel] = value;
+}

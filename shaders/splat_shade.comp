@@ -1,0 +1,80 @@
+/* Shade pass of method splat: integer sums over the fragments that lie within the blend margin of the first surface.
+ * One run per group of layers (constant 0); sums per sample are
+ *   color   r g b w
+ *   depth   low high - w    of w * offset, where offset counts 2^-18 of the pushed depth in front of it: low = bits 0..8
+ *   normal  x y z w         of w * (127 n + 127.5)
+ *   id      least dataset index among the discs that set the depth, in the id buffer */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#ifdef SPL_ATOMICS_64
+#extension GL_EXT_shader_atomic_int64 : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+#include "common/disc.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
+
+layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
+
+/* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves both. */
+#ifdef SPL_ATOMICS_64
+layout(std430, binding = SPL_BIND_SUMS) buffer sums_buffer { uint64_t sums[]; };
+void add(uint pair, uint a, uint b)
+{
+    atomicAdd(sums[pair], uint64_t(a) | uint64_t(b) << 32);
+}
+#else
+layout(std430, binding = SPL_BIND_SUMS) buffer sums_buffer { uint sums[]; };
+void add(uint pair, uint a, uint b)
+{
+    if (a != 0u)
+        atomicAdd(sums[2u * pair], a);
+    if (b != 0u)
+        atomicAdd(sums[2u * pair + 1u], b);
+}
+#endif
+
+void main()
+{
+    uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
+    splat s;
+    if (entry >= frame.entries || !load_splat(entry, gl_GlobalInvocationID.x % SPL_GROUP_SPLATS, false, s))
+        return;
+    if (!(s.position.z >= frame.near && s.position.z <= frame.far))
+        return;
+    uvec3 value = uvec3(0u);
+    if (GROUP == SPL_SUMS_COLOR)
+        value = load_color(s);
+    else if (GROUP == SPL_SUMS_NORMAL)
+        value = uvec3(s.normal * 127.0 + 127.5);
+    footprint f = disc_footprint(s);
+    for (int y = f.first.y; y <= f.last.y; y++) {
+        for (int x = f.first.x; x <= f.last.x; x++) {
+            float z;
+            float distance = disc_sample(s, f, ivec2(x, y), z);
+            uint at = sample_index(ivec2(x, y));
+            float first = uintBitsToFloat(depth[at]);
+            if (distance >= 1.0 || z > first)
+                continue;
+            if (GROUP == SPL_SUMS_ID) {
+                precise float pushed = z + f.margin;
+                if (pushed == first)
+                    atomicMin(ids[at], draw_chunks[s.chunk].first_id + s.index);
+                continue;
+            }
+            precise float share = (1.0 - distance) * float(frame.weight_max);
+            uint weight = max(uint(share + 0.5), 1u);
+            if (GROUP == SPL_SUMS_DEPTH) {
+                precise float offset = (first - z) / first * 262144.0;
+                uint sum = weight * min(uint(offset + 0.5), 262143u);
+                add(2u * at, sum & 511u, sum >> 9);
+                add(2u * at + 1u, 0u, weight);
+            } else {
+                add(2u * at, weight * value.x, weight * value.y);
+                add(2u * at + 1u, weight * value.z, weight);
+            }
+        }
+    }
+}

@@ -1,0 +1,263 @@
+/* A frame: the image is cut into tiles that fit the scratch buffers; each tile selects, uploads, records, waits, and is
+ * copied into the images. Supersampling is a larger tile that the resolve pass averages, so it costs no mechanism. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "render/readback.h"
+#include "render/renderer.h"
+
+#define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
+enum { default_margin = 1 };
+
+static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
+    [SPL_METHOD_SPLAT] = &spl_method_splat,
+    [SPL_METHOD_POINTS] = &spl_method_points,
+};
+
+/* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
+static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
+    [SPL_LAYER_COLOR] = SPL_SUMS_COLOR, [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
+    [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID, [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
+};
+
+struct frame_job {
+    struct spl_renderer *renderer;
+    struct spl_resident_dataset *resident;
+    const struct spl_view *view;
+    uint64_t deadline_ns;
+    struct spl_frame *frame;
+    struct spl_error page_error;     /* why a page could not be loaded, unless it was only the limit */
+};
+
+static bool ask_page(void *context, uint32_t page)
+{
+    struct frame_job *job = context;
+    struct spl_error why = {0};
+    int rc = spl_residency_ask(&job->renderer->residency, job->resident, page, &why);
+    if (rc && rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
+        spl_fail(&job->page_error, rc, "%s", why.message);
+    return rc == SPL_OK;
+}
+
+/* The largest weight of a fragment such that the sums over every splat that may reach a sample stay below 2^32: a splat
+ * adds at most 512 weight to any word (splat_shade.comp). 0 when even weight 1 is too much. */
+static uint32_t weight_max(uint64_t splats)
+{
+    uint64_t weight = UINT32_MAX / (512 * (splats ? splats : 1));
+    return weight > 255 ? 255 : (uint32_t)weight;
+}
+
+static void fill_params(struct spl_tile *tile)
+{
+    const struct spl_camera *camera = &tile->camera;
+    const struct spl_view *view = tile->view;
+    const uint8_t *b = view->background;
+    tile->params = (struct spl_frame_params){
+        .fx = (float)camera->fx,
+        .fy = (float)camera->fy,
+        .cx = (float)camera->cx,
+        .cy = (float)camera->cy,
+        .near = (float)camera->near,
+        .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
+        .low_pass = 0.70710678f, /* half a sample's diagonal: any centre then covers a sample */
+        .margin = view->margin < 0 ? default_margin : (float)view->margin,
+        .width = camera->width,
+        .height = camera->height,
+        .supersample = view->supersample,
+        .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
+    };
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            tile->params.rotation[4 * row + column] = (float)camera->rotation[3 * row + column];
+}
+
+static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_renderer *r = job->renderer;
+    struct spl_select_params params = {
+        .dataset = job->resident->dataset,
+        .camera = &tile->camera,
+        .lod = job->view->lod,
+        .low_pass = tile->params.low_pass,
+        .resident = ask_page,
+        .context = job,
+    };
+    spl_residency_begin_frame(&r->residency);
+    int rc = spl_select(&params, &r->list, err);
+    if (job->page_error.code)
+        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    tile->params.weight_max = weight_max(r->list.sample_splats);
+    if (!rc && !tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
+        return spl_fail_field(err, SPL_E_LIMIT, "lod", "at lod %g up to %llu splats would blend in one pixel; raise lod",
+                              job->view->lod, (unsigned long long)r->list.sample_splats);
+    return rc;
+}
+
+/* Records every group and layer of the view; the n-th requested layer starts at word n * pixels. */
+static int record(struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
+    bool first = true;
+    int rc = spl_gpu_begin(r->gpu, err);
+    if (rc)
+        return rc;
+    spl_tile_stamp(tile, SPL_STAGE_BEGIN);
+    for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
+        uint32_t layers = 0;
+        for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)
+            if (group_of_layer[layer] == group)
+                layers |= 1u << layer & wanted;
+        if (!layers)
+            continue;
+        rc = methods[tile->view->method]->record(tile, group, first, err);
+        first = false;
+        for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
+            if (layers >> layer & 1)
+                rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);
+        spl_gpu_barrier(r->gpu);
+        spl_tile_stamp(tile, SPL_STAGE_RESOLVE);
+    }
+    if (!rc && r->scratch.output) {
+        spl_gpu_copy(r->gpu, r->scratch.output, 0, r->scratch.readback, 0,
+                     (uint64_t)pixels * 4 * (uint32_t)__builtin_popcount(wanted));
+        spl_gpu_barrier(r->gpu);
+    }
+    return rc;
+}
+
+static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats)
+{
+    double *const stage_ms[] = {
+        [SPL_STAGE_CLEAR] = &stats->clear_ms,
+        [SPL_STAGE_DEPTH] = &stats->depth_ms,
+        [SPL_STAGE_SHADE] = &stats->shade_ms,
+        [SPL_STAGE_RESOLVE] = &stats->resolve_ms,
+    };
+    for (uint32_t i = 1; i < tile->stamps; i++) {
+        uint64_t from = spl_gpu_get_timestamp_ns(tile->renderer->gpu, i - 1);
+        uint64_t to = spl_gpu_get_timestamp_ns(tile->renderer->gpu, i);
+        if (from && to > from)
+            *stage_ms[tile->stamp_stage[i]] += (double)(to - from) * 1e-6;
+    }
+}
+
+static double since_ms(uint64_t *from)
+{
+    uint64_t now = spl_now_ns();
+    double ms = (double)(now - *from) * 1e-6;
+    *from = now;
+    return ms;
+}
+
+static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_renderer *r = job->renderer;
+    struct spl_frame_stats *stats = &job->frame->stats;
+    uint64_t ticket, clock = spl_now_ns();
+    if (clock >= job->deadline_ns)
+        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+    int rc = select_tile(job, tile, err);
+    stats->select_ms += since_ms(&clock);
+    if (!rc)
+        rc = spl_scratch_upload(&r->scratch, r->gpu, &r->list, err);
+    stats->upload_ms += since_ms(&clock);
+    if (!rc)
+        rc = record(tile, err);
+    if (!rc)
+        rc = spl_gpu_submit(r->gpu, &ticket, err);
+    /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
+    if (!rc)
+        rc = spl_gpu_wait(r->gpu, ticket, spl_now_ns() + FRAME_DEADLINE_NS, err);
+    if (rc)
+        return rc;
+    clock = spl_now_ns();
+    spl_readback_tile(tile, spl_gpu_buffer_map(r->scratch.readback), job->frame->images);
+    stats->readback_ms += since_ms(&clock);
+    add_times(tile, stats);
+    stats->splats_drawn += r->list.splats;
+    stats->chunks_drawn += r->list.chunk_count;
+    stats->nodes_drawn += r->list.nodes;
+    stats->complete &= r->list.complete;
+    stats->tiles++;
+    return SPL_OK;
+}
+
+/* The tile whose corner is (x, y): as wide as the image, as high as the scratch allows, in whole pixels. */
+static void place_tile(const struct frame_job *job, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
+                       struct spl_tile *tile)
+{
+    const struct spl_camera *whole = &job->view->camera;
+    uint32_t side = job->view->supersample;
+    *tile = (struct spl_tile){
+        .renderer = job->renderer,
+        .resident = job->resident,
+        .view = job->view,
+        .camera = *whole,
+        .x = x,
+        .y = y,
+        .width = width,
+        .height = height,
+        .samples = (uint64_t)width * side * height * side,
+    };
+    tile->camera.width = width * side;
+    tile->camera.height = height * side;
+    tile->camera.fx = whole->fx * side;
+    tile->camera.fy = whole->fy * side;
+    tile->camera.cx = (whole->cx - x) * side;
+    tile->camera.cy = (whole->cy - y) * side;
+    fill_params(tile);
+}
+
+static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        if (!(view->layers >> layer & 1))
+            continue;
+        struct spl_image *image = &frame->images[layer];
+        *image = (struct spl_image){.layer = layer, .type = spl_readback_type(layer), .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
+        if (!image->pixels)
+            return SPL_E_NOMEM;
+    }
+    return SPL_OK;
+}
+
+int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err)
+{
+    memset(frame, 0, sizeof *frame);
+    uint64_t start = spl_now_ns(), loaded = renderer->residency.pages_loaded;
+    struct frame_job job = {.renderer = renderer, .view = view, .frame = frame, .deadline_ns = view->deadline_ns};
+    int rc = spl_view_check(view, err);
+    if (rc)
+        return rc;
+    job.resident = spl_residency_get(&renderer->residency, dataset);
+    if (!job.resident)
+        return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
+    frame->stats.complete = true;
+    rc = make_images(frame, view, err);
+
+    uint32_t side = view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
+    uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
+    uint64_t pixels = renderer->scratch.samples / per_pixel;
+    uint32_t width = view->camera.width < pixels ? view->camera.width : (uint32_t)pixels;
+    uint32_t rows = (uint32_t)(pixels / width);
+    for (uint32_t y = 0; y < view->camera.height && !rc; y += rows) {
+        uint32_t height = view->camera.height - y < rows ? view->camera.height - y : rows;
+        for (uint32_t x = 0; x < view->camera.width && !rc; x += width) {
+            struct spl_tile tile;
+            place_tile(&job, x, y, view->camera.width - x < width ? view->camera.width - x : width, height, &tile);
+            rc = render_tile(&job, &tile, err);
+        }
+    }
+    frame->stats.pages_loaded = renderer->residency.pages_loaded - loaded;
+    frame->stats.total_ms = since_ms(&start);
+    if (rc)
+        spl_frame_finish(frame);
+    return rc;
+}

@@ -1,0 +1,49 @@
+/* View-space bounds of boxes against a tile's frustum. Doubles: the box's corner is relative to the eye before anything
+ * is rounded. */
+#ifndef SPL_RENDER_FRUSTUM_H
+#define SPL_RENDER_FRUSTUM_H
+
+#include <math.h>
+#include <stdbool.h>
+
+#include <splatd/camera.h>
+
+/* An axis-aligned box in view space: centre and the half extents of its bounding view-aligned box. */
+struct spl_view_box {
+    double center[3], half[3];
+};
+
+/* `least` is the box's least corner relative to the eye, world axes. */
+static inline struct spl_view_box spl_view_box(const struct spl_camera *camera, const double least[3],
+                                               const double size[3])
+{
+    struct spl_view_box box;
+    double middle[3] = {least[0] + size[0] / 2, least[1] + size[1] / 2, least[2] + size[2] / 2};
+    for (int i = 0; i < 3; i++) {
+        const double *r = camera->rotation + 3 * i;
+        box.center[i] = r[0] * middle[0] + r[1] * middle[1] + r[2] * middle[2];
+        box.half[i] = (fabs(r[0]) * size[0] + fabs(r[1]) * size[1] + fabs(r[2]) * size[2]) / 2;
+    }
+    return box;
+}
+
+/* False when no part of the box can reach the image, `pad` samples around it included. Conservative. */
+static inline bool spl_view_box_visible(const struct spl_camera *camera, const struct spl_view_box *box, double pad)
+{
+    double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
+    if (far < camera->near || near > camera->far)
+        return false;
+    /* The plane through the eye and an image edge at slope s: outside when x - s z > 0 over the whole box. */
+    double edges[4] = {(camera->width + pad - camera->cx) / camera->fx, (-pad - camera->cx) / camera->fx,
+                       (camera->height + pad - camera->cy) / camera->fy, (-pad - camera->cy) / camera->fy};
+    for (int i = 0; i < 4; i++) {
+        int axis = i / 2;
+        double sign = i % 2 ? -1 : 1;
+        double distance = sign * (box->center[axis] - edges[i] * box->center[2]);
+        if (distance > box->half[axis] + fabs(edges[i]) * box->half[2])
+            return false;
+    }
+    return true;
+}
+
+#endif

@@ -1,0 +1,34 @@
+/* Method splat: depth, attribute and resolve passes of the sparse-coded-splat-textures paper, section 3.6, as compute
+ * kernels. The depth pass runs once a tile, the shade pass once a group of layers. */
+#include "render/renderer.h"
+
+static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    struct spl_gpu_kernel *depth, *shade;
+    int rc = spl_renderer_get_kernel(r, SPL_KERNEL_SPLAT_DEPTH, &depth, err);
+    if (!rc)
+        rc = spl_renderer_get_kernel(r, SPL_KERNEL_SPLAT_SHADE + group, &shade, err);
+    if (rc)
+        return rc;
+    if (first)
+        spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * 4, SPL_NOTHING);
+    if (group == SPL_SUMS_ID)
+        spl_gpu_fill(r->gpu, r->scratch.ids, 0, tile->samples * 4, SPL_NOTHING);
+    else
+        spl_gpu_fill(r->gpu, r->scratch.sums, 0, tile->samples * 16, 0);
+    spl_gpu_barrier(r->gpu);
+    spl_tile_stamp(tile, SPL_STAGE_CLEAR);
+    if (first) {
+        rc = spl_tile_dispatch_splats(tile, depth, err);
+        spl_gpu_barrier(r->gpu);
+        spl_tile_stamp(tile, SPL_STAGE_DEPTH);
+    }
+    if (!rc)
+        rc = spl_tile_dispatch_splats(tile, shade, err);
+    spl_gpu_barrier(r->gpu);
+    spl_tile_stamp(tile, SPL_STAGE_SHADE);
+    return rc;
+}
+
+const struct spl_method_ops spl_method_splat = {.name = "splat", .record = record};

@@ -1,0 +1,69 @@
+/* Counts as a two-dimensional difference array (modulo 2^64, so negative differences are fine) and sums once. */
+#include "render/occupancy.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+enum { cell = 16 };
+
+int spl_occupancy_init(struct spl_occupancy *occupancy, uint32_t width, uint32_t height, struct spl_error *err)
+{
+    *occupancy = (struct spl_occupancy){.columns = width / cell + 2, .rows = height / cell + 2};
+    occupancy->cells = spl_alloc((size_t)occupancy->columns * occupancy->rows, sizeof *occupancy->cells, err);
+    return occupancy->cells ? SPL_OK : SPL_E_NOMEM;
+}
+
+void spl_occupancy_finish(struct spl_occupancy *occupancy)
+{
+    free(occupancy->cells);
+    *occupancy = (struct spl_occupancy){0};
+}
+
+/* First cell and one past the last that samples of [low, high] fall into, within `count` usable cells. */
+static void span(double low, double high, uint32_t count, uint32_t *first, uint32_t *end)
+{
+    double a = floor(low / cell), b = floor(high / cell) + 1;
+    *first = a > 0 ? (a < count ? (uint32_t)a : count) : 0;
+    *end = b > 0 ? (b < count ? (uint32_t)b : count) : 0;
+}
+
+void spl_occupancy_add(struct spl_occupancy *occupancy, const struct spl_camera *camera, const struct spl_view_box *box,
+                       uint32_t splats)
+{
+    double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
+    if (near < camera->near) {
+        occupancy->everywhere += splats;
+        return;
+    }
+    double low[2], high[2], focal[2] = {camera->fx, camera->fy}, center[2] = {camera->cx, camera->cy};
+    for (int i = 0; i < 2; i++) {
+        double a = box->center[i] - box->half[i], b = box->center[i] + box->half[i];
+        low[i] = focal[i] * (a / (a < 0 ? near : far)) + center[i] - 2; /* 2: the low pass and rounding */
+        high[i] = focal[i] * (b / (b > 0 ? near : far)) + center[i] + 2;
+    }
+    uint32_t x0, x1, y0, y1, stride = occupancy->columns;
+    span(low[0], high[0], occupancy->columns - 1, &x0, &x1);
+    span(low[1], high[1], occupancy->rows - 1, &y0, &y1);
+    occupancy->cells[y0 * stride + x0] += splats;
+    occupancy->cells[y0 * stride + x1] -= splats;
+    occupancy->cells[y1 * stride + x0] -= splats;
+    occupancy->cells[y1 * stride + x1] += splats;
+}
+
+uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy)
+{
+    uint64_t most = 0, *cells = occupancy->cells;
+    uint32_t stride = occupancy->columns;
+    for (uint32_t y = 0; y < occupancy->rows; y++) {
+        uint64_t row = 0;
+        for (uint32_t x = 0; x < stride; x++) {
+            row += cells[y * stride + x];
+            cells[y * stride + x] = row + (y ? cells[(y - 1) * stride + x] : 0);
+            if (cells[y * stride + x] > most)
+                most = cells[y * stride + x];
+        }
+    }
+    return most + occupancy->everywhere;
+}

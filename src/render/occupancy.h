@@ -1,0 +1,29 @@
+/* An upper bound of how many splats can reach any one sample, so that the shade pass picks the largest fragment weight
+ * whose 32 bit sums cannot wrap: cells of 16 x 16 samples count the splats of every chunk whose bounds touch them. */
+#ifndef SPL_RENDER_OCCUPANCY_H
+#define SPL_RENDER_OCCUPANCY_H
+
+#include <stdint.h>
+
+#include <splatd/camera.h>
+
+#include "base/error.h"
+#include "render/frustum.h"
+
+struct spl_occupancy {
+    uint32_t columns, rows;
+    uint64_t everywhere;   /* splats of chunks that have no bounded projection */
+    uint64_t *cells;       /* 2-D differences until the bound is asked for: one add a corner, whatever the size */
+};
+
+int spl_occupancy_init(struct spl_occupancy *occupancy, uint32_t width, uint32_t height, struct spl_error *err);
+void spl_occupancy_finish(struct spl_occupancy *occupancy);
+
+/* Counts `splats` over the samples that `box` projects to. */
+void spl_occupancy_add(struct spl_occupancy *occupancy, const struct spl_camera *camera, const struct spl_view_box *box,
+                       uint32_t splats);
+
+/* The largest cell. Call once, after the last add. */
+uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy);
+
+#endif

@@ -1,0 +1,49 @@
+/* Which pages of which datasets are on the device. Pages are loaded when a view asks for them and evicted, least recently
+ * drawn first, when the device's memory limit refuses another. Bookkeeping of the renderer's thread. */
+#ifndef SPL_RENDER_RESIDENCY_H
+#define SPL_RENDER_RESIDENCY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/error.h"
+#include "dataset/dataset.h"
+#include "gpu/gpu.h"
+
+struct spl_resident_page {
+    struct spl_gpu_buffer *buffer; /* NULL = not resident */
+    uint64_t last_frame;           /* when it was last asked for */
+};
+
+struct spl_resident_dataset {
+    const struct spl_dataset *dataset;  /* borrowed */
+    struct spl_resident_page *pages;
+    uint32_t page_count;
+};
+
+struct spl_residency {
+    struct spl_gpu *gpu;
+    struct spl_gpu_buffer *staging;     /* hardware only: software draws from mapped memory */
+    struct spl_resident_dataset *datasets;
+    size_t dataset_count, dataset_capacity;
+    uint64_t frame;                     /* pages asked for in this frame are never evicted */
+    uint64_t pages_loaded;              /* since init */
+};
+
+void spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu);
+void spl_residency_finish(struct spl_residency *residency);
+
+int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err);
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset);
+
+/* NULL when `dataset` was not added. Valid until the next add or remove. */
+struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
+
+/* Starts a frame: what was asked for before may be evicted again. */
+void spl_residency_begin_frame(struct spl_residency *residency);
+
+/* Makes page `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
+int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
+                      struct spl_error *err);
+
+#endif

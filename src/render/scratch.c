@@ -1,0 +1,75 @@
+/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's two buffers may grow. */
+#include "render/renderer.h"
+
+#include <string.h>
+
+enum { chunks_at_start = 32768, entries_at_start = 262144 };
+
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, struct spl_error *err)
+{
+    const struct spl_gpu_limits *limits = spl_gpu_get_limits(gpu);
+    if (samples * 16 > limits->binding_bytes)
+        samples = limits->binding_bytes / 16;
+    *scratch = (struct spl_scratch){.samples = samples};
+    bool software = spl_gpu_get_device(gpu)->software;
+    const struct {
+        struct spl_gpu_buffer **buffer;
+        enum spl_gpu_buffer_kind kind;
+        uint64_t bytes;
+    } wanted[] = {
+        {&scratch->depth, SPL_GPU_DEVICE, samples * (limits->atomics_64 ? 8 : 4)},
+        {&scratch->sums, SPL_GPU_DEVICE, samples * 16},
+        {&scratch->ids, SPL_GPU_DEVICE, samples * 4},
+        {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
+        {&scratch->readback, SPL_GPU_READBACK, samples * 4},
+        {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
+        {&scratch->chunks, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_draw_chunk)},
+        {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
+    };
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        int rc = wanted[i].bytes
+                     ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
+                     : SPL_OK;
+        if (rc) {
+            spl_scratch_finish(scratch, gpu);
+            return rc;
+        }
+    }
+    return SPL_OK;
+}
+
+void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
+{
+    struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->sums,   scratch->ids,    scratch->output,
+                                    scratch->readback, scratch->params, scratch->chunks, scratch->entries};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        spl_gpu_buffer_destroy(gpu, all[i]);
+    *scratch = (struct spl_scratch){0};
+}
+
+static int upload(struct spl_gpu *gpu, struct spl_gpu_buffer **buffer, const void *from, uint64_t bytes,
+                  struct spl_error *err)
+{
+    if (spl_gpu_buffer_get_bytes(*buffer) < bytes) {
+        uint64_t larger = spl_gpu_buffer_get_bytes(*buffer), most = spl_gpu_get_limits(gpu)->binding_bytes;
+        while (larger < bytes)
+            larger *= 2;
+        if (larger > most && bytes <= most)
+            larger = most;
+        struct spl_gpu_buffer *replacement;
+        int rc = spl_gpu_buffer_create(gpu, SPL_GPU_UPLOAD, larger, &replacement, err);
+        if (rc)
+            return rc;
+        spl_gpu_buffer_destroy(gpu, *buffer);
+        *buffer = replacement;
+    }
+    memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
+    return SPL_OK;
+}
+
+int spl_scratch_upload(struct spl_scratch *scratch, struct spl_gpu *gpu, const struct spl_draw_list *list,
+                       struct spl_error *err)
+{
+    int rc = upload(gpu, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
+    return rc ? rc : upload(gpu, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
+}

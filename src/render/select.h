@@ -1,0 +1,53 @@
+/* Level selection: the cut through the octree that one tile of a frame draws, as a draw list.
+ *
+ * Front to back from the root: a node outside the frustum is dropped; one whose splats are at most `lod` samples apart,
+ * or that has no children, is drawn; else its children are. Inside a drawn node every chunk is culled on its own and
+ * drawn with the fraction (spacing / lod)^2 of its splats, 1/4 at least, radii scaled by 1/sqrt(fraction): continuous
+ * detail (prune and scale of papers/textured-splats-panoramas). Pure but for the residency callback; the renderer's
+ * thread. */
+#ifndef SPL_RENDER_SELECT_H
+#define SPL_RENDER_SELECT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <splatd/camera.h>
+
+#include "base/error.h"
+#include "dataset/dataset.h"
+
+/* The draw-list entries of one page: what one dispatch works off. */
+struct spl_draw_batch {
+    uint32_t page;
+    uint32_t first_entry, entries;
+};
+
+struct spl_draw_list {
+    struct spl_draw_chunk *chunks;    /* visible chunks, front to back */
+    uint32_t *entries;                /* chunk index << SPL_GROUP_BITS | group, grouped by page */
+    struct spl_draw_batch *batches;   /* pages in the order in which they were first met */
+    size_t chunk_count, entry_count, batch_count;
+    size_t chunk_capacity, entry_capacity, batch_capacity;
+    uint32_t *batch_of_chunk;         /* chunk_count, scratch */
+    uint64_t splats;
+    uint32_t nodes;
+    uint64_t sample_splats;           /* upper bound of the splats that reach any one sample */
+    bool complete;                    /* false: a coarser node stood in for pages that are not resident */
+};
+
+struct spl_select_params {
+    const struct spl_dataset *dataset;
+    const struct spl_camera *camera;  /* of the tile, in samples */
+    double lod;                       /* samples; 0 = leaves in full */
+    double low_pass;                  /* samples */
+    bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
+    void *context;
+};
+
+/* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */
+int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);
+
+void spl_draw_list_finish(struct spl_draw_list *list);
+
+#endif

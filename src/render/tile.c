@@ -1,0 +1,116 @@
+/* Recording the dispatches of one tile: parameters, bindings, timestamps, kernels. */
+#include <string.h>
+
+#include "render/renderer.h"
+
+/* Every kernel's name and constants. */
+static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t constants[2], size_t *count)
+{
+    *count = 0;
+    if (slot == SPL_KERNEL_SPLAT_DEPTH)
+        return "splat_depth";
+    if (slot < SPL_KERNEL_POINTS) {
+        constants[(*count)++] = slot - SPL_KERNEL_SPLAT_SHADE;
+        return wide ? "splat_shade64" : "splat_shade";
+    }
+    *count = 2;
+    if (slot < SPL_KERNEL_RESOLVE) {
+        constants[0] = (slot - SPL_KERNEL_POINTS) / 2;
+        constants[1] = (slot - SPL_KERNEL_POINTS) % 2;
+        return wide ? "points64" : "points";
+    }
+    constants[0] = (slot - SPL_KERNEL_RESOLVE) / 2;
+    constants[1] = (slot - SPL_KERNEL_RESOLVE) % 2;
+    return wide && constants[1] ? "resolve64" : "resolve";
+}
+
+int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot slot, struct spl_gpu_kernel **out,
+                            struct spl_error *err)
+{
+    if (!renderer->kernels[slot]) {
+        uint32_t constants[2];
+        size_t count;
+        const char *name = describe(slot, spl_gpu_get_limits(renderer->gpu)->atomics_64, constants, &count);
+        int rc = spl_gpu_kernel_create(renderer->gpu, name, constants, count, &renderer->kernels[slot], err);
+        if (rc)
+            return rc;
+    }
+    *out = renderer->kernels[slot];
+    return SPL_OK;
+}
+
+static int next_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
+                       struct spl_error *err)
+{
+    struct spl_gpu_buffer *buffer = tile->renderer->scratch.params;
+    if (tile->slots_used == SPL_PARAMS_SLOTS)
+        return spl_fail(err, SPL_E_LIMIT, "a view touches more than %d pages at once; raise lod", SPL_PARAMS_SLOTS);
+    uint64_t offset = (uint64_t)tile->slots_used++ * SPL_PARAMS_STRIDE;
+    memcpy((char *)spl_gpu_buffer_map(buffer) + offset, params, sizeof *params);
+    *binding = (struct spl_gpu_binding){.buffer = buffer, .offset = offset, .bytes = SPL_PARAMS_STRIDE};
+    return SPL_OK;
+}
+
+static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_BIND_COUNT])
+{
+    const struct spl_scratch *scratch = &tile->renderer->scratch;
+    memset(bindings, 0, SPL_BIND_COUNT * sizeof *bindings);
+    bindings[SPL_BIND_DRAW].buffer = scratch->entries;
+    bindings[SPL_BIND_CHUNKS].buffer = scratch->chunks;
+    bindings[SPL_BIND_DEPTH].buffer = scratch->depth;
+    bindings[SPL_BIND_SUMS].buffer = scratch->sums;
+    bindings[SPL_BIND_ID].buffer = scratch->ids;
+    bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
+}
+
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, struct spl_error *err)
+{
+    enum { entries_per_workgroup = SPL_WORKGROUP / SPL_GROUP_SPLATS };
+    const struct spl_draw_list *list = &tile->renderer->list;
+    uint64_t most = (uint64_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * entries_per_workgroup;
+    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
+    bind_scratch(tile, bindings);
+    for (size_t i = 0; i < list->batch_count; i++) {
+        const struct spl_draw_batch *batch = &list->batches[i];
+        bindings[SPL_BIND_PAGE].buffer = tile->resident->pages[batch->page].buffer;
+        for (uint32_t done = 0; done < batch->entries;) {
+            uint32_t left = batch->entries - done;
+            struct spl_frame_params params = tile->params;
+            params.first_entry = batch->first_entry + done;
+            params.entries = left < most ? left : (uint32_t)most;
+            int rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
+            if (rc)
+                return rc;
+            spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
+                             (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
+            done += params.entries;
+        }
+    }
+    return SPL_OK;
+}
+
+int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)
+{
+    struct spl_gpu_kernel *kernel;
+    uint32_t slot = SPL_KERNEL_RESOLVE + 2 * layer + (tile->view->method == SPL_METHOD_POINTS);
+    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
+    if (rc)
+        return rc;
+    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
+    bind_scratch(tile, bindings);
+    struct spl_frame_params params = tile->params;
+    params.output_word = output_word;
+    rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
+    if (!rc)
+        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
+                         (tile->width * tile->height + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
+    return rc;
+}
+
+void spl_tile_stamp(struct spl_tile *tile, enum spl_stage stage)
+{
+    if (tile->stamps == SPL_GPU_TIMESTAMPS_MAX)
+        return;
+    tile->stamp_stage[tile->stamps] = (uint8_t)stage;
+    spl_gpu_timestamp(tile->renderer->gpu, tile->stamps++);
+}
