@@ -1,12 +1,10 @@
-/* Structs and constants that C and GLSL share. C includes it from shaders/shared_c.h users only through
- * "shared.h"; GLSL includes it as it is. Only 4-byte scalars, so that std430 and C agree without padding; sizes are
- * asserted on the C side here and on the GLSL side by the layout test in tests/gpu. */
+/* Structs and constants that C and GLSL share; both include this file as it is. Only 4-byte scalars, so that std430 and C
+ * agree without padding. Sizes are asserted on the C side here; every device reads each field on the GLSL side in the
+ * self-test at open (selftest.comp: a changed struct changes it there too). */
 #ifndef SPL_SHARED_H
 #define SPL_SHARED_H
 
-#ifdef GL_core_profile
-#define SPL_GLSL 1
-#elif defined(VULKAN)
+#ifdef GL_core_profile /* predefined in both of glslang's flavours */
 #define SPL_GLSL 1
 #endif
 
@@ -26,15 +24,16 @@
 #define SPL_GROUP_BITS 4
 #define SPL_WORKGROUP 64
 
-/* Binding numbers are unique over uniform and storage buffers, so that one numbering serves Vulkan and OpenGL. */
-#define SPL_BIND_FRAME 0   /* uniform: struct spl_frame_params */
-#define SPL_BIND_DRAW 1    /* storage: uint[], draw-list entries of this dispatch's page, front to back */
-#define SPL_BIND_CHUNKS 2  /* storage: struct spl_draw_chunk[] */
-#define SPL_BIND_PAGE 3    /* storage: uint[], one page of the dataset as it lies in the file */
-#define SPL_BIND_DEPTH 4   /* storage: uint[] or uint64[], one per sample */
-#define SPL_BIND_SUMS 5    /* storage: uint[], four words a sample, see splat_shade.comp */
-#define SPL_BIND_OUTPUT 6  /* storage: uint[], requested layers one after the other, one word a pixel */
-#define SPL_BIND_ID 7      /* storage: uint[], id of the nearest splat, one per sample */
+/* Every binding is a std430 storage buffer (a uniform block would pad arrays to 16 bytes an element); one numbering
+ * serves Vulkan (set 0) and OpenGL. */
+#define SPL_BIND_FRAME 0   /* struct spl_frame_params */
+#define SPL_BIND_DRAW 1    /* uint[], draw-list entries of this dispatch's page, front to back */
+#define SPL_BIND_CHUNKS 2  /* struct spl_draw_chunk[] */
+#define SPL_BIND_PAGE 3    /* uint[], one page of the dataset as it lies in the file */
+#define SPL_BIND_DEPTH 4   /* uint[] or uint64[], one per sample */
+#define SPL_BIND_SUMS 5    /* uint[], four words a sample, see splat_shade.comp */
+#define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
+#define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
 
 /* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */

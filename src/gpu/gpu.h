@@ -46,13 +46,14 @@ void spl_gpu_close(struct spl_gpu *gpu); /* NULL-safe; waits (bounded) for what 
 const struct spl_device_info *spl_gpu_get_device(const struct spl_gpu *gpu);
 const struct spl_gpu_limits *spl_gpu_get_limits(const struct spl_gpu *gpu);
 uint64_t spl_gpu_get_memory(const struct spl_gpu *gpu); /* bytes of all live buffers */
+uint64_t spl_gpu_get_complaints(const struct spl_gpu *gpu); /* with options.debug: warnings and errors of the driver */
 
 /* Every device of every backend, unusable ones with a reason; returns how many there are, writes at most capacity. */
 size_t spl_gpu_list(struct spl_device_info *devices, size_t capacity);
 
 enum spl_gpu_buffer_kind {
     SPL_GPU_DEVICE,    /* storage on the device; filled by spl_gpu_copy/_fill */
-    SPL_GPU_UPLOAD,    /* mapped for writing; usable as storage or uniform binding and as copy source */
+    SPL_GPU_UPLOAD,    /* mapped for writing; usable as storage binding and as copy source */
     SPL_GPU_READBACK,  /* mapped for reading after a wait; storage binding or copy target */
 };
 
@@ -71,13 +72,13 @@ int spl_gpu_kernel_create(struct spl_gpu *gpu, const char *name, const uint32_t 
                           struct spl_gpu_kernel **out, struct spl_error *err);
 void spl_gpu_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel); /* NULL-safe */
 
-/* What a dispatch sees: slot i is binding i of shared.h; buffer NULL = unused. Slot 0 is the uniform block. */
+/* What a dispatch sees: slot i is binding i of shared.h; buffer NULL = unused. */
 struct spl_gpu_binding {
     struct spl_gpu_buffer *buffer;
     uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
 };
 
-/* Recording. One list at a time: begin … submit. Errors of recording (bad ranges are our bugs: assertions) surface at
+/* Recording. One list at a time: begin … submit. Lists run in order, each seeing all that the one before wrote. Errors of recording (bad ranges are our bugs: assertions) surface at
  * submit. */
 int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
 void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,

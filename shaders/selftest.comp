@@ -1,0 +1,103 @@
+/* Proves at open that a device runs our kernels as we mean them: struct layout of shared.h, specialisation constants,
+ * storage bindings 0..7, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c checks every word.
+ *
+ * OUTPUT: constants 0..7, then each field of frame, then each field of chunks[1], in the order of shared.h.
+ * DRAW[i] -> SUMS[i] = bits of float(DRAW[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of DRAW, [3] or of ~PAGE;
+ * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#ifdef SPL_ATOMICS_64
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_shader_atomic_int64 : require
+#endif
+#include "shared.h"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint c0 = 0;
+layout(constant_id = 1) const uint c1 = 0;
+layout(constant_id = 2) const uint c2 = 0;
+layout(constant_id = 3) const uint c3 = 0;
+layout(constant_id = 4) const uint c4 = 0;
+layout(constant_id = 5) const uint c5 = 0;
+layout(constant_id = 6) const uint c6 = 0;
+layout(constant_id = 7) const uint c7 = 0;
+
+layout(std430, binding = SPL_BIND_FRAME) readonly buffer Frame { spl_frame_params frame; };
+layout(std430, binding = SPL_BIND_DRAW) readonly buffer Draw { uint draw[]; };
+layout(std430, binding = SPL_BIND_CHUNKS) readonly buffer Chunks { spl_draw_chunk chunks[]; };
+layout(std430, binding = SPL_BIND_PAGE) readonly buffer Page { uint page[]; };
+#ifdef SPL_ATOMICS_64
+layout(std430, binding = SPL_BIND_DEPTH) buffer Depth { uint64_t depth[]; };
+#else
+layout(std430, binding = SPL_BIND_DEPTH) buffer Depth { uint depth[]; };
+#endif
+layout(std430, binding = SPL_BIND_SUMS) writeonly buffer Sums { uint sums[]; };
+layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer Output { uint words[]; };
+layout(std430, binding = SPL_BIND_ID) writeonly buffer Id { uint ids[]; };
+
+uint at = 0;
+
+void put(uint word)
+{
+    words[at++] = word;
+}
+
+void put(float value)
+{
+    put(floatBitsToUint(value));
+}
+
+void put_frame()
+{
+    for (int i = 0; i < 12; i++)
+        put(frame.rotation[i]);
+    put(frame.fx), put(frame.fy), put(frame.cx), put(frame.cy);
+    put(frame.near), put(frame.far);
+    put(frame.low_pass);
+    put(frame.margin);
+    put(frame.width), put(frame.height);
+    put(frame.supersample);
+    put(frame.entries);
+    put(frame.first_entry);
+    put(frame.weight_max);
+    put(frame.background);
+    put(frame.output_word);
+}
+
+void put_chunk(spl_draw_chunk c)
+{
+    put(c.origin_x), put(c.origin_y), put(c.origin_z);
+    put(c.step);
+    put(c.radius_min), put(c.radius_step);
+    put(c.geometry_word);
+    put(c.color_word);
+    put(c.geometry_bits);
+    put(c.color_bits);
+    put(c.color_base);
+    put(c.normal_u), put(c.normal_v), put(c.normal_step);
+    put(c.first_id);
+    put(c.count);
+}
+
+void main()
+{
+    uint i = gl_GlobalInvocationID.x;
+    if (i == 0) {
+        put(c0), put(c1), put(c2), put(c3), put(c4), put(c5), put(c6), put(c7);
+        put_frame();
+        put_chunk(chunks[1]);
+    }
+    if (i >= uint(draw.length()))
+        return;
+    precise float f = float(draw[i]) * 0.5 + 0.25;
+    sums[i] = floatBitsToUint(f);
+    ids[i] = i;
+#ifdef SPL_ATOMICS_64
+    atomicMin(depth[0], uint64_t(draw[i]) << 32 | uint64_t(i));
+#else
+    atomicMin(depth[0], draw[i]);
+    atomicMax(depth[1], draw[i]);
+    atomicAdd(depth[2], draw[i]);
+    atomicOr(depth[3], ~page[i]);
+#endif
+}
