@@ -1,0 +1,110 @@
+/* The table of scenes, and exact answers to rays. A scene is a list of primitives under a bounding volume hierarchy; the
+ * user's seed never changes it. */
+#include "synth/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <splatd/synth.h>
+
+#include "base/memory.h"
+#include "synth/build.h"
+#include "synth/vector.h"
+
+static const struct {
+    const char *name, *help;
+    void (*build)(struct spl_scene *scene);
+} scenes[] = {
+    {"courtyard", "20 x 16 m: textured facades, columns, a sphere, wires, a tree; 4 terrestrial stations",
+     spl_build_courtyard},
+};
+enum { scene_count = sizeof scenes / sizeof *scenes };
+
+const char *spl_synth_scene_name(size_t i)
+{
+    return i < scene_count ? scenes[i].name : NULL;
+}
+
+const char *spl_synth_scene_help(size_t i)
+{
+    return i < scene_count ? scenes[i].help : NULL;
+}
+
+static int unknown(const char *name, struct spl_error *err)
+{
+    char names[256] = "";
+    for (size_t i = 0; i < scene_count; i++)
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", i ? ", " : "", scenes[i].name);
+    return spl_fail_field(err, SPL_E_USAGE, "scene", "there is no scene '%s'; there are: %s", name, names);
+}
+
+int spl_scene_create(const char *name, struct spl_scene **out, struct spl_error *err)
+{
+    size_t i = 0;
+    while (i < scene_count && strcmp(scenes[i].name, name))
+        i++;
+    if (i == scene_count)
+        return unknown(name, err);
+    struct spl_scene *scene = spl_alloc(1, sizeof *scene, err);
+    if (!scene)
+        return SPL_E_NOMEM;
+    scene->name = scenes[i].name;
+    scene->help = scenes[i].help;
+    scenes[i].build(scene);
+    if (!scene->error.code)
+        spl_bvh_build(scene->primitives, scene->primitive_count, &scene->nodes, &scene->error);
+    if (scene->error.code) {
+        int code = spl_fail(err, scene->error.code, "%s", scene->error.message);
+        spl_scene_destroy(scene);
+        return code;
+    }
+    *out = scene;
+    return 0;
+}
+
+void spl_scene_destroy(struct spl_scene *scene)
+{
+    if (!scene)
+        return;
+    free(scene->primitives);
+    free(scene->nodes);
+    free(scene->materials);
+    free(scene->objects);
+    free(scene->stations);
+    free(scene);
+}
+
+bool spl_scene_hit(const struct spl_scene *scene, const double origin[3], const double direction[3],
+                   struct spl_hit *hit)
+{
+    double t = INFINITY;
+    uint32_t index = 0;
+    if (!spl_bvh_hit(scene->nodes, scene->primitives, origin, direction, &t, &index))
+        return false;
+    const struct spl_primitive *p = &scene->primitives[index];
+    hit->t = t;
+    hit->primitive = index;
+    hit->id = p->object;
+    mad3(origin, t, direction, hit->position);
+    spl_primitive_normal(p, hit->position, hit->normal);
+    if (dot3(hit->normal, direction) > 0)
+        mad3((double[3]){0}, -1, hit->normal, hit->normal);
+    spl_scene_color(scene, index, hit->position, hit->color);
+    return true;
+}
+
+uint32_t spl_scene_find_object(const struct spl_scene *scene, const char *name)
+{
+    for (size_t i = 0; i < scene->object_count; i++)
+        if (!strcmp(scene->objects[i], name))
+            return (uint32_t)i;
+    return UINT32_MAX;
+}
+
+void spl_scene_color(const struct spl_scene *scene, uint32_t primitive, const double position[3], uint8_t color[3])
+{
+    const struct spl_primitive *p = &scene->primitives[primitive];
+    spl_material_color(&scene->materials[p->material], p, position, color);
+}
