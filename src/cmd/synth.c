@@ -4,11 +4,11 @@
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include <splatd/synth.h>
 
+#include "cmd/options.h"
 #include "cmd/progress.h"
 
 static void usage(FILE *out)
@@ -34,35 +34,16 @@ static void usage(FILE *out)
             "The files' paths go to stdout, messages to stderr.\n");
 }
 
-static int bad(const char *option, const char *value, const char *wanted)
+/* A whole number as "5000000" or "5e6"; its range is the library's. */
+static int parse_points(const char *text, uint64_t *points, struct spl_error *err)
 {
-    fprintf(stderr, "splatd: %s: '%s' is not %s; see 'splatd synth --help'\n", option, value, wanted);
-    return 2;
-}
-
-/* A whole number as "5000000" or "5e6", up to 2^53. */
-static bool parse_whole(const char *text, uint64_t *value)
-{
-    char *end;
-    double number = strtod(text, &end);
-    if (!*text || *end || strspn(text, "0123456789.eE+") != strlen(text) || number != floor(number) || number > 0x1p53)
-        return false;
-    *value = (uint64_t)number;
-    return true;
-}
-
-static bool parse_seed(const char *text, uint64_t *value)
-{
-    char *end;
-    *value = strtoull(text, &end, 10);
-    return *text && !*end && strspn(text, "0123456789") == strlen(text);
-}
-
-static bool parse_metres(const char *text, double *value)
-{
-    char *end;
-    *value = strtod(text, &end);
-    return *text && !*end && isfinite(*value) && *value >= 0;
+    double value;
+    int result = spl_cmd_parse_real("--points", text, 0, 0x1p53, &value, err);
+    if (!result && value != floor(value))
+        return spl_fail(err, SPL_E_USAGE, "--points takes a whole number such as 5000000 or 5e6, not '%s'", text);
+    if (!result)
+        *points = (uint64_t)value;
+    return result;
 }
 
 static void print_paths(const struct spl_synth_options *o)
@@ -87,27 +68,24 @@ int spl_cmd_synth(int argc, char **argv)
     struct spl_synth_options o = {.points = 1000000, .seed = 1, .noise = -1, .progress = spl_cmd_progress,
                                   .progress_context = &progress};
     uint64_t threads = 0, written = 0;
+    struct spl_error err = {0};
+    int result = 0;
     for (int c; (c = getopt_long(argc, argv, "n:s:o:h", options, NULL)) >= 0;) {
         switch (c) {
         case 'n':
-            if (!parse_whole(optarg, &o.points))
-                return bad("points", optarg, "a whole number like 5000000 or 5e6");
+            result = parse_points(optarg, &o.points, &err);
             break;
         case 's':
-            if (!parse_seed(optarg, &o.seed))
-                return bad("seed", optarg, "a whole number");
+            result = spl_cmd_parse_count("--seed", optarg, 0, UINT64_MAX, &o.seed, &err);
             break;
         case opt_noise:
-            if (!parse_metres(optarg, &o.noise))
-                return bad("noise", optarg, "a length in metres");
+            result = spl_cmd_parse_real("--noise", optarg, 0, 1, &o.noise, &err);
             break;
         case opt_format:
             o.formats = optarg;
             break;
         case opt_threads:
-            if (!parse_whole(optarg, &threads) || threads < 1 || threads > 64)
-                return bad("threads", optarg, "a number from 1 to 64");
-            o.threads = (unsigned)threads;
+            result = spl_cmd_parse_count("--threads", optarg, 1, 64, &threads, &err);
             break;
         case 'o':
             o.directory = optarg;
@@ -123,14 +101,16 @@ int spl_cmd_synth(int argc, char **argv)
             fprintf(stderr, "'splatd synth --help' shows how\n");
             return 2;
         }
+        if (result)
+            return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
         usage(stderr);
         return 2;
     }
     o.scene = argv[optind];
-    struct spl_error err = {0};
-    int result = spl_synth(&o, &written, &err);
+    o.threads = (unsigned)threads;
+    result = spl_synth(&o, &written, &err);
     spl_cmd_progress_finish(&progress);
     if (result)
         return spl_cmd_fail(&err);
