@@ -105,7 +105,11 @@ int spl_cmd_synth(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
-        usage(stderr);
+        fprintf(stderr, "splatd: synth takes one SCENE; 'splatd synth --list' names them\n");
+        return 2;
+    }
+    if (!o.directory) {
+        fprintf(stderr, "splatd: synth needs a directory to write to: -o DIR\n");
         return 2;
     }
     o.scene = argv[optind];
