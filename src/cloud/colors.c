@@ -1,0 +1,149 @@
+/* Finding out what a file's colour numbers mean: 8 or 16 bits, 0..1 or 0..255, or intensities whose range becomes grey.
+ *
+ * Binary colours of an ambiguous type are all looked at (until one exceeds 8 bits), since one dark half of a scan must not
+ * decide for the other. Text is sampled at places all over the file; spl_rows_emit() then refuses a value that contradicts
+ * what the samples said, so that no colour is ever wrong in silence. Runs once, inside spl_cloud_open(). */
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "cloud/reader.h"
+
+enum { PARTS = 64, SAMPLES = 1 << 16 };
+
+struct ranges {
+    bool colors, intensities;      /* which are wanted */
+    bool done;                     /* the colours are settled: they have more than 8 bits */
+    double color_max;
+    double *sample;                /* intensities */
+    size_t sample_count, sample_limit;
+    uint64_t stride, rows;         /* every stride-th row gives an intensity */
+};
+
+static void look(struct ranges *ranges, const struct spl_rows *rows)
+{
+    for (size_t r = 0; ranges->colors && r < rows->count; r++)
+        for (int k = 0; k < 3; k++) {
+            double v = rows->value[SPL_COLUMN_RED + k][r];
+            if (v > ranges->color_max)
+                ranges->color_max = v;
+        }
+    ranges->done = ranges->color_max > 255.5;
+    for (size_t r = 0; ranges->intensities && r < rows->count; r++) {
+        double v = rows->value[SPL_COLUMN_INTENSITY][r];
+        if (ranges->rows++ % ranges->stride == 0 && isfinite(v) && ranges->sample_count < ranges->sample_limit)
+            ranges->sample[ranges->sample_count++] = v;
+    }
+}
+
+/* Reads from where the reader stands, at most `limit` rows. What is malformed inside a sample is reported by the real
+ * pass, which knows the line; a sample just ends there. */
+static int scan(struct spl_cloud *cloud, struct ranges *ranges, uint64_t limit, bool sample, struct spl_error *err)
+{
+    uint64_t seen = 0;
+    while (seen < limit && !ranges->done) {
+        struct spl_error ignored = {0};
+        int code = cloud->reader->rows(cloud, &cloud->rows, SPL_ROWS, sample ? &ignored : err);
+        if (code == SPL_E_INPUT && sample)
+            return SPL_OK;
+        if (code < 0)
+            return sample ? spl_fail(err, code, "%s", ignored.message) : code;
+        if (code == 0)
+            return SPL_OK;
+        look(ranges, &cloud->rows);
+        seen += cloud->rows.count;
+    }
+    return SPL_OK;
+}
+
+static int scan_all(struct spl_cloud *cloud, struct ranges *ranges, struct spl_error *err)
+{
+    /* where no count is known, a line has at least 8 bytes: "1 2 3 4\n" */
+    uint64_t known = cloud->info.points_expected, points = known ? known : cloud->info.file_bytes / 8;
+    bool sample = (cloud->sampling == SPL_SAMPLE_ALL && cloud->info.file_bytes > 1 << 22) ||
+                  (cloud->sampling == SPL_SAMPLE_INTENSITY && !ranges->colors && points > SAMPLES);
+    unsigned parts = sample ? PARTS : 1;
+
+    ranges->sample_limit = SAMPLES;
+    ranges->stride = sample || points <= SAMPLES ? 1 : (points + SAMPLES - 1) / SAMPLES;
+    for (unsigned part = 0; part < parts; part++) {
+        int code = cloud->reader->seek(cloud, part, parts, err);
+        if (sample)
+            ranges->sample_limit = (size_t)(part + 1) * SAMPLES / parts;
+        if (code == SPL_OK)
+            code = scan(cloud, ranges, sample ? 4096 : UINT64_MAX, sample, err);
+        if (code < 0)
+            return code;
+    }
+    return SPL_OK;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Between the 1st and the 99th percentile, so that a few glints do not darken everything. */
+static struct spl_color_rule grey_rule(double *sample, size_t count)
+{
+    if (count == 0)
+        return (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+    qsort(sample, count, sizeof *sample, ascending);
+    double low = sample[count / 100], high = sample[count - 1 - count / 100];
+    if (low == high) {
+        low = sample[0];
+        high = sample[count - 1];
+    }
+    /* one value everywhere says nothing about the scene */
+    return low < high ? spl_color_rule_grey(low, high) : (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+}
+
+int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err)
+{
+    bool intensity = cloud->columns >> SPL_COLUMN_INTENSITY & 1;
+    struct ranges ranges = {.colors = spl_columns_have3(cloud->columns, SPL_COLUMN_RED) && cloud->scan_colors};
+    int code = SPL_OK;
+
+    if (cloud->color.kind != SPL_COLOR_ABSENT)
+        goto decided; /* by the format itself */
+    if (spl_columns_have3(cloud->columns, SPL_COLUMN_RED) && !cloud->scan_colors) {
+        cloud->color = spl_color_rule_rgb(255);
+        goto decided;
+    }
+    if (ranges.colors) {
+        code = scan_all(cloud, &ranges, err);
+        if (code < 0)
+            return code;
+        if (ranges.color_max > 65535.5)
+            return spl_source_fail(&cloud->source, SPL_E_INPUT, "red, green, blue", err,
+                                   "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
+        if (ranges.color_max > 255.5)
+            cloud->color = spl_color_rule_rgb(65535);
+        else if (ranges.color_max > 1.001 || cloud->integer_colors)
+            cloud->color = spl_color_rule_rgb(255);
+        else
+            cloud->color = spl_color_rule_rgb(1);
+    }
+    /* colour fields that nobody filled are no colours */
+    if (intensity && (!ranges.colors || ranges.color_max <= 0)) {
+        ranges = (struct ranges){.intensities = true};
+        ranges.sample = spl_alloc_raw(SAMPLES, sizeof *ranges.sample, err);
+        if (!ranges.sample)
+            return SPL_E_NOMEM;
+        code = scan_all(cloud, &ranges, err);
+        if (code == SPL_OK)
+            cloud->color = grey_rule(ranges.sample, ranges.sample_count);
+        free(ranges.sample);
+        if (code < 0)
+            return code;
+    } else if (ranges.colors && ranges.color_max <= 0) {
+        cloud->color = (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+    }
+decided:
+    if (cloud->color.kind != SPL_COLOR_ABSENT)
+        cloud->info.attributes |= SPL_CLOUD_COLOR;
+    cloud->info.points_skipped = 0;
+    cloud->row = 0;
+    return cloud->reader->seek(cloud, 0, 1, err);
+}

@@ -1,0 +1,45 @@
+/* The inside of a cloud: the table of functions that each format fills, and what they share. One thread at a time. */
+#ifndef SPL_CLOUD_READER_H
+#define SPL_CLOUD_READER_H
+
+#include "cloud/rows.h"
+
+struct spl_reader {
+    const char *format;
+    /* Checks the header, allocates cloud->state, fills info (attributes but COLOR), columns, sampling and what
+     * else spl_cloud_find_colors() wants. */
+    int (*open)(struct spl_cloud *cloud, struct spl_error *err);
+    /* The next 1 to `limit` (<= SPL_ROWS) rows: 1, or 0 at the end, or negative. */
+    int (*rows)(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err);
+    /* Goes to about part / parts of the points, exactly to the first when part is 0. */
+    int (*seek)(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err);
+};
+
+/* Which ranges come from samples all over a large file, where a pass over all of it would cost as much as reading it. */
+enum spl_sampling {
+    SPL_SAMPLE_NEVER,       /* rows can only be found by reading from the first */
+    SPL_SAMPLE_INTENSITY,   /* fixed-size rows: colours are cheap to look at, and exact matters */
+    SPL_SAMPLE_ALL          /* text */
+};
+
+struct spl_cloud {
+    struct spl_source source;
+    struct spl_cloud_info info;
+    const struct spl_reader *reader;
+    const struct spl_cloud_options *options;  /* during open only; never NULL then */
+    void *state;                /* the reader's, one allocation */
+    uint32_t columns;           /* bit 1 << enum spl_column for each that the file has */
+    enum spl_sampling sampling;
+    bool scan_colors;           /* the range of the colours is not fixed by their type */
+    bool integer_colors;        /* 1 is then the darkest grey, not white */
+    struct spl_color_rule color;
+    uint64_t row;               /* index of the next row */
+    struct spl_rows rows;
+};
+
+extern const struct spl_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
+
+/* Decides cloud->color from the columns and the values' range, and leaves the reader at its first row. */
+int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err);
+
+#endif
