@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/renderer.h"
 
@@ -40,14 +41,6 @@ static bool ask_page(void *context, uint32_t page)
     if (rc && rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
         spl_fail(&job->page_error, rc, "%s", why.message);
     return rc == SPL_OK;
-}
-
-/* The largest weight of a fragment such that the sums over every splat that may reach a sample stay below 2^32: a splat
- * adds at most 512 weight to any word (splat_shade.comp). 0 when even weight 1 is too much. */
-static uint32_t weight_max(uint64_t splats)
-{
-    uint64_t weight = UINT32_MAX / (512 * (splats ? splats : 1));
-    return weight > 255 ? 255 : (uint32_t)weight;
 }
 
 static void fill_params(struct spl_tile *tile)
@@ -89,7 +82,7 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     int rc = spl_select(&params, &r->list, err);
     if (job->page_error.code)
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
-    tile->params.weight_max = weight_max(r->list.sample_splats);
+    tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!rc && !tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
         return spl_fail_field(err, SPL_E_LIMIT, "lod", "at lod %g up to %llu splats would blend in one pixel; raise lod",
                               job->view->lod, (unsigned long long)r->list.sample_splats);

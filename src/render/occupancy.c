@@ -67,3 +67,9 @@ uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy)
     }
     return most + occupancy->everywhere;
 }
+
+uint32_t spl_occupancy_weight(uint64_t splats)
+{
+    uint64_t weight = UINT32_MAX / (512 * (splats ? splats : 1));
+    return weight > 255 ? 255 : (uint32_t)weight;
+}

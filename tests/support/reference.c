@@ -1,0 +1,328 @@
+/* The reference renderer; see reference.h. Written from the comments of the kernels, not from their code: where both
+ * agree, the comment holds. Floats are used where the GPU uses floats, in the same order of operations. */
+#include "support/reference.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
+#include "render/occupancy.h"
+#include "render/select.h"
+
+struct sample {
+    float first;          /* pushed depth, INFINITY = nothing */
+    float nearest;        /* method points: depth of the winner */
+    uint32_t id;
+    uint32_t payload;     /* method points: colour */
+    float normal_winner[3];
+    uint64_t color[3], weight;
+    uint64_t depth, normal[3];
+};
+
+struct scene {
+    const struct spl_dataset *dataset;
+    const struct spl_view *view;
+    struct spl_camera camera;   /* in samples */
+    struct spl_draw_list list;
+    struct sample *samples;
+    uint32_t weight_max;
+    float margin;
+};
+
+struct disc {
+    float p[3], n[3], radius;
+    uint32_t id;
+    uint8_t color[3];
+};
+
+static bool always(void *context, uint32_t page)
+{
+    (void)context;
+    (void)page;
+    return true;
+}
+
+static void to_view(const struct spl_camera *camera, const float v[3], float out[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const double *r = camera->rotation + 3 * i;
+        out[i] = (float)r[0] * v[0] + (float)r[1] * v[1] + (float)r[2] * v[2];
+    }
+}
+
+/* The container's chunk behind a draw chunk, found by its first splat's id. */
+static const struct spl_chunk *find_chunk(const struct spl_chunk *chunks, uint32_t count, uint32_t first_id)
+{
+    uint32_t low = 0, high = count;
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (chunks[middle].first_id <= first_id)
+            low = middle;
+        else
+            high = middle;
+    }
+    return &chunks[low];
+}
+
+static void footprint(const struct scene *s, const struct disc *d, int first[2], int last[2], float center[2])
+{
+    /* No tight bound here: the sphere's, which the tight one must agree with. */
+    double f[2] = {s->camera.fx, s->camera.fy}, c[2] = {s->camera.cx, s->camera.cy};
+    int size[2] = {(int)s->camera.width, (int)s->camera.height};
+    float inverse = 1.0f / d->p[2];
+    for (int i = 0; i < 2; i++) {
+        center[i] = (float)f[i] * (d->p[i] * inverse) + (float)c[i];
+        double a = (double)d->p[2] * d->p[2] - (double)d->radius * d->radius, low = -1e9, high = 1e9;
+        if (a > 0) {
+            double b = (double)d->p[i] * d->p[2];
+            double root = d->radius * sqrt((double)d->p[i] * d->p[i] + a);
+            low = f[i] * (b - root) / a + c[i];
+            high = f[i] * (b + root) / a + c[i];
+        }
+        low = fmin(low, center[i] - 1);
+        high = fmax(high, center[i] + 1);
+        first[i] = low < 0 ? 0 : low > size[i] ? size[i] : (int)low;
+        last[i] = high >= size[i] ? size[i] - 1 : high < 0 ? -1 : (int)high;
+    }
+}
+
+static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z)
+{
+    const float low_pass = 0.70710678f;
+    float ox = (float)x + 0.5f - center[0], oy = (float)y + 0.5f - center[1];
+    float near_center = (ox * ox + oy * oy) / (low_pass * low_pass);
+    float tx = ox / (float)s->camera.fx, ty = oy / (float)s->camera.fy;
+    const float *p = d->p, *n = d->n;
+    float facing = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
+    float rise = p[2] * (n[0] * tx + n[1] * ty);
+    float dz = -p[2] * (rise / (facing + rise)), along = p[2] + dz;
+    float qx = p[0] / p[2] * dz + tx * along, qy = p[1] / p[2] * dz + ty * along;
+    float distance = (qx * qx + qy * qy + dz * dz) / (d->radius * d->radius);
+    bool on_disc = distance < 1 && along > 0;
+    *z = on_disc ? along : p[2];
+    return on_disc && distance < near_center ? distance : near_center;
+}
+
+static void depth_disc(struct scene *s, const struct disc *d, bool shade)
+{
+    int first[2], last[2];
+    float center[2], z;
+    footprint(s, d, first, last, center);
+    float pixel = 0.70710678f * d->p[2] / (float)s->camera.fx;
+    float margin = s->margin * (d->radius > pixel ? d->radius : pixel);
+    for (int y = first[1]; y <= last[1]; y++) {
+        for (int x = first[0]; x <= last[0]; x++) {
+            float distance = coverage(s, d, center, x, y, &z);
+            if (!(distance < 1))
+                continue;
+            struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
+            float pushed = z + margin;
+            if (!shade) {
+                if (pushed < at->first)
+                    at->first = pushed;
+                continue;
+            }
+            if (z > at->first)
+                continue;
+            if (pushed == at->first && d->id < at->id)
+                at->id = d->id;
+            uint32_t weight = (uint32_t)((1 - distance) * (float)s->weight_max + 0.5f);
+            weight = weight ? weight : 1;
+            uint32_t offset = (uint32_t)((at->first - z) / at->first * 262144.0f + 0.5f);
+            at->weight += weight;
+            at->depth += (uint64_t)weight * (offset > 262143 ? 262143 : offset);
+            for (int i = 0; i < 3; i++) {
+                at->color[i] += (uint64_t)weight * d->color[i];
+                at->normal[i] += (uint64_t)weight * (uint32_t)(d->n[i] * 127.0f + 127.5f);
+            }
+        }
+    }
+}
+
+static void point(struct scene *s, const struct disc *d)
+{
+    float x = (float)s->camera.fx * (d->p[0] / d->p[2]) + (float)s->camera.cx;
+    float y = (float)s->camera.fy * (d->p[1] / d->p[2]) + (float)s->camera.cy;
+    if (!(x >= 0 && y >= 0 && x < (float)s->camera.width && y < (float)s->camera.height))
+        return;
+    struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
+    uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
+    if (d->p[2] > at->first)
+        return;
+    bool nearer = d->p[2] < at->first;
+    at->first = d->p[2];
+    at->payload = nearer || payload < at->payload ? payload : at->payload;
+    if (nearer || d->id < at->id) {
+        at->id = d->id;
+        memcpy(at->normal_winner, d->n, sizeof d->n);
+    }
+}
+
+static void for_each_disc(struct scene *s, bool shade)
+{
+    uint32_t chunk_count;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(s->dataset, &chunk_count);
+    for (size_t b = 0; b < s->list.batch_count; b++) {
+        const struct spl_draw_batch *batch = &s->list.batches[b];
+        size_t bytes;
+        const uint32_t *page = spl_dataset_get_page(s->dataset, batch->page, &bytes);
+        for (uint32_t e = 0; e < batch->entries * SPL_GROUP_SPLATS; e++) {
+            uint32_t entry = s->list.entries[batch->first_entry + e / SPL_GROUP_SPLATS];
+            const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_GROUP_BITS];
+            uint32_t index = (entry & 15) * SPL_GROUP_SPLATS + e % SPL_GROUP_SPLATS;
+            if (index >= draw->count)
+                continue;
+            const struct spl_chunk *chunk = find_chunk(chunks, chunk_count, draw->first_id);
+            struct spl_chunk local = *chunk;
+            local.origin[0] = local.origin[1] = local.origin[2] = 0;
+            local.radius_min = draw->radius_min;
+            local.radius_step = draw->radius_step;
+            struct spl_splat splat;
+            spl_chunk_decode(&local, page, index, &splat);
+            struct disc d = {.radius = splat.radius, .id = draw->first_id + index};
+            memcpy(d.color, splat.color, sizeof d.color);
+            to_view(&s->camera, splat.position, d.p);
+            to_view(&s->camera, splat.normal, d.n);
+            d.p[0] += draw->origin_x;
+            d.p[1] += draw->origin_y;
+            d.p[2] += draw->origin_z;
+            if (!(d.p[2] >= (float)s->camera.near && d.p[2] <= (float)s->camera.far))
+                continue;
+            if (s->view->method == SPL_METHOD_POINTS)
+                point(s, &d);
+            else
+                depth_disc(s, &d, shade);
+        }
+    }
+}
+
+static float depth_of(const struct scene *s, const struct sample *at)
+{
+    if (s->view->method == SPL_METHOD_POINTS)
+        return at->first;
+    return (float)((double)at->first * (1 - (double)at->depth / (double)at->weight / 262144.0));
+}
+
+static void normal_of(const struct scene *s, const struct sample *at, double out[3])
+{
+    double length = 0;
+    for (int i = 0; i < 3; i++) {
+        out[i] = s->view->method == SPL_METHOD_POINTS ? at->normal_winner[i]
+                                                      : (double)at->normal[i] / (double)at->weight - 127.5;
+        length += out[i] * out[i];
+    }
+    for (int i = 0; i < 3; i++)
+        out[i] /= sqrt(length);
+}
+
+static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
+{
+    uint32_t side = s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0, width = s->view->camera.width;
+    float nearest = INFINITY;
+    uint64_t color[3] = {0};
+    double normal[3] = {0}, depth = 0;
+    size_t pixel = (size_t)y * width + x;
+    for (uint32_t pass = 0; pass < 2; pass++) {
+        for (uint32_t i = 0; i < side * side; i++) {
+            const struct sample *at = &s->samples[(size_t)(y * side + i / side) * s->camera.width + x * side + i % side];
+            if (at->first == INFINITY)
+                continue;
+            if (pass == 1) {
+                if (at->first <= nearest * 1.01f) {
+                    depth += depth_of(s, at);
+                    near_count++;
+                }
+                continue;
+            }
+            covered++;
+            if (at->first < nearest || (at->first == nearest && at->id < id))
+                id = at->id;
+            nearest = fminf(nearest, at->first);
+            double n[3];
+            normal_of(s, at, n);
+            for (int c = 0; c < 3; c++) {
+                color[c] += s->view->method == SPL_METHOD_POINTS ? (at->payload >> 8 * c & 255)
+                                                                 : (at->color[c] + at->weight / 2) / at->weight;
+                normal[c] += n[c];
+            }
+        }
+    }
+    const struct spl_image *images = frame->images;
+    if (images[SPL_LAYER_COLOR].pixels) {
+        uint8_t *out = (uint8_t *)images[SPL_LAYER_COLOR].pixels + 4 * pixel;
+        const uint8_t *back = s->view->background;
+        uint32_t back_weight = back[3] * (side * side - covered), weight = 255 * covered + back_weight;
+        for (int c = 0; c < 3; c++)
+            out[c] = weight ? (uint8_t)((255 * color[c] + back_weight * back[c] + weight / 2) / weight) : 0;
+        out[3] = (uint8_t)((weight + side * side / 2) / (side * side));
+    }
+    float z = covered ? (float)(depth / near_count) : NAN;
+    if (images[SPL_LAYER_DEPTH].pixels)
+        ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
+    if (images[SPL_LAYER_RANGE].pixels) {
+        double rx = ((x + 0.5) * side - s->camera.cx) / s->camera.fx, ry = ((y + 0.5) * side - s->camera.cy) / s->camera.fy;
+        ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(z * sqrt(1 + rx * rx + ry * ry));
+    }
+    if (images[SPL_LAYER_NORMAL].pixels) {
+        float *out = (float *)images[SPL_LAYER_NORMAL].pixels + 3 * pixel;
+        const double *r = s->camera.rotation;
+        double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+        for (int i = 0; i < 3; i++)
+            out[i] = covered ? (float)((r[i] * normal[0] + r[3 + i] * normal[1] + r[6 + i] * normal[2]) / length) : 0;
+    }
+    if (images[SPL_LAYER_ID].pixels)
+        ((uint32_t *)images[SPL_LAYER_ID].pixels)[pixel] = id;
+    if (images[SPL_LAYER_COVERAGE].pixels)
+        ((float *)images[SPL_LAYER_COVERAGE].pixels)[pixel] = (float)covered / (float)(side * side);
+}
+
+int reference_render(const struct spl_dataset *dataset, const struct spl_view *view, struct spl_frame *frame,
+                     struct spl_error *err)
+{
+    memset(frame, 0, sizeof *frame);
+    struct scene s = {.dataset = dataset, .view = view, .camera = view->camera};
+    s.camera.width *= view->supersample;
+    s.camera.height *= view->supersample;
+    s.camera.fx *= view->supersample;
+    s.camera.fy *= view->supersample;
+    s.camera.cx *= view->supersample;
+    s.camera.cy *= view->supersample;
+    s.margin = view->margin < 0 ? 1 : (float)view->margin;
+    struct spl_select_params params = {
+        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = 0.70710678f, .resident = always};
+    int rc = spl_select(&params, &s.list, err);
+    size_t count = (size_t)s.camera.width * s.camera.height;
+    s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
+    if (!rc && !s.samples)
+        rc = SPL_E_NOMEM;
+    static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32,
+                                                               SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32};
+    for (int i = 0; i < SPL_LAYER_COUNT && !rc; i++) {
+        if (!(view->layers >> i & 1))
+            continue;
+        struct spl_image *image = &frame->images[i];
+        *image = (struct spl_image){.layer = i, .type = types[i], .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc((size_t)image->width * image->height, spl_pixel_bytes(types[i]), err);
+        rc = image->pixels ? SPL_OK : SPL_E_NOMEM;
+    }
+    if (!rc) {
+        s.weight_max = spl_occupancy_weight(s.list.sample_splats);
+        for (size_t i = 0; i < count; i++)
+            s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
+        for_each_disc(&s, false);
+        if (view->method == SPL_METHOD_SPLAT)
+            for_each_disc(&s, true);
+        for (uint32_t y = 0; y < view->camera.height; y++)
+            for (uint32_t x = 0; x < view->camera.width; x++)
+                resolve_pixel(&s, x, y, frame);
+    }
+    free(s.samples);
+    spl_draw_list_finish(&s.list);
+    if (rc)
+        spl_frame_finish(frame);
+    return rc;
+}

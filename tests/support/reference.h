@@ -1,0 +1,14 @@
+/* A plain C renderer that gives the same images from the same container as the GPU: one thread, one loop, wide sums.
+ * It shares level selection and the CPU decode with the product, and nothing of the frame. */
+#ifndef TEST_SUPPORT_REFERENCE_H
+#define TEST_SUPPORT_REFERENCE_H
+
+#include <splatd/dataset.h>
+#include <splatd/render.h>
+
+/* Renders every layer of `view` into `frame` (spl_frame_finish). Images of one tile only: the caller keeps
+ * width * height * supersample^2 within the renderer's scratch. */
+int reference_render(const struct spl_dataset *dataset, const struct spl_view *view, struct spl_frame *frame,
+                     struct spl_error *err);
+
+#endif
