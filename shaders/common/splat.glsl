@@ -94,7 +94,7 @@ uvec3 load_color(splat s)
     int u = bitfieldExtract(int(base), 0, 16) + int(read_bits(word, bit + ny, nu));
     int v = bitfieldExtract(int(base), 16, 16) + int(read_bits(word, bit + ny + nu, nv));
     int g = y - ((u + v) >> 2);
-    return uvec3(clamp(ivec3(v + g, g, u + g), ivec3(0), ivec3(255)));
+    return uvec3(ivec3(v + g, g, u + g) & 255);
 }
 
 #endif

@@ -1,0 +1,332 @@
+/* The kernels against the plain C reference, on random scenes and real cameras: depth within 1e-6 relative, colour within
+ * one level, the same nearest splat but at ties, coverage equal. One body for every backend. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include <splatd/render.h>
+
+#include "base/error.h"
+#include "support/make_dataset.h"
+#include "support/reference.h"
+
+enum { all_layers = (1 << SPL_LAYER_COUNT) - 1 };
+
+static struct spl_renderer *renderer;
+
+static uint64_t random_state = 1;
+static double uniform(void)
+{
+    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(random_state >> 11) / 9007199254740992.0;
+}
+
+struct tally {
+    size_t pixels, covered_differs, depth_differs, color_differs, id_differs, normal_differs;
+    double depth_worst;
+    int color_worst;
+};
+
+static struct tally compare(const struct spl_frame *a, const struct spl_frame *b)
+{
+    struct tally t = {0};
+    const float *da = a->images[SPL_LAYER_DEPTH].pixels, *db = b->images[SPL_LAYER_DEPTH].pixels;
+    const float *ca = a->images[SPL_LAYER_COVERAGE].pixels, *cb = b->images[SPL_LAYER_COVERAGE].pixels;
+    const float *na = a->images[SPL_LAYER_NORMAL].pixels, *nb = b->images[SPL_LAYER_NORMAL].pixels;
+    const uint32_t *ia = a->images[SPL_LAYER_ID].pixels, *ib = b->images[SPL_LAYER_ID].pixels;
+    const uint8_t *ra = a->images[SPL_LAYER_COLOR].pixels, *rb = b->images[SPL_LAYER_COLOR].pixels;
+    t.pixels = (size_t)a->images[SPL_LAYER_DEPTH].width * a->images[SPL_LAYER_DEPTH].height;
+    for (size_t i = 0; i < t.pixels; i++) {
+        t.covered_differs += ca[i] != cb[i];
+        t.id_differs += ia[i] != ib[i];
+        if (isnan(da[i]) != isnan(db[i])) {
+            t.depth_differs++;
+        } else if (!isnan(da[i])) {
+            double relative = fabs((double)da[i] - db[i]) / db[i];
+            t.depth_worst = fmax(t.depth_worst, relative);
+            t.depth_differs += relative > 1e-6;
+        }
+        int worst = 0;
+        for (int c = 0; c < 4; c++)
+            worst = abs(ra[4 * i + c] - rb[4 * i + c]) > worst ? abs(ra[4 * i + c] - rb[4 * i + c]) : worst;
+        t.color_differs += worst > 1;
+        t.color_worst = worst > t.color_worst ? worst : t.color_worst;
+        double dot = 0, length = 0;
+        for (int c = 0; c < 3; c++) {
+            dot += (double)na[3 * i + c] * nb[3 * i + c];
+            length += (double)nb[3 * i + c] * nb[3 * i + c];
+        }
+        t.normal_differs += length > 0 && dot < 0.9999;
+    }
+    return t;
+}
+
+/* A pixel may differ where rounding moves a fragment across a border: stated as a share of the pixels. */
+static void same_images(const struct spl_dataset *dataset, const struct spl_view *view, const char *what)
+{
+    struct spl_frame gpu, cpu;
+    struct spl_error err = {0};
+    int rc = spl_renderer_render(renderer, dataset, view, &gpu, &err);
+    if (rc)
+        fail_msg("%s: %s", what, err.message);
+    assert_int_equal(reference_render(dataset, view, &cpu, &err), SPL_OK);
+    struct tally t = compare(&gpu, &cpu);
+    size_t few = t.pixels / 10000 + 1;
+    if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > few ||
+        t.normal_differs > few)
+        fail_msg("%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu",
+                 what, t.pixels, t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst,
+                 t.id_differs, t.normal_differs);
+    spl_frame_finish(&gpu);
+    spl_frame_finish(&cpu);
+}
+
+/* Random splats in a cube around `center`: every orientation, radii over two decades. */
+static struct spl_dataset *random_cube(size_t count, const double center[3], double radius)
+{
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++) {
+        double length = 0, n[3];
+        for (int c = 0; c < 3; c++) {
+            splats[i].position[c] = center[c] + 2 * uniform() - 1;
+            n[c] = uniform() - 0.5;
+            length += n[c] * n[c];
+            splats[i].color[c] = (uint8_t)(uniform() * 256);
+        }
+        for (int c = 0; c < 3; c++)
+            splats[i].normal[c] = (float)(n[c] / sqrt(length));
+        splats[i].radius = (float)(radius * pow(10, 2 * uniform() - 1));
+    }
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    return dataset;
+}
+
+static void done(struct spl_dataset *dataset)
+{
+    spl_renderer_remove(renderer, dataset);
+    spl_dataset_close(dataset);
+}
+
+static struct spl_view looking(const double center[3], double distance, uint32_t width, uint32_t height)
+{
+    struct spl_view view;
+    spl_view_init(&view);
+    view.layers = all_layers;
+    view.camera.near = 0.01;
+    view.camera.far = 1000;
+    double eye[3] = {center[0] + distance * 0.6, center[1] - distance * 0.7, center[2] + distance * 0.4};
+    const double up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, center, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 50, width, height, NULL), SPL_OK);
+    return view;
+}
+
+static const double origin[3] = {0, 0, 0}, utm[3] = {406000.125, 7405000.5, 30.25};
+
+static void random_splats_match(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        for (uint32_t supersample = 1; supersample <= 4; supersample *= 2) {
+            struct spl_view view = looking(origin, 3, 160, 120);
+            view.method = method;
+            view.supersample = supersample;
+            view.background[0] = 200;
+            view.background[3] = supersample == 2 ? 0 : 255;
+            same_images(dataset, &view, spl_method_name(method));
+        }
+    }
+    done(dataset);
+}
+
+static void inside_the_cloud_matches(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
+    struct spl_view view = looking(origin, 0.3, 160, 120);
+    same_images(dataset, &view, "eye within the cloud");
+    view.camera.cx += 31.7;
+    view.camera.fy *= 1.3;
+    view.margin = 0;
+    same_images(dataset, &view, "shifted principal point, no margin");
+    done(dataset);
+}
+
+static void far_coordinates_match_near_ones(void **state)
+{
+    (void)state;
+    struct spl_frame frames[2];
+    struct spl_dataset *datasets[2];
+    const double *centers[2] = {origin, utm};
+    for (int i = 0; i < 2; i++) {
+        random_state = 77;
+        datasets[i] = random_cube(2000, centers[i], 0.03);
+        struct spl_view view = looking(centers[i], 3, 160, 120);
+        same_images(datasets[i], &view, i ? "UTM" : "origin");
+        assert_int_equal(spl_renderer_render(renderer, datasets[i], &view, &frames[i], NULL), SPL_OK);
+    }
+    struct tally t = compare(&frames[0], &frames[1]);
+    /* The sources differ by the double's rounding at 7e6 (1e-9 m), which may move a code by one step. */
+    assert_true(t.covered_differs < t.pixels / 100);
+    for (int i = 0; i < 2; i++) {
+        spl_frame_finish(&frames[i]);
+        done(datasets[i]);
+    }
+}
+
+static void a_million_splats_on_one_pixel_do_not_wrap(void **state)
+{
+    (void)state;
+    size_t count = 1 << 20;
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++)
+        splats[i] = (struct make_splat){.position = {uniform() * 1e-3, uniform() * 1e-3, 0}, .normal = {0, 0, 1},
+                                        .radius = 1e-3f, .color = {255, 128, 7}};
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view;
+    spl_view_init(&view);
+    view.layers = 1 << SPL_LAYER_COLOR | 1 << SPL_LAYER_DEPTH;
+    view.lod = 0;
+    view.camera.near = 0.1;
+    view.camera.far = 100;
+    const double eye[3] = {5e-4, 5e-4, 10}, target[3] = {5e-4, 5e-4, 0}, up[3] = {0, 1, 0};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 40, 33, 33, NULL), SPL_OK);
+    struct spl_frame frame;
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+    const uint8_t *pixel = (uint8_t *)frame.images[SPL_LAYER_COLOR].pixels + 4 * (33 * 16 + 16);
+    assert_int_equal(pixel[0], 255);
+    assert_int_equal(pixel[1], 128);
+    assert_int_equal(pixel[2], 7);
+    assert_true(fabsf(((float *)frame.images[SPL_LAYER_DEPTH].pixels)[33 * 16 + 16] - 10) < 1e-4f);
+    spl_frame_finish(&frame);
+    done(dataset);
+}
+
+static void small_tiles_give_the_same_image(void **state)
+{
+    struct spl_renderer_options options = {.device = *state, .scratch_samples = 5000};
+    struct spl_renderer *small, *large = renderer;
+    assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
+    assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 3, 203, 151);
+    struct spl_frame frames[2];
+    assert_int_equal(spl_renderer_render(large, dataset, &view, &frames[0], NULL), SPL_OK);
+    assert_int_equal(spl_renderer_render(small, dataset, &view, &frames[1], NULL), SPL_OK);
+    assert_int_equal(frames[0].stats.tiles, 1);
+    assert_true(frames[1].stats.tiles > 4);
+    struct tally t = compare(&frames[0], &frames[1]);
+    assert_true(t.color_differs + t.depth_differs + t.id_differs + t.covered_differs <= 4 * (t.pixels / 10000 + 1));
+    spl_frame_finish(&frames[0]);
+    spl_frame_finish(&frames[1]);
+    spl_renderer_destroy(small);
+    done(dataset);
+}
+
+static void the_same_request_gives_the_same_bytes(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
+    struct spl_view view = looking(origin, 2, 160, 120);
+    struct spl_frame first;
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &first, NULL), SPL_OK);
+    for (int i = 0; i < 100; i++) {
+        struct spl_frame again;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &again, NULL), SPL_OK);
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+            assert_memory_equal(first.images[layer].pixels, again.images[layer].pixels,
+                                160 * 120 * spl_pixel_bytes(first.images[layer].type));
+        spl_frame_finish(&again);
+    }
+    spl_frame_finish(&first);
+    done(dataset);
+}
+
+static void a_lost_device_is_reported_and_replaced(void **state)
+{
+    struct spl_renderer_options options = {.device = *state};
+    struct spl_dataset *dataset = random_cube(500, origin, 0.05);
+    struct spl_view view = looking(origin, 3, 64, 48);
+    struct spl_frame frame;
+    for (int i = 0; i < 3; i++) {
+        struct spl_renderer *mortal;
+        struct spl_error err = {0};
+        assert_int_equal(spl_renderer_create(&options, &mortal, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_add(mortal, dataset, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_OK);
+        spl_frame_finish(&frame);
+        spl_renderer_inject_loss(mortal);
+        assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, &err), SPL_E_DEVICE_LOST);
+        assert_null(frame.images[SPL_LAYER_COLOR].pixels);
+        spl_renderer_destroy(mortal);
+    }
+    done(dataset);
+}
+
+static void views_out_of_range_name_their_field(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(10, origin, 0.05);
+    const struct {
+        const char *field;
+        size_t offset;
+        double value;
+    } bad[] = {
+        {"lod", offsetof(struct spl_view, lod), NAN},
+        {"lod", offsetof(struct spl_view, lod), -1},
+        {"margin", offsetof(struct spl_view, margin), INFINITY},
+    };
+    struct spl_frame frame;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct spl_view view = looking(origin, 3, 16, 16);
+        struct spl_error err = {0};
+        memcpy((char *)&view + bad[i].offset, &bad[i].value, sizeof bad[i].value);
+        assert_true(spl_renderer_render(renderer, dataset, &view, &frame, &err) < 0);
+        assert_string_equal(err.field, bad[i].field);
+    }
+    struct spl_view view = looking(origin, 3, 16, 16);
+    struct spl_error err = {0};
+    view.supersample = 3;
+    assert_true(spl_renderer_render(renderer, dataset, &view, &frame, &err) < 0);
+    assert_string_equal(err.field, "supersample");
+    done(dataset);
+    spl_view_init(&view);
+    assert_int_equal(spl_method_from_name("splat"), SPL_METHOD_SPLAT);
+    assert_int_equal(spl_method_from_name("mesh"), -1);
+}
+
+int main(int argc, char **argv)
+{
+    char *device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
+    struct spl_renderer_options options = {.device = device, .debug = true};
+    struct spl_error err = {0};
+    if (spl_renderer_create(&options, &renderer, &err)) {
+        fprintf(stderr, "skipped: %s\n", err.message);
+        return 77;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_splats_match),
+        cmocka_unit_test(inside_the_cloud_matches),
+        cmocka_unit_test(far_coordinates_match_near_ones),
+        cmocka_unit_test(a_million_splats_on_one_pixel_do_not_wrap),
+        cmocka_unit_test_prestate(small_tiles_give_the_same_image, device),
+        cmocka_unit_test(the_same_request_gives_the_same_bytes),
+        cmocka_unit_test_prestate(a_lost_device_is_reported_and_replaced, device),
+        cmocka_unit_test(views_out_of_range_name_their_field),
+    };
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_renderer_destroy(renderer);
+    return failed;
+}
