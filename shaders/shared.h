@@ -69,7 +69,9 @@ struct spl_draw_chunk {
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
- * axis 27..29: index of the axis that is the octahedron's +z (0 x, 1 y, 2 z), bit 29 its sign (1 = negative). */
+ * axis 27..28: the world axis a that is the octahedron's +z (0 x, 1 y, 2 z), the other two following cyclically; bit 29:
+ * the whole vector is negated. Decoding: l = octahedral decode of (u, v), sign = bit 29 ? -1 : 1,
+ * n[(a + 1) % 3] = sign * l.x, n[(a + 2) % 3] = sign * l.y, n[a] = sign * l.z. */
 #define SPL_GEOMETRY_X 0
 #define SPL_GEOMETRY_Y 5
 #define SPL_GEOMETRY_Z 10
@@ -78,7 +80,8 @@ struct spl_draw_chunk {
 #define SPL_GEOMETRY_RADIUS 23
 #define SPL_GEOMETRY_AXIS 27
 /* color_bits: y 0..3, u 4..7, v 8..11 (0..9 bits each), base of y 16..23. Colour is the reversible transform of 8 bit
- * RGB: u = b - g, v = r - g, y = g + floor((u + v) / 4); decoding: g = y - floor((u + v) / 4), b = u + g, r = v + g. */
+ * RGB: u = b - g, v = r - g, y = g + floor((u + v) / 4); decoding: g = y - floor((u + v) / 4), b = u + g, r = v + g, each
+ * clamped to 0..255 (which only a forged file needs). */
 #define SPL_COLOR_Y 0
 #define SPL_COLOR_U 4
 #define SPL_COLOR_V 8

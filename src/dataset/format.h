@@ -53,6 +53,15 @@ struct spl_node {
     uint32_t depth;               /* root = 0 */
 };
 
+/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15. */
+#define SPL_EXTRA_CLASS 0
+#define SPL_EXTRA_UNCERTAINTY 4
+#define SPL_EXTRA_CLASS_BASE 8
+#define SPL_UNCERTAINTY_BITS_MAX 5
+
+/* Zero words that end each page, so that a shader may read two words for a field without looking where a stream ends. */
+#define SPL_PAGE_TAIL_WORDS 2
+
 /* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream
  * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
  * the other from the low bits up. */
@@ -66,8 +75,8 @@ struct spl_chunk {
     uint32_t geometry_bits;       /* as in shared.h */
     uint32_t color_bits;          /* as in shared.h */
     uint32_t color_base;
-    uint32_t extra_bits;          /* class: width 0..3, base 8..15; uncertainty: width 4..7 */
-    float uncertainty_max;        /* uncertainty = max * 2^-(code / 2), code 2^width - 1 = 0 */
+    uint32_t extra_bits;          /* SPL_EXTRA_* */
+    float uncertainty_max;        /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
     uint32_t first_id;            /* dataset-wide index of its first splat */
     uint32_t count;
 };

@@ -1,0 +1,345 @@
+/* The chunk codec under its bounds, and at the edges of what a chunk can hold. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "dataset/chunk.h"
+#include "geom/octahedral.h"
+
+static const struct spl_chunk_options defaults = {
+    .position_error = 0.016, .normal_error = M_PI / 180, .radius_error = 0.05, .has_class = true, .has_uncertainty = true};
+
+static uint32_t random_state;
+
+static double uniform(void) /* [0, 1) */
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) * 0x1p-24;
+}
+
+struct sample {
+    struct spl_splat splats[SPL_CHUNK_SPLATS];
+    double position[SPL_CHUNK_SPLATS][3];
+    uint32_t count;
+};
+
+static const double (*constant(const struct sample *s))[3]
+{
+    return (const double(*)[3])s->position;
+}
+
+static void set_normal(struct spl_splat *splat, double x, double y, double z)
+{
+    double length = sqrt(x * x + y * y + z * z);
+    splat->normal[0] = (float)(x / length);
+    splat->normal[1] = (float)(y / length);
+    splat->normal[2] = (float)(z / length);
+}
+
+/* Splats on a square sheet of edge `extent` and given thickness; normals within `spread` of `toward`. */
+static void make_sheet(struct sample *s, uint32_t count, double extent, double thickness, double radius, double spread,
+                       const double toward[3])
+{
+    *s = (struct sample){.count = count};
+    for (uint32_t i = 0; i < count; i++) {
+        struct spl_splat *splat = &s->splats[i];
+        s->position[i][0] = extent * (3.7 + uniform());
+        s->position[i][1] = extent * (11.1 + uniform());
+        s->position[i][2] = extent * 0.9 + thickness * uniform();
+        set_normal(splat, toward[0] + spread * (2 * uniform() - 1), toward[1] + spread * (2 * uniform() - 1),
+                   toward[2] + spread * (2 * uniform() - 1) + 1e-9);
+        splat->radius = (float)(radius * (1 + uniform()));
+        splat->uncertainty = (float)(uniform() < 0.1 ? 0 : exp2(-12 * uniform()));
+        for (int c = 0; c < 3; c++)
+            splat->color[c] = (uint8_t)(uniform() * 256);
+        splat->classification = (uint8_t)(uniform() * 7 + 249);
+    }
+}
+
+static double angle_between(const float a[3], const float b[3])
+{
+    double chord = 0;
+    for (int i = 0; i < 3; i++)
+        chord += ((double)a[i] - b[i]) * ((double)a[i] - b[i]);
+    return 2 * asin(fmin(1, 0.5 * sqrt(chord)));
+}
+
+/* Encodes, decodes each splat from a larger page, and checks every promise of the contract. Returns bits a splat. */
+static double check_sample(const struct sample *s, const struct spl_chunk_options *options)
+{
+    uint32_t page[SPL_CHUNK_WORDS_MAX + 7 + SPL_PAGE_TAIL_WORDS];
+    memset(page, 0xa5, sizeof page);
+    struct spl_chunk chunk;
+    struct spl_chunk_error stated;
+    uint32_t words = spl_chunk_encode(s->splats, constant(s), s->count, options, &chunk, page + 7, &stated);
+    assert_true(words <= SPL_CHUNK_WORDS_MAX);
+    for (size_t i = 7 + words; i < sizeof page / sizeof *page; i++)
+        assert_int_equal(page[i], 0xa5a5a5a5u);
+    chunk.geometry_word = 7;
+    assert_int_equal(spl_chunk_words(&chunk), words);
+    assert_int_equal(chunk.count, s->count);
+    assert_true(chunk.step > 0 && chunk.radius_step > 0 && chunk.normal_step > 0);
+
+    double position_sum = 0, normal_sum = 0, radius_sum = 0;
+    for (uint32_t i = 0; i < s->count; i++) {
+        const struct spl_splat *in = &s->splats[i];
+        struct spl_splat out;
+        spl_chunk_decode(&chunk, page, i, &out);
+        double square = 0;
+        for (int a = 0; a < 3; a++)
+            square += (out.position[a] - s->position[i][a]) * (out.position[a] - s->position[i][a]);
+        position_sum += sqrt(square) / in->radius;
+        double angle = angle_between(out.normal, in->normal);
+        normal_sum += angle;
+        assert_true(angle < 5 * options->normal_error);
+        assert_true(fabs(out.radius - in->radius) <= options->radius_error * in->radius * 1.00001);
+        radius_sum += in->radius;
+        assert_memory_equal(out.color, in->color, 3);
+        assert_int_equal(out.classification, options->has_class ? in->classification : 0);
+        if (!options->has_uncertainty || in->uncertainty == 0)
+            assert_true(out.uncertainty == 0);
+        else
+            assert_true(fabs(log2(out.uncertainty / in->uncertainty)) < 0.26);
+    }
+    assert_true(position_sum <= options->position_error * s->count * 1.00001);
+    assert_true(normal_sum <= options->normal_error * s->count * 1.00001);
+    assert_true(fabs(position_sum - stated.position_over_radius) <= 1e-5 * position_sum + 1e-12);
+    assert_true(fabs(normal_sum - stated.normal_radians) <= 1e-3 * normal_sum + 1e-6);
+    assert_true(fabs(chunk.radius_mean - radius_sum / s->count) <= 1e-6 * chunk.radius_mean);
+
+    uint64_t bits[SPL_ATTRIBUTE_COUNT] = {0}, all = 0;
+    spl_chunk_add_bits(&chunk, bits);
+    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
+        all += bits[a];
+    assert_int_equal(all, 32 * words + 8 * sizeof chunk);
+    return (double)(bits[SPL_ATTRIBUTE_POSITION] + bits[SPL_ATTRIBUTE_NORMAL] + bits[SPL_ATTRIBUTE_RADIUS] +
+                    bits[SPL_ATTRIBUTE_COLOR]) / s->count;
+}
+
+static void test_random(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct sample s;
+    for (uint32_t round = 0; round < 300; round++) {
+        random_state = round + 1;
+        uint32_t count = 1 + (uint32_t)(uniform() * SPL_CHUNK_SPLATS);
+        double extent = exp2(20 * uniform() - 12), radius = extent * exp2(-8 * uniform());
+        make_sheet(&s, count, extent, extent * exp2(-16 * uniform()), radius, 2 * uniform(), up);
+        check_sample(&s, &defaults);
+        check_sample(&s, &(struct spl_chunk_options){.position_error = 0.1, .normal_error = 0.1, .radius_error = 0.2});
+        check_sample(&s, &(struct spl_chunk_options){.position_error = 0.001, .normal_error = 0.001,
+                                                     .radius_error = 0.001});
+    }
+}
+
+/* A wall of a scan: the splats of a square grid, jittered, with eq. 20's radius. */
+static void test_wall_is_cheap(void **state)
+{
+    (void)state;
+    static const double toward[3] = {0.6, -0.3, 0.2};
+    struct sample s;
+    random_state = 5;
+    make_sheet(&s, SPL_CHUNK_SPLATS, 11.3 * 0.01, 0.001, 0.0113, 0.05, toward);
+    for (uint32_t i = 0; i < s.count; i++)
+        for (int c = 0; c < 3; c++)
+            s.splats[i].color[c] = (uint8_t)(120 + 10 * c + uniform() * 12);
+    double bits = check_sample(&s, &defaults);
+    assert_true(bits < 50);
+}
+
+static void test_one_and_equal(void **state)
+{
+    (void)state;
+    static const double down[3] = {0, 0, -1};
+    struct sample s;
+    random_state = 3;
+    make_sheet(&s, 1, 1, 1, 0.01, 0.5, down);
+    struct spl_chunk_options plain = defaults;
+    plain.has_class = plain.has_uncertainty = false;
+    assert_true(check_sample(&s, &plain) == 0);
+    check_sample(&s, &defaults);
+    s.count = SPL_CHUNK_SPLATS;
+    for (uint32_t i = 1; i < s.count; i++) {
+        s.splats[i] = s.splats[0];
+        memcpy(s.position[i], s.position[0], sizeof s.position[i]);
+    }
+    assert_true(check_sample(&s, &defaults) == 0);
+    for (int a = 0; a < 3; a++) /* two points a metre apart: the codes lie at the cells' far corners */
+        s.position[1][a] += 1;
+    s.count = 2;
+    check_sample(&s, &defaults);
+}
+
+/* 24 bits an axis are the end: the step grows, everything stays finite and within the step. */
+static void test_absurd_extent(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct sample s;
+    random_state = 9;
+    make_sheet(&s, SPL_CHUNK_SPLATS, 1e9, 1e9, 1e-30, 0.1, up);
+    uint32_t words[SPL_CHUNK_WORDS_MAX];
+    struct spl_chunk chunk;
+    struct spl_chunk_error error;
+    spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, &error);
+    assert_true(isfinite(error.position_over_radius));
+    for (uint32_t i = 0; i < s.count; i++) {
+        struct spl_splat out;
+        spl_chunk_decode(&chunk, words, i, &out);
+        for (int a = 0; a < 3; a++)
+            assert_true(fabs(out.position[a] - s.position[i][a]) <= 12e9 * 0x1p-23);
+        assert_true(out.radius > 0);
+    }
+}
+
+/* Where the radii span more than 12 bits can tell apart the step grows, and no radius vanishes. */
+static void test_radius_spread(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct sample s;
+    random_state = 21;
+    make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0, 1e-6, 0.1, up);
+    s.splats[77].radius = 100;
+    uint32_t words[SPL_CHUNK_WORDS_MAX];
+    struct spl_chunk chunk;
+    spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+    for (uint32_t i = 0; i < s.count; i++) {
+        struct spl_splat out;
+        spl_chunk_decode(&chunk, words, i, &out);
+        assert_true(out.radius > 0 && fabsf(out.radius - s.splats[i].radius) <= 100 * 0x1p-12f);
+    }
+}
+
+/* Chunks around each axis, octant, edge and fold of the octahedron, and one with every direction at once. */
+static void test_normal_directions(void **state)
+{
+    (void)state;
+    struct sample s;
+    for (int x = -1; x <= 1; x++)
+        for (int y = -1; y <= 1; y++)
+            for (int z = -1; z <= 1; z++) {
+                if (!x && !y && !z)
+                    continue;
+                random_state = (uint32_t)(9 * x + 3 * y + z + 100);
+                make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0.1, 0.1, 0.02, (double[3]){x, y, z});
+                check_sample(&s, &defaults);
+                make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0.1, 0.1, 1.5, (double[3]){x, y, z});
+                check_sample(&s, &defaults);
+                make_sheet(&s, 1, 1, 0.1, 0.1, 0, (double[3]){x, y, z});
+                check_sample(&s, &defaults);
+            }
+    make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0.1, 0.1, 1, (double[3]){0, 0, 0});
+    for (int i = 0; i < 6; i++)
+        set_normal(&s.splats[i], i == 0 ? 1 : i == 1 ? -1 : 0, i == 2 ? 1 : i == 3 ? -1 : 0,
+                   i == 4 ? 1 : i == 5 ? -1 : 0);
+    check_sample(&s, &defaults);
+}
+
+static void test_zero_normal(void **state)
+{
+    (void)state;
+    struct sample s;
+    make_sheet(&s, 4, 1, 1, 0.1, 0.1, (double[3]){0, 0, 1});
+    memset(s.splats[2].normal, 0, sizeof s.splats[2].normal);
+    uint32_t words[SPL_CHUNK_WORDS_MAX];
+    struct spl_chunk chunk;
+    spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+    struct spl_splat out;
+    spl_chunk_decode(&chunk, words, 2, &out);
+    assert_true(fabs(hypot(hypot(out.normal[0], out.normal[1]), out.normal[2]) - 1) < 1e-6);
+}
+
+static void test_octahedral(void **state)
+{
+    (void)state;
+    random_state = 77;
+    for (int round = 0; round < 20000; round++) {
+        struct spl_splat splat;
+        set_normal(&splat, uniform() - 0.5, uniform() - 0.5, round % 8 ? uniform() - 0.5 : 0);
+        for (unsigned turn = 0; turn < 6; turn++) {
+            float local[3], back[3], u, v;
+            spl_octahedral_turn(splat.normal, turn % 3, turn >= 3, local);
+            spl_octahedral_encode(local, &u, &v);
+            assert_true(fabsf(u) <= 1 && fabsf(v) <= 1);
+            spl_octahedral_decode(u, v, back);
+            assert_true(angle_between(local, back) < 1e-5);
+            spl_octahedral_turn_back(local, turn % 3, turn >= 3, back);
+            assert_memory_equal(back, splat.normal, sizeof back);
+        }
+    }
+    float pole[3];
+    for (int corner = 0; corner < 4; corner++) { /* the folded pole, and codes that rounded past the border */
+        spl_octahedral_decode(corner & 1 ? 1.001f : -1.001f, corner & 2 ? 1.001f : -1.001f, pole);
+        assert_true(pole[2] < -0.99f);
+    }
+}
+
+static void test_color_is_lossless(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct sample s;
+    random_state = 1;
+    make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0, 0.1, 0, up);
+    for (uint32_t round = 0; round < 400; round++) { /* every part of the cube, every other time with its corners */
+        uint32_t start = round / 2 * 79784;
+        for (uint32_t i = 0; i < s.count; i++) {
+            uint32_t rgb = round % 2 && i < 8 ? (i & 1 ? 0xff : 0) | (i & 2 ? 0xff00 : 0) | (i & 4 ? 0xff0000 : 0)
+                                             : (start + i * 623) & 0xffffff;
+            for (int c = 0; c < 3; c++)
+                s.splats[i].color[c] = (uint8_t)(rgb >> 8 * c);
+        }
+        check_sample(&s, &defaults);
+    }
+}
+
+static void test_uncertainty_levels(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct sample s;
+    uint32_t words[SPL_CHUNK_WORDS_MAX];
+    struct spl_chunk chunk;
+    make_sheet(&s, 3, 1, 0, 0.1, 0, up);
+    static const struct {
+        float in[3], out[3];
+        unsigned bits;
+    } rows[] = {
+        {{0, 0, 0}, {0, 0, 0}, 0},
+        {{0.25f, 0.25f, 0.25f}, {0.25f, 0.25f, 0.25f}, 0},
+        {{0, 1, 1}, {0, 1, 1}, 1},
+        {{0.5f, 1, 0}, {0.5f, 1, 0}, 2},
+        {{0x1p-15f, 1, 0}, {0x1p-15f, 1, 0}, 5},
+        {{1e-30f, 1, 1}, {0, 1, 1}, 1},
+    };
+    for (size_t row = 0; row < sizeof rows / sizeof *rows; row++) {
+        for (int i = 0; i < 3; i++)
+            s.splats[i].uncertainty = rows[row].in[i];
+        spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+        assert_int_equal(chunk.extra_bits >> SPL_EXTRA_UNCERTAINTY & 15, rows[row].bits);
+        for (uint32_t i = 0; i < 3; i++) {
+            struct spl_splat out;
+            spl_chunk_decode(&chunk, words, i, &out);
+            assert_true(out.uncertainty == rows[row].out[i]);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_random),           cmocka_unit_test(test_wall_is_cheap),
+        cmocka_unit_test(test_one_and_equal),    cmocka_unit_test(test_absurd_extent),
+        cmocka_unit_test(test_radius_spread),    cmocka_unit_test(test_normal_directions),
+        cmocka_unit_test(test_zero_normal),      cmocka_unit_test(test_octahedral),
+        cmocka_unit_test(test_color_is_lossless), cmocka_unit_test(test_uncertainty_levels),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
