@@ -1,0 +1,133 @@
+/* Recording, submission and waiting. OpenGL has no command lists of ours: commands go to the driver as they are recorded,
+ * in order, and submit puts a fence behind them. Owned by the device's thread. */
+#include "gpu/egl/gl.h"
+
+void gl_frames_init(struct gl_gpu *gpu)
+{
+    if (gpu->base.limits.timestamps)
+        for (int i = 0; i < SPL_GPU_SLOTS; i++)
+            gpu->gl.CreateQueries(GL_TIMESTAMP, SPL_GPU_TIMESTAMPS_MAX, gpu->slots[i].queries);
+}
+
+void gl_frames_finish(struct gl_gpu *gpu)
+{
+    for (int i = 0; i < SPL_GPU_SLOTS; i++) {
+        gpu->gl.DeleteQueries(SPL_GPU_TIMESTAMPS_MAX, gpu->slots[i].queries);
+        gpu->gl.DeleteSync(gpu->slots[i].sync);
+    }
+}
+
+static int check(struct gl_gpu *gpu, struct spl_error *err)
+{
+    if (gpu->gl.GetGraphicsResetStatus() != GL_NO_ERROR)
+        return spl_fail(err, SPL_E_DEVICE_LOST, "egl: device '%s' was reset", gpu->base.info.name);
+    GLenum error = gpu->gl.GetError();
+    if (error != GL_NO_ERROR)
+        return spl_fail(err, SPL_E_DEVICE_LOST, "egl: device '%s' refused work (GL error 0x%x)", gpu->base.info.name,
+                        error);
+    return 0;
+}
+
+int gl_begin(struct spl_gpu *base, uint32_t index, struct spl_error *err)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_use(gpu);
+    gpu->slot = &gpu->slots[index];
+    gpu->gl.DeleteSync(gpu->slot->sync);
+    gpu->slot->sync = NULL;
+    gpu->slot->written = 0;
+    return check(gpu, err);
+}
+
+void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
+                 uint32_t workgroups)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_use(gpu);
+    for (uint32_t i = 0; i < SPL_BIND_COUNT; i++) {
+        const struct gl_buffer *buffer = (const struct gl_buffer *)bindings[i].buffer;
+        if (buffer)
+            gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, buffer->name, (GLintptr)bindings[i].offset,
+                                    (GLsizeiptr)bindings[i].bytes);
+        else
+            gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, ((struct gl_buffer *)gpu->dummy)->name, 0, 256);
+    }
+    gpu->gl.UseProgram(((struct gl_kernel *)kernel)->program);
+    gpu->gl.DispatchCompute(workgroups, 1, 1);
+}
+
+void gl_barrier(struct spl_gpu *base)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_use(gpu);
+    gpu->gl.MemoryBarrier(GL_ALL_BARRIER_BITS);
+}
+
+void gl_copy(struct spl_gpu *base, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
+             uint64_t to_offset, uint64_t bytes)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_use(gpu);
+    gpu->gl.CopyNamedBufferSubData(((struct gl_buffer *)from)->name, ((struct gl_buffer *)to)->name,
+                                   (GLintptr)from_offset, (GLintptr)to_offset, (GLsizeiptr)bytes);
+}
+
+void gl_fill(struct spl_gpu *base, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes, uint32_t word)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_use(gpu);
+    gpu->gl.ClearNamedBufferSubData(((struct gl_buffer *)buffer)->name, GL_R32UI, (GLintptr)offset,
+                                    (GLsizeiptr)bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, &word);
+}
+
+void gl_timestamp(struct spl_gpu *base, uint32_t slot)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    if (gpu->slot->written >> slot & 1)
+        return; /* as in Vulkan, the first stays */
+    gpu->slot->written |= 1u << slot;
+    gl_use(gpu);
+    gpu->gl.QueryCounter(gpu->slot->queries[slot], GL_TIMESTAMP);
+}
+
+int gl_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
+{
+    (void)ticket;
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    gl_barrier(base);
+    gpu->slot->sync = gpu->gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gpu->gl.Flush();
+    return check(gpu, err);
+}
+
+int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    if (ticket <= gpu->ended)
+        return 0;
+    gl_use(gpu);
+    GLsync sync = gpu->slots[(ticket - 1) % SPL_GPU_SLOTS].sync;
+    GLenum result = gpu->gl.ClientWaitSync(sync, GL_SYNC_FLUSH_COMMANDS_BIT,
+                                           timeout_ns < INT64_MAX ? timeout_ns : INT64_MAX);
+    if (result == GL_TIMEOUT_EXPIRED)
+        return spl_fail(err, SPL_E_TIMEOUT, "device '%s' did not end its work in time", base->info.name);
+    if (result == GL_WAIT_FAILED) {
+        int code = check(gpu, err);
+        return code < 0 ? code : spl_fail(err, SPL_E_DEVICE_LOST, "egl: waiting failed");
+    }
+    gpu->ended = ticket;
+    return 0;
+}
+
+void gl_read_timestamps(struct spl_gpu *base, uint64_t ticket)
+{
+    struct gl_gpu *gpu = (struct gl_gpu *)base;
+    const struct gl_slot *slot = &gpu->slots[(ticket - 1) % SPL_GPU_SLOTS];
+    gl_use(gpu);
+    for (uint32_t i = 0; i < SPL_GPU_TIMESTAMPS_MAX; i++) {
+        GLuint64 ns = 0;
+        if (slot->written >> i & 1)
+            gpu->gl.GetQueryObjectui64v(slot->queries[i], GL_QUERY_RESULT, &ns);
+        base->timestamps_ns[i] = ns;
+    }
+}
