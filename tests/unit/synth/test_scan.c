@@ -1,0 +1,347 @@
+/* Scans on disk: complete, repeatable, true to the surfaces they sampled, and absent when something was wrong. */
+#include <dirent.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include <splatd/synth.h>
+
+#include "base/memory.h"
+#include "synth/scene.h"
+#include "synth/vector.h"
+
+static char folder[] = "/tmp/splatd-synth-XXXXXX";
+
+static const char *in_folder(const char *name)
+{
+    static char path[2][128];
+    static int turn;
+    turn ^= 1;
+    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
+    return path[turn];
+}
+
+static char *read_all(const char *path, size_t *bytes)
+{
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    assert_int_equal(fseek(file, 0, SEEK_END), 0);
+    *bytes = (size_t)ftell(file);
+    rewind(file);
+    char *text = calloc(*bytes + 1, 1);
+    assert_int_equal(fread(text, 1, *bytes, file), *bytes);
+    fclose(file);
+    return text;
+}
+
+static size_t file_count(const char *path)
+{
+    size_t count = 0;
+    DIR *dir = opendir(path);
+    if (!dir)
+        return 0;
+    for (struct dirent *entry; (entry = readdir(dir));)
+        count += entry->d_name[0] != '.';
+    closedir(dir);
+    return count;
+}
+
+static struct spl_synth_options options_for(const char *directory, uint64_t points)
+{
+    return (struct spl_synth_options){.scene = "courtyard", .directory = directory, .points = points, .seed = 1,
+                                      .noise = -1, .threads = 2};
+}
+
+static uint64_t scan(struct spl_synth_options o)
+{
+    struct spl_error err = {0};
+    uint64_t points = 0;
+    if (spl_synth(&o, &points, &err))
+        fail_msg("%s: %s", err.field, err.message);
+    return points;
+}
+
+static bool same_files(const char *a, const char *b)
+{
+    size_t bytes[2];
+    char *text[2] = {read_all(a, &bytes[0]), read_all(b, &bytes[1])};
+    bool same = bytes[0] == bytes[1] && !memcmp(text[0], text[1], bytes[0]);
+    free(text[0]);
+    free(text[1]);
+    return same;
+}
+
+static void files_depend_on_the_seed_and_not_on_threads(void **state)
+{
+    (void)state;
+    const char *const names[] = {"one", "three", "again", "other"};
+    for (int i = 0; i < 4; i++) {
+        struct spl_synth_options o = options_for(in_folder(names[i]), 20000);
+        o.threads = i == 1 ? 3 : 1;
+        o.seed = i == 3 ? 2 : 1;
+        scan(o);
+        assert_int_equal(file_count(o.directory), 2);
+    }
+    assert_true(same_files(in_folder("one/courtyard.ptx"), in_folder("three/courtyard.ptx")));
+    assert_true(same_files(in_folder("one/courtyard.ply"), in_folder("three/courtyard.ply")));
+    assert_true(same_files(in_folder("one/courtyard.ptx"), in_folder("again/courtyard.ptx")));
+    assert_false(same_files(in_folder("one/courtyard.ptx"), in_folder("other/courtyard.ptx")));
+    assert_false(same_files(in_folder("one/courtyard.ply"), in_folder("other/courtyard.ply")));
+}
+
+static void counts_come_within_two_percent(void **state)
+{
+    (void)state;
+    const uint64_t wanted[] = {1000, 1234, 5000, 77777, 200000, 200001, 600000};
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        struct spl_synth_options o = options_for(in_folder("count"), wanted[i]);
+        o.formats = "ply";
+        uint64_t points = scan(o);
+        assert_true(fabs((double)points - (double)wanted[i]) <= 0.02 * (double)wanted[i]);
+        size_t bytes;
+        unsigned long long stated = 0;
+        char *ply = read_all(in_folder("count/courtyard.ply"), &bytes);
+        char *body = strstr(ply, "end_header\n") + strlen("end_header\n");
+        assert_int_equal(sscanf(strstr(ply, "element vertex"), "element vertex %llu", &stated), 1);
+        assert_int_equal(stated, points);
+        assert_int_equal(bytes - (size_t)(body - ply), points * 15);
+        free(ply);
+    }
+    assert_int_equal(file_count(in_folder("count")), 1); /* written over, and no PTX */
+}
+
+/* Reads the PTX with its own poses and casts from each station through each point: how far the surface is from it. */
+static void check_truth(const char *directory, uint64_t points, double sigma)
+{
+    struct spl_scene *scene;
+    assert_int_equal(spl_scene_create("courtyard", &scene, NULL), 0);
+    char path[160];
+    size_t ply_bytes;
+    snprintf(path, sizeof path, "%s/courtyard.ply", directory);
+    char *ply = read_all(path, &ply_bytes), *at = strstr(ply, "end_header\n") + strlen("end_header\n");
+    snprintf(path, sizeof path, "%s/courtyard.ptx", directory);
+    FILE *ptx = fopen(path, "r");
+    assert_non_null(ptx);
+    uint64_t returns = 0, empty = 0, off_surface = 0, off_color = 0;
+    double squares = 0;
+    for (size_t s = 0; s < scene->station_count; s++) {
+        unsigned long columns, rows;
+        double p[3], axes[9], m[16];
+        assert_int_equal(fscanf(ptx, "%lu %lu", &columns, &rows), 2);
+        for (int i = 0; i < 3; i++)
+            assert_int_equal(fscanf(ptx, "%lf", &p[i]), 1);
+        for (int i = 0; i < 9; i++)
+            assert_int_equal(fscanf(ptx, "%lf", &axes[i]), 1);
+        for (int i = 0; i < 16; i++)
+            assert_int_equal(fscanf(ptx, "%lf", &m[i]), 1);
+        for (int i = 0; i < 3; i++)
+            assert_true(m[12 + i] == p[i] && m[4 * i] == axes[3 * i] && m[4 * i + 3] == 0);
+        assert_true(m[15] == 1);
+        for (unsigned long cell = 0; cell < columns * rows; cell++) {
+            double x[3], intensity, world[3], d[3];
+            int rgb[3];
+            float stored[3];
+            struct spl_hit h;
+            assert_int_equal(fscanf(ptx, "%lf %lf %lf %lf %d %d %d", &x[0], &x[1], &x[2], &intensity, &rgb[0], &rgb[1],
+                                    &rgb[2]), 7);
+            assert_true(intensity >= 0 && intensity <= 1);
+            if (x[0] == 0 && x[1] == 0 && x[2] == 0) {
+                assert_true(intensity == 0.5 && !rgb[0] && !rgb[1] && !rgb[2]);
+                empty++;
+                continue;
+            }
+            returns++;
+            for (int i = 0; i < 3; i++)
+                world[i] = x[0] * m[i] + x[1] * m[4 + i] + x[2] * m[8 + i] + m[12 + i];
+            memcpy(stored, at, sizeof stored);
+            for (int i = 0; i < 3; i++) {
+                assert_true(fabs((double)stored[i] - world[i]) < 2e-5);
+                assert_int_equal((uint8_t)at[12 + i], rgb[i]);
+            }
+            at += 15;
+            sub3(world, p, d);
+            double range = normalise3(d), error = INFINITY;
+            if (spl_scene_hit(scene, p, d, &h))
+                error = h.t - range;
+            /* A ray along an edge may pass on its other side after the rounding to 10 µm. */
+            if (fabs(error) > 5 * sigma + 1e-4) {
+                off_surface++;
+                continue;
+            }
+            squares += error * error;
+            for (int i = 0; i < 3; i++)
+                off_color += abs(h.color[i] - rgb[i]) > 2;
+        }
+    }
+    double trailing;
+    assert_int_equal(fscanf(ptx, "%lf", &trailing), EOF);
+    assert_ptr_equal(at, ply + ply_bytes);
+    fclose(ptx);
+    assert_int_equal(returns, points);
+    assert_true(empty > returns / 4); /* the sky */
+    assert_true(off_surface <= returns / 500);
+    assert_true(off_color <= returns / 100);
+    double deviation = sqrt(squares / (double)returns);
+    assert_true(deviation >= 0.97 * sigma && deviation <= 1.03 * sigma + 2e-5);
+    free(ply);
+    spl_scene_destroy(scene);
+}
+
+static void points_lie_on_the_surfaces(void **state)
+{
+    (void)state;
+    struct spl_synth_options o = options_for(in_folder("exact/deeper"), 60000);
+    o.noise = 0;
+    check_truth(o.directory, scan(o), 0);
+    o.noise = 0.01;
+    check_truth(o.directory, scan(o), 0.01);
+    o.noise = -1;
+    check_truth(o.directory, scan(o), 0.0015);
+}
+
+static void refused(struct spl_synth_options o, int code, const char *field, const char *word)
+{
+    struct spl_error err = {0};
+    uint64_t points = 7;
+    assert_int_equal(spl_synth(&o, &points, &err), code);
+    assert_string_equal(err.field, field);
+    if (!strstr(err.message, word))
+        fail_msg("'%s' does not say '%s'", err.message, word);
+    assert_int_equal(points, 7);
+    assert_int_equal(file_count(o.directory ? o.directory : "/nonexistent"), 0);
+}
+
+static void bad_arguments_are_named_and_leave_nothing(void **state)
+{
+    (void)state;
+    const struct spl_synth_options good = options_for(in_folder("refused"), 1000);
+    char directory[128];
+    snprintf(directory, sizeof directory, "%s", good.directory);
+    struct spl_synth_options o = good;
+    o.directory = directory;
+#define REFUSED(member, value, code, field, word)                                                                      \
+    do {                                                                                                               \
+        struct spl_synth_options bad = o;                                                                              \
+        bad.member = value;                                                                                            \
+        refused(bad, code, field, word);                                                                               \
+    } while (0)
+    REFUSED(scene, "nowhere", SPL_E_USAGE, "scene", "courtyard");
+    REFUSED(scene, "", SPL_E_USAGE, "scene", "courtyard");
+    REFUSED(points, 0, SPL_E_USAGE, "points", "1000");
+    REFUSED(points, 999, SPL_E_USAGE, "points", "999");
+    REFUSED(points, 1000000000000, SPL_E_USAGE, "points", "10000000000");
+    REFUSED(noise, NAN, SPL_E_USAGE, "noise", "0 to 1");
+    REFUSED(noise, 1.01, SPL_E_USAGE, "noise", "1.01");
+    REFUSED(noise, -INFINITY, SPL_E_USAGE, "noise", "inf");
+    REFUSED(formats, "", SPL_E_USAGE, "format", "ptx, ply");
+    REFUSED(formats, "ptx,", SPL_E_USAGE, "format", "ptx, ply");
+    REFUSED(formats, "ply,las", SPL_E_USAGE, "format", "'las'");
+    REFUSED(directory, "", SPL_E_USAGE, "directory", "directory");
+    REFUSED(directory, NULL, SPL_E_USAGE, "directory", "directory");
+    REFUSED(directory, "/proc/no/where", SPL_E_IO, "", "/proc/no");
+    REFUSED(directory, "/dev/null", SPL_E_USAGE, "", "/dev/null");
+    REFUSED(directory, "/dev/null/below", SPL_E_USAGE, "", "/dev/null");
+#undef REFUSED
+    assert_int_not_equal(access(directory, F_OK), 0);
+}
+
+static void a_full_disk_keeps_the_old_files(void **state)
+{
+    (void)state;
+    char directory[128], before[2][160];
+    snprintf(directory, sizeof directory, "%s", in_folder("full"));
+    struct spl_synth_options o = options_for(directory, 2000);
+    scan(o);
+    for (int i = 0; i < 2; i++) {
+        snprintf(before[i], sizeof before[i], "%s/%s", directory, i ? "before" : "courtyard.ply");
+    }
+    assert_int_equal(link(before[0], before[1]), 0);
+    struct rlimit kept, small = {.rlim_cur = 100000};
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &kept), 0);
+    small.rlim_max = kept.rlim_max;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    struct spl_error err = {0};
+    o.points = 50000;
+    int result = spl_synth(&o, NULL, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &kept), 0);
+    assert_int_equal(result, SPL_E_IO);
+    assert_non_null(strstr(err.message, "courtyard."));
+    assert_int_equal(file_count(directory), 3); /* both old files and the link, nothing partial */
+    assert_true(same_files(before[0], before[1]));
+}
+
+static void refused_memory_leaves_nothing(void **state)
+{
+    (void)state;
+    struct spl_synth_options o = options_for(in_folder("memory"), 1000);
+    for (long n = 1;; n++) {
+        struct spl_error err = {0};
+        spl_memory_fail_after(n);
+        int result = spl_synth(&o, NULL, &err);
+        spl_memory_fail_after(0);
+        if (!result)
+            break;
+        assert_int_equal(result, SPL_E_NOMEM);
+        assert_int_equal(file_count(o.directory), 0);
+    }
+    assert_int_equal(file_count(o.directory), 2);
+}
+
+static void note_progress(void *context, const struct spl_progress *progress)
+{
+    struct spl_progress *last = context;
+    assert_true(progress->done >= last->done);
+    assert_true(progress->done <= progress->total);
+    *last = *progress;
+}
+
+static void progress_ends_at_the_number_of_points(void **state)
+{
+    (void)state;
+    struct spl_progress last = {0};
+    struct spl_synth_options o = options_for(in_folder("progress"), 1000);
+    o.progress = note_progress;
+    o.progress_context = &last;
+    uint64_t points = scan(o);
+    assert_int_equal(last.done, points);
+    assert_int_equal(last.total, points);
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) ? 0 : -1;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    char command[64];
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    return system(command);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(files_depend_on_the_seed_and_not_on_threads),
+        cmocka_unit_test(counts_come_within_two_percent),
+        cmocka_unit_test(points_lie_on_the_surfaces),
+        cmocka_unit_test(bad_arguments_are_named_and_leave_nothing),
+        cmocka_unit_test(a_full_disk_keeps_the_old_files),
+        cmocka_unit_test(refused_memory_leaves_nothing),
+        cmocka_unit_test(progress_ends_at_the_number_of_points),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,329 @@
+/* Rays against closed forms, the hierarchy against every primitive, and what the courtyard promises other tests. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "synth/build.h"
+#include "synth/random.h"
+#include "synth/vector.h"
+
+#define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
+
+static struct spl_scene *courtyard(void)
+{
+    struct spl_scene *scene = NULL;
+    struct spl_error err = {0};
+    assert_int_equal(spl_scene_create("courtyard", &scene, &err), 0);
+    return scene;
+}
+
+/* t of the hit, NAN for a miss. */
+static double hit(const struct spl_scene *scene, const double o[3], const double d[3])
+{
+    double t = INFINITY;
+    return spl_primitive_hit(&scene->primitives[scene->primitive_count - 1], o, d, &t) ? t : NAN;
+}
+
+static void unbuild(struct spl_scene *scene)
+{
+    free(scene->primitives);
+    free(scene->materials);
+    free(scene->objects);
+    free(scene->stations);
+}
+
+static void plane_shapes_end_where_they_should(void **state)
+{
+    (void)state;
+    struct spl_scene s = {0};
+    const double x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, z[3] = {0, 0, 1}, down[3] = {0, 0, -1}, twice_down[3] = {0, 0, -2};
+    spl_build_rectangle(&s, (struct spl_skin){0}, (double[3]){1, 2, 3}, x, y, (double[2]){0.5, 0.25}, NULL);
+    assert_near(hit(&s, (double[3]){1, 2, 7}, down), 4, 1e-15);
+    assert_near(hit(&s, (double[3]){1, 2, 7}, twice_down), 2, 1e-15);
+    assert_near(hit(&s, (double[3]){1, 2, 0}, z), 3, 1e-15); /* from behind */
+    assert_near(hit(&s, (double[3]){1.499999, 2.249999, 4}, down), 1, 1e-15);
+    assert_true(isnan(hit(&s, (double[3]){1.500001, 2, 4}, down)));
+    assert_true(isnan(hit(&s, (double[3]){1, 2.250001, 4}, down)));
+    assert_true(isnan(hit(&s, (double[3]){1, 2, 4}, z)));  /* behind the origin */
+    assert_true(isnan(hit(&s, (double[3]){0, 2, 4}, x)));  /* parallel */
+    assert_true(isnan(hit(&s, (double[3]){0, 2, 3}, x)));  /* in the plane */
+    spl_build_disc(&s, (struct spl_skin){0}, (double[3]){1, 2, 3}, (double[3]){0, 0, 5}, 0.5);
+    assert_near(hit(&s, (double[3]){1.3, 2.39, 7}, down), 4, 1e-15);
+    assert_true(isnan(hit(&s, (double[3]){1.4, 2.4, 7}, down)));
+    unbuild(&s);
+}
+
+static void round_shapes_are_exact_from_near_and_far(void **state)
+{
+    (void)state;
+    struct spl_scene s = {0};
+    const double x[3] = {1, 0, 0};
+    spl_build_sphere(&s, (struct spl_skin){0}, (double[3]){10, 0, 0}, 0.75);
+    assert_near(hit(&s, (double[3]){0}, x), 9.25, 1e-14);
+    assert_near(hit(&s, (double[3]){10, 0, 0}, x), 0.75, 1e-14); /* from inside */
+    assert_near(hit(&s, (double[3]){0, 0.6, 0}, x), 10 - 0.45, 1e-14);
+    assert_true(isnan(hit(&s, (double[3]){0, 0.7500001, 0}, x)));
+    assert_true(isnan(hit(&s, (double[3]){11, 0, 0}, x)));
+    assert_near(hit(&s, (double[3]){-1e6, 0.6, 0}, x), 1e6 + 9.55, 1e-9);
+
+    spl_build_cone(&s, (struct spl_skin){0}, (double[3]){10, 0, -1}, (double[3]){10, 0, 1}, 0.004, 0.004);
+    assert_near(hit(&s, (double[3]){0, 0.0024, 0.5}, x), 10 - 0.0032, 1e-12);
+    assert_near(hit(&s, (double[3]){-1e6, 0.0024, 0.5}, x), 1e6 + 10 - 0.0032, 1e-9);
+    assert_near(hit(&s, (double[3]){10, 0, 0}, x), 0.004, 1e-12);
+    assert_true(isnan(hit(&s, (double[3]){0, 0, 1.001}, x)));  /* beyond its end */
+    assert_true(isnan(hit(&s, (double[3]){10, 0, -5}, (double[3]){0, 0, 1}))); /* through the open ends */
+    assert_true(isnan(hit(&s, (double[3]){10.003, 0, -5}, (double[3]){0, 0, 1})));
+
+    spl_build_cone(&s, (struct spl_skin){0}, (double[3]){10, 0, 0}, (double[3]){10, 0, 4}, 2, 0);
+    assert_near(hit(&s, (double[3]){0, 0, 1}, x), 8.5, 1e-14);
+    assert_near(hit(&s, (double[3]){0, 0, 3}, x), 9.5, 1e-14);
+    assert_true(isnan(hit(&s, (double[3]){0, 0, 4.5}, x)));    /* not its mirror image above the tip */
+    assert_near(hit(&s, (double[3]){11, 0, 9}, (double[3]){0, 0, -1}), 7, 1e-14);
+    double normal[3];
+    spl_primitive_normal(&s.primitives[s.primitive_count - 1], (double[3]){8.5, 0, 1}, normal);
+    assert_near(normal[0], -2 / sqrt(5), 1e-15);
+    assert_near(normal[2], 1 / sqrt(5), 1e-15);
+    unbuild(&s);
+}
+
+static void hits_lie_on_tilted_surfaces_and_in_their_boxes(void **state)
+{
+    (void)state;
+    uint64_t random = 9;
+    int hits = 0;
+    for (int n = 0; n < 4000; n++) {
+        struct spl_scene s = {0};
+        double a[3], b[3], o[3], d[3], at[3], normal[3], from[3], bounds[2][3], t = INFINITY;
+        for (int i = 0; i < 3; i++) {
+            a[i] = random_between(&random, -1, 1);
+            b[i] = random_between(&random, -1, 1);
+            o[i] = random_between(&random, -5, 5);
+        }
+        double first = random_between(&random, 0.1, 1), last = random_between(&random, 0.1, 1);
+        switch (n % 3) {
+        case 0:
+            spl_build_cone(&s, (struct spl_skin){0}, a, b, first, last);
+            break;
+        case 1:
+            spl_build_sphere(&s, (struct spl_skin){0}, a, first);
+            break;
+        case 2:
+            spl_build_disc(&s, (struct spl_skin){0}, a, b, first);
+            break;
+        }
+        const struct spl_primitive *p = &s.primitives[0];
+        for (int i = 0; i < 3; i++)
+            d[i] = a[i] + 0.7 * random_between(&random, -1, 1) - o[i];
+        spl_primitive_bounds(p, bounds);
+        if (spl_primitive_hit(p, o, d, &t)) {
+            hits++;
+            mad3(o, t, d, at);
+            spl_primitive_normal(p, at, normal);
+            assert_near(dot3(normal, normal), 1, 1e-12);
+            for (int i = 0; i < 3; i++)
+                assert_true(at[i] >= bounds[0][i] && at[i] <= bounds[1][i]);
+            sub3(at, p->center, from);
+            double along = dot3(from, p->normal), across = sqrt(fmax(0, dot3(from, from) - along * along));
+            if (n % 3 == 0) {
+                assert_near(across, first + (last - first) * along / p->length, 1e-9);
+                double generator[3], slope = (last - first) / p->length; /* from the base circle through the hit */
+                for (int i = 0; i < 3; i++)
+                    generator[i] = p->normal[i] + slope * (from[i] - along * p->normal[i]) / across;
+                assert_near(dot3(normal, generator), 0, 1e-9);
+            } else if (n % 3 == 1) {
+                assert_near(sqrt(dot3(from, from)), first, 1e-12);
+            } else {
+                assert_near(along, 0, 1e-9);
+                assert_true(across <= first);
+            }
+        }
+        unbuild(&s);
+    }
+    assert_true(hits > 1000);
+}
+
+static void hierarchy_agrees_with_every_primitive(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = courtyard();
+    uint64_t random = 77;
+    for (int n = 0; n < 3000; n++) {
+        double o[3] = {random_between(&random, -12, 12), random_between(&random, -10, 10), random_between(&random, 0, 9)};
+        double d[3] = {random_between(&random, -1, 1), random_between(&random, -1, 1), random_between(&random, -1, 1)};
+        switch (n % 8) { /* the awkward ones: parallel to the axes, in a wall's or the ground's plane, from far away */
+        case 0:
+            d[n / 8 % 3] = 0;
+            break;
+        case 1:
+            d[0] = d[1] = 0;
+            break;
+        case 2:
+            o[2] = 0;
+            d[2] = 0;
+            break;
+        case 3:
+            o[1] = 8;
+            d[1] = 0;
+            break;
+        case 4:
+            for (int i = 0; i < 3; i++)
+                o[i] -= 1e4 * d[i];
+            break;
+        default:
+            break;
+        }
+        double t = INFINITY, expected = INFINITY;
+        uint32_t index;
+        for (size_t i = 0; i < scene->primitive_count; i++)
+            spl_primitive_hit(&scene->primitives[i], o, d, &expected);
+        bool found = spl_bvh_hit(scene->nodes, scene->primitives, o, d, &t, &index);
+        assert_int_equal(found, isfinite(expected));
+        assert_true(t == expected);
+    }
+    spl_scene_destroy(scene);
+}
+
+static void landmarks_are_where_tests_look_for_them(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = courtyard();
+    struct spl_hit h;
+    assert_true(spl_scene_hit(scene, (double[3]){2.5, -6, 1.6}, (double[3]){0, 2, 0}, &h));
+    assert_int_equal(h.id, spl_scene_find_object(scene, "sphere"));
+    assert_near(h.t, (4.5 - 0.75) / 2, 1e-12);
+    assert_near(h.normal[1], -1, 1e-12);
+    assert_true(spl_scene_hit(scene, (double[3]){0, 3.5, 1.7}, (double[3]){-1, 0, 0}, &h));
+    assert_int_equal(h.id, spl_scene_find_object(scene, "red-panel"));
+    assert_memory_equal(h.color, ((uint8_t[3]){255, 0, 0}), 3);
+    assert_near(h.position[0], -9.94, 1e-12);
+    assert_true(spl_scene_hit(scene, (double[3]){0, 0, 1.7}, (double[3]){0, 0, -1}, &h));
+    assert_int_equal(h.id, spl_scene_find_object(scene, "ground"));
+    assert_near(h.normal[2], 1, 0);
+    assert_true(spl_scene_hit(scene, (double[3]){0, 0, -1}, (double[3]){0, 0, 1}, &h)); /* from below: normal turned */
+    assert_near(h.normal[2], -1, 0);
+    assert_false(spl_scene_hit(scene, (double[3]){0, 0, 1.7}, (double[3]){0, 0, 1}, &h));
+    assert_int_equal(spl_scene_find_object(scene, "unicorn"), UINT32_MAX);
+    uint64_t random = 5;
+    for (int n = 0; n < 20000; n++) { /* no gaps between the parts of the façades */
+        double azimuth = random_between(&random, 0, 2 * M_PI);
+        double d[3] = {cos(azimuth), sin(azimuth), random_between(&random, -0.5, 0.4)};
+        assert_true(spl_scene_hit(scene, (double[3]){0, 0.3, 1.7}, d, &h));
+        assert_true(fabs(h.position[0]) < 10.3 && fabs(h.position[1]) < 8.3);
+    }
+    spl_scene_destroy(scene);
+}
+
+static void stations_stand_free_and_upright(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = courtyard();
+    assert_int_equal(scene->station_count, 4);
+    for (size_t i = 0; i < scene->station_count; i++) {
+        const struct spl_station *s = &scene->stations[i];
+        struct spl_hit h;
+        uint64_t random = i;
+        double x[3], y[3], z[3];
+        for (int a = 0; a < 3; a++) {
+            x[a] = s->rotation[3 * a];
+            y[a] = s->rotation[3 * a + 1];
+            z[a] = s->rotation[3 * a + 2];
+        }
+        double cross[3];
+        cross3(x, y, cross);
+        for (int a = 0; a < 3; a++)
+            assert_near(cross[a], z[a], 1e-15);
+        assert_true(z[2] > 0.999 && z[2] < 0.99999);
+        for (int n = 0; n < 2000; n++) {
+            double d[3];
+            for (int a = 0; a < 3; a++)
+                d[a] = random_between(&random, -1, 1);
+            normalise3(d);
+            assert_true(!spl_scene_hit(scene, s->position, d, &h) || h.t > 0.5);
+        }
+    }
+    spl_scene_destroy(scene);
+}
+
+/* Along a line on each wall and the ground: colours change, by little at a time, and not with a period. */
+static void textures_are_band_limited_and_do_not_repeat(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = courtyard();
+    const struct {
+        const char *object;
+        double eye[3], toward[3], along[3];
+        double period;
+    } lines[] = {
+        {"facade-north", {-9, 5, 3.3}, {0, 1, 0}, {1, 0, 0}, 0.25},
+        {"facade-east", {9.5, 5, 3.9}, {1, 0, 0}, {0, -1, 0}, 1.4},
+        {"facade-south", {6, -5, 3.4}, {0, -1, 0}, {-1, 0, 0}, 0.9},
+        {"facade-west", {-9, -5, 3.4}, {-1, 0, 0}, {0, 1, 0}, 0.4},
+        {"ground", {-8, -3.3, 1}, {0, 0, -1}, {1, 0, 0}, 0.6},
+    };
+    const double step = 0.0002;
+    enum { steps = 10000 };
+    uint8_t (*colors)[3] = calloc(steps, sizeof *colors);
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+        int distinct = 0, repeated = 0;
+        size_t period = (size_t)llround(lines[i].period / step);
+        for (size_t k = 0; k < steps; k++) {
+            struct spl_hit h;
+            double o[3];
+            mad3(lines[i].eye, (double)k * step, lines[i].along, o);
+            assert_true(spl_scene_hit(scene, o, lines[i].toward, &h));
+            assert_string_equal(scene->objects[h.id], lines[i].object);
+            memcpy(colors[k], h.color, 3);
+            for (int c = 0; k && c < 3; c++)
+                assert_true(abs(colors[k][c] - colors[k - 1][c]) <= 12);
+            distinct += k && memcmp(colors[k], colors[k - 1], 3);
+            repeated += k >= period && !memcmp(colors[k], colors[k - period], 3);
+        }
+        assert_true(distinct > 100);
+        assert_true(repeated < steps / 4);
+    }
+    free(colors);
+    spl_scene_destroy(scene);
+}
+
+static void unknown_scenes_and_refused_memory_are_errors(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_scene *scene = NULL;
+    assert_int_equal(spl_scene_create("nowhere", &scene, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "scene");
+    assert_non_null(strstr(err.message, "courtyard"));
+    for (long n = 1;; n++) {
+        err = (struct spl_error){0};
+        spl_memory_fail_after(n);
+        int result = spl_scene_create("courtyard", &scene, &err);
+        spl_memory_fail_after(0);
+        if (!result)
+            break;
+        assert_int_equal(result, SPL_E_NOMEM);
+        assert_int_equal(err.code, SPL_E_NOMEM);
+        assert_null(scene);
+    }
+    spl_scene_destroy(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(plane_shapes_end_where_they_should),
+        cmocka_unit_test(round_shapes_are_exact_from_near_and_far),
+        cmocka_unit_test(hits_lie_on_tilted_surfaces_and_in_their_boxes),
+        cmocka_unit_test(hierarchy_agrees_with_every_primitive),
+        cmocka_unit_test(landmarks_are_where_tests_look_for_them),
+        cmocka_unit_test(stations_stand_free_and_upright),
+        cmocka_unit_test(textures_are_band_limited_and_do_not_repeat),
+        cmocka_unit_test(unknown_scenes_and_refused_memory_are_errors),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
