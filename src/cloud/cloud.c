@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "cloud/fields.h"
 #include "cloud/reader.h"
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err)
@@ -38,6 +39,31 @@ static bool begins_with(const uint8_t *bytes, size_t available, const char *text
     return available >= length && memcmp(bytes, text, length) == 0;
 }
 
+static bool is_text(const uint8_t *bytes, size_t available)
+{
+    for (size_t i = 0; i < available; i++)
+        if ((bytes[i] < ' ' && !memchr("\t\n\f\r", bytes[i], 4)) || bytes[i] == 0x7f)
+            return false;
+    return true;
+}
+
+/* Its first two lines are one whole number each: the columns and rows of a station. */
+static bool is_ptx(const uint8_t *bytes, size_t available)
+{
+    const char *p = (const char *)bytes, *end = p + available;
+    for (int k = 0; k < 2; k++) {
+        uint64_t ignored;
+        while (p < end && memchr(" \t\r\n", *p, 4))
+            p++;
+        p = spl_integer_parse(p, end, &ignored);
+        while (p && p < end && (*p == ' ' || *p == '\t'))
+            p++;
+        if (!p || (p < end && *p != '\r' && *p != '\n'))
+            return false;
+    }
+    return true;
+}
+
 static int find_reader(struct spl_source *source, const struct spl_reader **reader, struct spl_error *err)
 {
     const uint8_t *bytes;
@@ -53,9 +79,14 @@ static int find_reader(struct spl_source *source, const struct spl_reader **read
         return spl_source_fail(source, SPL_E_UNSUPPORTED, "", err,
                                "is E57, which is not supported yet: convert it first, with \"pdal translate IN.e57 "
                                "OUT.las\" or CloudCompare");
+    else if (is_text(bytes, available))
+        *reader = is_ptx(bytes, available) ? &spl_ptx_reader : &spl_text_reader;
     else
         return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, PTX, PTS, or text with columns)");
+                               "is no point cloud known here (PLY, LAS, PTX, PTS, or UTF-8 text with columns)");
+    if ((*reader == &spl_ptx_reader || *reader == &spl_text_reader) && !memchr(bytes, '\n', available) &&
+        memchr(bytes, '\r', available))
+        source->newline = '\r';
     return SPL_OK;
 }
 

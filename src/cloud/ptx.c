@@ -1,0 +1,261 @@
+/* PTX: one or more stations, each a header (columns, rows, scanner position and axes, 4×4 matrix with the translation in
+ * its last row) and columns × rows cells "x y z [intensity [r g b]]" in the station's frame. A cell at exactly 0 0 0 saw
+ * nothing; it is counted and dropped.
+ *
+ * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "cloud/fields.h"
+#include "cloud/reader.h"
+
+struct ptx {
+    uint64_t cells, taken;      /* of the current station */
+    unsigned fields;            /* values of a cell of this station, 0 before its first */
+    unsigned first_fields;      /* of the file's first station */
+    size_t station_capacity;
+    double pose[16];            /* row-major, station to world */
+};
+
+/* One header line of `count` numbers. */
+static int take_numbers(struct spl_source *source, const char *field, double *values, size_t count,
+                        struct spl_error *err)
+{
+    const char *line;
+    size_t length;
+    char text[32];
+    int code = spl_source_line(source, &line, &length, err);
+    if (code < 0)
+        return code;
+    if (code == 0)
+        return spl_source_fail_line(source, source->line, field, err, "the file ends inside a station's header");
+    struct spl_fields fields = spl_fields_begin(line, length, ' ');
+    for (size_t i = 0; i < count; i++) {
+        enum spl_field got = spl_fields_number(&fields, &values[i]);
+        if (got == SPL_FIELD_END)
+            return spl_source_fail_line(source, source->line, field, err, "%zu numbers where %zu are needed", i, count);
+        if (got == SPL_FIELD_BAD || !isfinite(values[i]))
+            return spl_source_fail_line(source, source->line, field, err, "\"%s\" is not a finite number",
+                                        spl_fields_show(&fields, text));
+    }
+    if (!spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
+        return spl_source_fail_line(source, source->line, field, err, "more than %zu numbers", count);
+    return SPL_OK;
+}
+
+static int take_size(struct spl_source *source, const char *field, uint64_t *size, struct spl_error *err)
+{
+    double value;
+    int code = take_numbers(source, field, &value, 1, err);
+    if (code < 0)
+        return code;
+    if (value < 0 || value > 4294967295.0 || value != floor(value))
+        return spl_source_fail_line(source, source->line, field, err, "%g is not a count", value);
+    *size = (uint64_t)value;
+    return SPL_OK;
+}
+
+static int take_pose(struct spl_source *source, double pose[16], struct spl_error *err)
+{
+    double m[16];
+    for (unsigned row = 0; row < 4; row++) {
+        int code = take_numbers(source, "matrix", m + 4 * row, 4, err);
+        if (code < 0)
+            return code;
+        if (fabs(m[4 * row + 3] - (row == 3)) > 1e-6)
+            return spl_source_fail_line(source, source->line, "matrix", err,
+                                        "the last column must be 0 0 0 1, the translation belongs into the last row");
+    }
+    double det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+                 m[2] * (m[4] * m[9] - m[5] * m[8]);
+    if (det == 0 || !isfinite(det))
+        return spl_source_fail_line(source, source->line, "matrix", err, "is singular (determinant %g)", det);
+    for (unsigned row = 0; row < 4; row++)
+        for (unsigned column = 0; column < 4; column++)
+            pose[4 * column + row] = m[4 * row + column];
+    return SPL_OK;
+}
+
+static int add_station(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    struct spl_cloud_info *info = &cloud->info;
+    if (info->station_count == UINT16_MAX)
+        return spl_source_fail(&cloud->source, SPL_E_LIMIT, "stations", err, "has more than %d stations", UINT16_MAX);
+    if (info->station_count == ptx->station_capacity) {
+        size_t capacity = ptx->station_capacity ? 2 * ptx->station_capacity : 8;
+        void *grown = spl_realloc(info->stations, capacity, sizeof *info->stations, err);
+        if (!grown)
+            return SPL_E_NOMEM;
+        info->stations = grown;
+        ptx->station_capacity = capacity;
+    }
+    memcpy(info->stations[info->station_count++], ptx->pose, sizeof ptx->pose);
+    return SPL_OK;
+}
+
+/* The next station's header: 1, or 0 when only blank lines are left, or negative. */
+static int take_header(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    struct spl_source *source = &cloud->source;
+    uint64_t columns, rows, start;
+    double ignored[3];
+    const char *line;
+    size_t length;
+    int code;
+
+    do {
+        start = spl_source_tell(source);
+        code = spl_source_line(source, &line, &length, err);
+        if (code <= 0)
+            return code;
+    } while (spl_fields_blank(line, length));
+    spl_source_seek(source, start);
+    source->line--;
+    code = take_size(source, "columns", &columns, err);
+    if (code == SPL_OK)
+        code = take_size(source, "rows", &rows, err);
+    if (code == SPL_OK)
+        code = take_numbers(source, "scanner position", ignored, 3, err);
+    for (int k = 0; k < 3 && code == SPL_OK; k++)
+        code = take_numbers(source, "scanner axes", ignored, 3, err);
+    if (code == SPL_OK)
+        code = take_pose(source, ptx->pose, err);
+    if (code < 0)
+        return code;
+    ptx->cells = columns * rows; /* both below 2^32 */
+    ptx->taken = ptx->fields = 0;
+    if (ptx->cells > (spl_source_left(source) + 1) / 6) /* "0 0 0" and a line ending */
+        return spl_source_fail_line(source, source->line, "columns, rows", err,
+                                    "%llu x %llu cells cannot fit the %llu bytes that follow (truncated?)",
+                                    (unsigned long long)columns, (unsigned long long)rows,
+                                    (unsigned long long)spl_source_left(source));
+    code = add_station(cloud, err);
+    return code < 0 ? code : 1;
+}
+
+/* The first cell of a station tells what all its cells hold. */
+static int set_fields(struct spl_cloud *cloud, unsigned fields, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    struct spl_source *source = &cloud->source;
+    if (fields != 3 && fields != 4 && fields != 7)
+        return spl_source_fail_line(source, source->line, "", err,
+                                    "%u values; a cell has x y z, x y z intensity, or x y z intensity r g b", fields);
+    if (ptx->first_fields && (ptx->first_fields == 3) != (fields == 3))
+        return spl_source_fail_line(source, source->line, "", err,
+                                    "%u values a cell, but the first station has %u: stations with and without "
+                                    "intensity do not mix", fields, ptx->first_fields);
+    ptx->fields = fields;
+    if (fields > 3)
+        cloud->color = fields == 7 ? spl_color_rule_rgb(255) : spl_color_rule_grey(0, 1);
+    return SPL_OK;
+}
+
+static int take_cell(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_error *err)
+{
+    static const int8_t column[7] = {SPL_COLUMN_X, SPL_COLUMN_Y, SPL_COLUMN_Z, SPL_COLUMN_INTENSITY,
+                                     SPL_COLUMN_RED, SPL_COLUMN_GREEN, SPL_COLUMN_BLUE};
+    struct ptx *ptx = cloud->state;
+    struct spl_source *source = &cloud->source;
+    const double *m = ptx->pose;
+    size_t length, row = rows->count;
+    double v[7] = {0};
+    const char *line;
+    char text[32];
+    int code;
+
+    do {
+        code = spl_source_line(source, &line, &length, err);
+        if (code < 0)
+            return code;
+        if (code == 0)
+            return spl_source_fail_line(source, source->line, "", err,
+                                        "the file ends after %llu of the station's %llu cells (truncated?)",
+                                        (unsigned long long)ptx->taken, (unsigned long long)ptx->cells);
+    } while (spl_fields_blank(line, length));
+    if (!ptx->fields) {
+        code = set_fields(cloud, (unsigned)spl_fields_count(line, length, ' '), err);
+        if (code < 0)
+            return code;
+    }
+    struct spl_fields fields = spl_fields_begin(line, length, ' ');
+    for (unsigned i = 0; i < ptx->fields; i++) {
+        enum spl_field got = spl_fields_number(&fields, &v[i]);
+        if (got == SPL_FIELD_END)
+            return spl_source_fail_line(source, source->line, spl_column_name(column[i]), err,
+                                        "is missing: %u values, the station's first cell has %u", i, ptx->fields);
+        if (got == SPL_FIELD_BAD)
+            return spl_source_fail_line(source, source->line, spl_column_name(column[i]), err, "\"%s\" is not a number",
+                                        spl_fields_show(&fields, text));
+    }
+    if (!spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
+        return spl_source_fail_line(source, source->line, "", err, "more values than the %u of the station's first cell",
+                                    ptx->fields);
+    ptx->taken++;
+    if (v[0] == 0 && v[1] == 0 && v[2] == 0) {
+        cloud->info.points_skipped++;
+        return SPL_OK;
+    }
+    for (unsigned k = 0; k < 3; k++)
+        rows->value[SPL_COLUMN_X + k][row] = m[4 * k] * v[0] + m[4 * k + 1] * v[1] + m[4 * k + 2] * v[2] + m[4 * k + 3];
+    for (unsigned i = 3; i < ptx->fields; i++)
+        rows->value[column[i]][row] = v[i];
+    rows->line[row] = source->line;
+    rows->count++;
+    return SPL_OK;
+}
+
+static int ptx_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    int code = SPL_OK;
+
+    rows->count = 0;
+    while (rows->count < limit && code == SPL_OK) {
+        if (ptx->taken < ptx->cells) {
+            code = take_cell(cloud, rows, err);
+        } else if (rows->count > 0) {
+            break; /* rows of one call share a station */
+        } else {
+            code = take_header(cloud, err);
+            if (code <= 0)
+                return code;
+            code = SPL_OK;
+        }
+    }
+    if (code < 0)
+        return code;
+    rows->station = (uint16_t)(cloud->info.station_count - 1);
+    return 1;
+}
+
+static int ptx_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    (void)part, (void)parts, (void)err; /* never sampled: intensities are 0 to 1 and colours 8 bits by definition */
+    ptx->cells = ptx->taken = 0;
+    cloud->info.station_count = 0;
+    spl_source_seek(&cloud->source, 0);
+    cloud->source.line = 0;
+    return SPL_OK;
+}
+
+/* Looks at the first station and its first cell, which say what the file holds. */
+static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state = spl_alloc(1, sizeof *ptx, err);
+    int code = ptx ? take_header(cloud, err) : SPL_E_NOMEM;
+    cloud->rows.count = 0;
+    if (code > 0 && ptx->cells > 0)
+        code = take_cell(cloud, &cloud->rows, err);
+    if (code < 0)
+        return code;
+    ptx->first_fields = ptx->fields;
+    cloud->info.attributes |= SPL_CLOUD_STATION;
+    return SPL_OK;
+}
+
+const struct spl_reader spl_ptx_reader = {.format = "PTX", .open = ptx_open, .rows = ptx_rows, .seek = ptx_seek};

@@ -1,0 +1,269 @@
+/* PTS, XYZ and CSV-like text: lines of numbers, with or without a leading count (PTS, one for each block), header names,
+ * comments. Columns come from names or are recognised (text_columns.c).
+ *
+ * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
+#include "cloud/text.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+#include "cloud/fields.h"
+
+enum { SAMPLE_LINES = 1000 };
+
+struct text {
+    struct spl_layout layout;
+    uint64_t start, start_line;    /* of the first line of numbers */
+    bool counted;                  /* PTS */
+    uint64_t count;                /* the first block's */
+    uint64_t left;                 /* of the current block; UINT64_MAX where nothing is counted */
+};
+
+static size_t comment_mark(const char *line, size_t length)
+{
+    while (length > 0 && (*line == ' ' || *line == '\t'))
+        line++, length--;
+    if (length > 0 && *line == '#')
+        return 1;
+    return length > 1 && line[0] == '/' && line[1] == '/' ? 2 : 0;
+}
+
+/* The next line that is neither blank nor a comment: as spl_source_line(). `at` (may be NULL) is its offset. */
+static int next_line(struct spl_source *source, const char **line, size_t *length, uint64_t *at, struct spl_error *err)
+{
+    int code;
+    do {
+        if (at)
+            *at = spl_source_tell(source);
+        code = spl_source_line(source, line, length, err);
+    } while (code > 0 && (spl_fields_blank(*line, *length) || comment_mark(*line, *length)));
+    return code;
+}
+
+static bool is_number(const char *line, size_t length, char separator)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, separator);
+    double ignored;
+    return spl_fields_number(&fields, &ignored) == SPL_FIELD_OK;
+}
+
+static bool is_count(const char *line, size_t length, uint64_t *count)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, ' ');
+    size_t word;
+    if (spl_fields_text(&fields, &word) != SPL_FIELD_OK || fields.p != fields.end)
+        return false;
+    return spl_integer_parse(fields.start, fields.start + word, count) == fields.start + word;
+}
+
+/* A count is believed only if so many lines of "0 0 0" fit what is left of the file. */
+static int check_count(const struct spl_source *source, uint64_t count, struct spl_error *err)
+{
+    if (count > (spl_source_left(source) + 1) / 6)
+        return spl_source_fail_line(source, source->line, "count", err,
+                                    "%llu points cannot fit the %llu bytes that follow (truncated, or a wrong count)",
+                                    (unsigned long long)count, (unsigned long long)spl_source_left(source));
+    return SPL_OK;
+}
+
+/* A comment before the first line may carry the names ("//X Y Z R G B"). */
+static bool names_in_comment(struct spl_layout *layout, const char *line, size_t length)
+{
+    const char *end = line + length;
+    while (line < end && (*line == '/' || *line == '#' || *line == ' ' || *line == '\t'))
+        line++;
+    return spl_layout_from_names(layout, line, (size_t)(end - line)) && spl_layout_lacks(layout) < 0;
+}
+
+/* Everything before the numbers: comments, names, a count. On success `line` is the first line of numbers. */
+static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line, size_t *length,
+                         struct spl_error *err)
+{
+    struct text *text = cloud->state;
+    struct spl_source *source = &cloud->source;
+    struct spl_layout *layout = &text->layout, commented;
+    bool option = cloud->options->columns, header = false;
+    int code;
+
+    *named = option;
+    if (option && (code = spl_layout_from_option(layout, cloud->options->columns, err)) < 0)
+        return code;
+    for (;;) {
+        text->start = spl_source_tell(source);
+        text->start_line = source->line;
+        code = spl_source_line(source, line, length, err);
+        if (code < 0)
+            return code;
+        if (code == 0)
+            return spl_source_fail_line(source, source->line, "", err, "the file ends before any line of numbers");
+        if (spl_fields_blank(*line, *length))
+            continue;
+        if (comment_mark(*line, *length)) {
+            if (!*named && names_in_comment(&commented, *line, *length)) {
+                *layout = commented;
+                *named = true;
+            }
+            continue;
+        }
+        if (!header && !text->counted && is_count(*line, *length, &text->count)) {
+            text->counted = true;
+            code = check_count(source, text->count, err);
+            if (code < 0)
+                return code;
+            continue;
+        }
+        if (is_number(*line, *length, spl_text_separator(*line, *length)))
+            return SPL_OK;
+        if (header)
+            return spl_source_fail_line(source, source->line, "", err, "is neither numbers nor a comment");
+        header = true;
+        if (option)
+            continue;
+        if (!spl_layout_from_names(layout, *line, *length))
+            return spl_source_fail_line(source, source->line, "", err, "more than %d columns", SPL_TEXT_FIELDS);
+        if (spl_layout_lacks(layout) >= 0)
+            return spl_source_fail_line(source, source->line, spl_column_name(spl_layout_lacks(layout)), err,
+                                        "no column has this name; name the columns with the option \"columns\"");
+        *named = true;
+    }
+}
+
+static int recognise(struct spl_cloud *cloud, const char *line, size_t length, struct spl_error *err)
+{
+    struct text *text = cloud->state;
+    struct spl_text_sample sample = {0};
+    size_t fields = spl_fields_count(line, length, text->layout.separator);
+    int code = 1;
+
+    if (fields < 3 || fields > SPL_TEXT_FIELDS)
+        return spl_source_fail_line(&cloud->source, cloud->source.line, "", err,
+                                    "%zu values; a point needs x y z, and at most %d columns are known here", fields,
+                                    SPL_TEXT_FIELDS);
+    text->layout.fields = (unsigned)fields;
+    text->layout.exact = true;
+    while (code > 0 && sample.lines < SAMPLE_LINES && spl_text_sample_add(&sample, &text->layout, line, length))
+        code = next_line(&cloud->source, &line, &length, NULL, err);
+    if (code < 0)
+        return code;
+    spl_layout_recognise(&text->layout, &sample);
+    return SPL_OK;
+}
+
+static int text_open(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct text *text = cloud->state = spl_alloc(1, sizeof *text, err);
+    const uint8_t *bytes;
+    const char *line;
+    size_t length;
+    bool named;
+
+    if (!text)
+        return SPL_E_NOMEM;
+    int code = spl_source_peek(&cloud->source, 3, &bytes, &length, err);
+    if (code < 0)
+        return code;
+    if (length >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0) /* UTF-8 byte order mark */
+        spl_source_take(&cloud->source, 3);
+    code = take_preamble(cloud, &named, &line, &length, err);
+    if (code < 0)
+        return code;
+    text->layout.separator = spl_text_separator(line, length);
+    if (!named)
+        code = recognise(cloud, line, length, err);
+    if (code < 0)
+        return code;
+    for (unsigned i = 0; i < text->layout.fields; i++)
+        if (text->layout.column[i] >= 0)
+            cloud->columns |= 1u << text->layout.column[i];
+    if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
+        cloud->info.attributes |= SPL_CLOUD_NORMAL;
+    if (cloud->columns >> SPL_COLUMN_CLASS & 1)
+        cloud->info.attributes |= SPL_CLOUD_CLASS;
+    cloud->sampling = SPL_SAMPLE_ALL;
+    cloud->scan_colors = true;
+    if (text->counted) {
+        cloud->info.format = "PTS";
+        cloud->info.points_expected = text->count;
+    }
+    return SPL_OK;
+}
+
+static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char *line, size_t length,
+                     struct spl_error *err)
+{
+    const struct text *text = cloud->state;
+    const struct spl_layout *layout = &text->layout;
+    const struct spl_source *source = &cloud->source;
+    struct spl_fields fields = spl_fields_begin(line, length, layout->separator);
+    size_t row = rows->count, ignored;
+    char shown[32];
+
+    for (unsigned i = 0; i < layout->fields; i++) {
+        int column = layout->column[i];
+        enum spl_field got = column >= 0 ? spl_fields_number(&fields, &rows->value[column][row])
+                                         : spl_fields_text(&fields, &ignored);
+        if (got == SPL_FIELD_END)
+            return spl_source_fail_line(source, source->line, spl_column_name(column), err,
+                                        "column %u of %u is missing", i + 1, layout->fields);
+        if (got == SPL_FIELD_BAD)
+            return spl_source_fail_line(source, source->line, spl_column_name(column), err,
+                                        "\"%s\" in column %u is not a number", spl_fields_show(&fields, shown), i + 1);
+    }
+    if (layout->exact && !spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
+        return spl_source_fail_line(source, source->line, "", err, "has more than the %u columns of the lines before",
+                                    layout->fields);
+    rows->line[row] = source->line;
+    rows->count++;
+    return SPL_OK;
+}
+
+static int text_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
+{
+    struct text *text = cloud->state;
+    struct spl_source *source = &cloud->source;
+    const char *line;
+    size_t length;
+
+    rows->count = 0;
+    while (rows->count < limit) {
+        int code = next_line(source, &line, &length, NULL, err);
+        if (code < 0)
+            return code;
+        if (code == 0 && text->left > 0 && text->left != UINT64_MAX)
+            return spl_source_fail_line(source, source->line, "count", err,
+                                        "the file ends %llu points before the count is reached (truncated?)",
+                                        (unsigned long long)text->left);
+        if (code == 0)
+            break;
+        if (text->left == 0) { /* another block of a PTS file */
+            if (!is_count(line, length, &text->left))
+                return spl_source_fail_line(source, source->line, "count", err,
+                                            "more points than the count before them says: correct the count or delete its line");
+            code = check_count(source, text->left, err);
+        } else {
+            code = take_line(cloud, rows, line, length, err);
+            text->left -= text->left != UINT64_MAX;
+        }
+        if (code < 0)
+            return code;
+    }
+    return rows->count > 0;
+}
+
+static int text_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
+{
+    struct text *text = cloud->state;
+    struct spl_source *source = &cloud->source;
+    const char *line;
+    size_t length;
+
+    spl_source_seek(source, text->start + (source->size - text->start) / parts * part);
+    source->line = text->start_line;
+    text->left = text->counted && parts == 1 ? text->count : UINT64_MAX;
+    if (part == 0)
+        return SPL_OK;
+    int code = spl_source_line(source, &line, &length, err); /* the rest of the line that the offset lies in */
+    return code < 0 ? code : SPL_OK;
+}
+
+const struct spl_reader spl_text_reader = {.format = "text", .open = text_open, .rows = text_rows, .seek = text_seek};

@@ -1,0 +1,145 @@
+/* Which column of a text file is which. Names decide when there are any (a header line, a commented one, the caller's
+ * option); otherwise the count and the values do: x y z come first, three neighbours of unit length are a normal, three
+ * neighbours of colour-like numbers a colour, what is left at the fourth place or behind the colour an intensity.
+ * Pure functions. */
+#include <math.h>
+#include <string.h>
+
+#include "cloud/fields.h"
+#include "cloud/text.h"
+
+char spl_text_separator(const char *line, size_t length)
+{
+    return memchr(line, ';', length) ? ';' : memchr(line, ',', length) ? ',' : ' ';
+}
+
+static bool has_column(const struct spl_layout *layout, int column)
+{
+    for (unsigned i = 0; i < layout->fields; i++)
+        if (layout->column[i] == column)
+            return true;
+    return false;
+}
+
+int spl_layout_lacks(const struct spl_layout *layout)
+{
+    for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
+        if (!has_column(layout, k))
+            return k;
+    return SPL_COLUMN_SKIP;
+}
+
+bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t length)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
+    size_t name;
+    *layout = (struct spl_layout){.exact = true};
+    while (spl_fields_text(&fields, &name) == SPL_FIELD_OK) {
+        if (layout->fields == SPL_TEXT_FIELDS)
+            return false;
+        int column = spl_column_from_name(fields.start, name);
+        layout->column[layout->fields] = (int8_t)(has_column(layout, column) ? SPL_COLUMN_SKIP : column);
+        layout->fields++;
+    }
+    return true;
+}
+
+int spl_layout_from_option(struct spl_layout *layout, const char *columns, struct spl_error *err)
+{
+    struct spl_fields fields = spl_fields_begin(columns, strlen(columns), ',');
+    enum spl_field got;
+    size_t length;
+    *layout = (struct spl_layout){0};
+    while ((got = spl_fields_text(&fields, &length)) == SPL_FIELD_OK) {
+        int column = spl_column_from_name(fields.start, length);
+        if (layout->fields == SPL_TEXT_FIELDS)
+            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: more than %d names", SPL_TEXT_FIELDS);
+        if (column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
+            return spl_fail_field(err, SPL_E_USAGE, "columns",
+                                  "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class, or - "
+                                  "to skip a column", length < 40 ? (int)length : 40, fields.start);
+        if (column != SPL_COLUMN_SKIP && has_column(layout, column))
+            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is named twice", spl_column_name(column));
+        layout->column[layout->fields++] = (int8_t)column;
+    }
+    int lacks = spl_layout_lacks(layout);
+    if (got == SPL_FIELD_BAD || lacks >= 0)
+        return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is missing (as in \"x,y,z,intensity,r,g,b,-\")",
+                              spl_column_name(lacks >= 0 ? lacks : SPL_COLUMN_X));
+    return SPL_OK;
+}
+
+bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout *layout, const char *line,
+                         size_t length)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, layout->separator);
+    double v[SPL_TEXT_FIELDS];
+    for (unsigned i = 0; i < layout->fields; i++) {
+        struct spl_fields field = fields;
+        size_t text;
+        if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
+            return false;
+        if (spl_fields_number(&field, &v[i]) != SPL_FIELD_OK)
+            v[i] = NAN;
+        sample->fraction[i] |= v[i] != floor(v[i]);
+        sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
+        sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
+    }
+    for (unsigned i = 0; i + 2 < layout->fields; i++) {
+        double norm = sqrt(v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2]);
+        sample->crooked[i] |= !(norm == 0 || fabs(norm - 1) < 0.02);
+    }
+    sample->lines++;
+    return spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+}
+
+static bool is_normal(const struct spl_text_sample *s, unsigned i)
+{
+    bool fraction = s->fraction[i] || s->fraction[i + 1] || s->fraction[i + 2];
+    bool negative = s->bright[i] || s->bright[i + 1] || s->bright[i + 2];
+    return !s->crooked[i] && (fraction || negative);
+}
+
+static bool is_color(const struct spl_text_sample *s, unsigned i)
+{
+    bool integers = true, unit = true;
+    for (unsigned k = i; k < i + 3; k++) {
+        integers &= !s->fraction[k] && !s->wide[k];
+        unit &= !s->bright[k];
+    }
+    return integers || unit;
+}
+
+static void set3(struct spl_layout *layout, unsigned at, int column)
+{
+    for (int k = 0; k < 3; k++)
+        layout->column[at + (unsigned)k] = (int8_t)(column + k);
+}
+
+static bool free3(const struct spl_layout *layout, unsigned at)
+{
+    return at + 2 < layout->fields && layout->column[at] < 0 && layout->column[at + 1] < 0 && layout->column[at + 2] < 0;
+}
+
+void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sample *sample)
+{
+    memset(layout->column, SPL_COLUMN_SKIP, sizeof layout->column);
+    set3(layout, 0, SPL_COLUMN_X);
+    for (unsigned i = 3; i + 2 < layout->fields; i++)
+        if (is_normal(sample, i)) {
+            set3(layout, i, SPL_COLUMN_NX);
+            break;
+        }
+    /* with seven columns or more, "x y z intensity r g b" (PTS) before "x y z r g b intensity" */
+    static const uint8_t order[] = {4, 3, 5, 6, 7, 8, 9, 10};
+    for (unsigned k = layout->fields < 7; k < sizeof order; k++)
+        if (free3(layout, order[k]) && is_color(sample, order[k])) {
+            set3(layout, order[k], SPL_COLUMN_RED);
+            break;
+        }
+    for (unsigned i = 3; i < layout->fields && i < 7; i++)
+        if (layout->column[i] < 0) {
+            layout->column[i] = SPL_COLUMN_INTENSITY;
+            break;
+        }
+}
