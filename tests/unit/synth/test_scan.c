@@ -17,6 +17,7 @@
 #include <splatd/synth.h>
 
 #include "base/memory.h"
+#include "cloud/cloud.h"
 #include "synth/scene.h"
 #include "synth/vector.h"
 
@@ -209,6 +210,53 @@ static void points_lie_on_the_surfaces(void **state)
     check_truth(o.directory, scan(o), 0.0015);
 }
 
+/* All points of a file; the caller frees *batch with spl_point_batch_finish(). */
+static void read_cloud(const char *path, uint64_t points, struct spl_point_batch *batch, struct spl_cloud **cloud)
+{
+    struct spl_error err = {0};
+    if (spl_cloud_open(path, NULL, cloud, &err) || spl_point_batch_init(batch, points + 1, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(spl_cloud_read(*cloud, batch, &err), 1);
+    assert_int_equal(batch->count, points);
+    struct spl_point_batch rest;
+    assert_int_equal(spl_point_batch_init(&rest, 16, &err), 0);
+    assert_int_equal(spl_cloud_read(*cloud, &rest, &err), 0);
+    spl_point_batch_finish(&rest);
+}
+
+static void our_readers_find_the_same_points_and_the_stations(void **state)
+{
+    (void)state;
+    struct spl_synth_options o = options_for(in_folder("readers"), 10000);
+    uint64_t points = scan(o);
+    struct spl_point_batch ptx, ply;
+    struct spl_cloud *ptx_cloud, *ply_cloud;
+    struct spl_scene *scene;
+    assert_int_equal(spl_scene_create("courtyard", &scene, NULL), 0);
+    read_cloud(in_folder("readers/courtyard.ptx"), points, &ptx, &ptx_cloud);
+    read_cloud(in_folder("readers/courtyard.ply"), points, &ply, &ply_cloud);
+    const struct spl_cloud_info *info = spl_cloud_get_info(ptx_cloud);
+    assert_int_equal(info->attributes & (SPL_CLOUD_COLOR | SPL_CLOUD_STATION), SPL_CLOUD_COLOR | SPL_CLOUD_STATION);
+    assert_int_equal(info->station_count, scene->station_count);
+    for (size_t s = 0; s < scene->station_count; s++)
+        for (int i = 0; i < 3; i++) {
+            assert_true(fabs(info->stations[s][4 * i + 3] - scene->stations[s].position[i]) < 1e-9);
+            for (int j = 0; j < 3; j++)
+                assert_true(fabs(info->stations[s][4 * i + j] - scene->stations[s].rotation[3 * i + j]) < 1e-12);
+        }
+    for (size_t i = 0; i < points; i++) {
+        assert_memory_equal(ptx.color[i], ply.color[i], 3);
+        for (int a = 0; a < 3; a++)
+            assert_true(fabs(ptx.position[i][a] - ply.position[i][a]) < 2e-5);
+        assert_true(ptx.station[i] < scene->station_count && (!i || ptx.station[i] >= ptx.station[i - 1]));
+    }
+    spl_scene_destroy(scene);
+    spl_cloud_destroy(ptx_cloud);
+    spl_cloud_destroy(ply_cloud);
+    spl_point_batch_finish(&ptx);
+    spl_point_batch_finish(&ply);
+}
+
 static void refused(struct spl_synth_options o, int code, const char *field, const char *word)
 {
     struct spl_error err = {0};
@@ -338,6 +386,7 @@ int main(void)
         cmocka_unit_test(files_depend_on_the_seed_and_not_on_threads),
         cmocka_unit_test(counts_come_within_two_percent),
         cmocka_unit_test(points_lie_on_the_surfaces),
+        cmocka_unit_test(our_readers_find_the_same_points_and_the_stations),
         cmocka_unit_test(bad_arguments_are_named_and_leave_nothing),
         cmocka_unit_test(a_full_disk_keeps_the_old_files),
         cmocka_unit_test(refused_memory_leaves_nothing),
