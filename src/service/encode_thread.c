@@ -1,0 +1,24 @@
+/* The encode threads: one layer of one frame in, bytes of a format out. Each frame's pixels are released as soon as they
+ * are encoded, so that what waits for slow clients is compressed. */
+#include "base/clock.h"
+#include "service/stages.h"
+
+static void encode(struct spl_job *job)
+{
+    uint64_t began = spl_now_ns();
+    if (spl_job_is_over(job))
+        return;
+    const struct spl_view_request *request = &job->request;
+    spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
+    job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
+}
+
+void *spl_encode_thread_run(void *argument)
+{
+    struct spl_pipeline *pipeline = argument;
+    for (struct spl_job *job; (job = spl_queue_pop(pipeline->encode, SPL_NEVER));) {
+        encode(job);
+        spl_pipeline_finish_job(pipeline, job);
+    }
+    return NULL;
+}

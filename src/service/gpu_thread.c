@@ -1,0 +1,174 @@
+/* The gpu thread: the only one that touches the renderer, for its whole life.
+ *
+ * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a new
+ * renderer is made from the mapped datasets. More than `rebuilds_max` losses within `rebuild_window_ns` end the process,
+ * for its supervisor to decide.
+ *
+ * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
+ * lost, K times in all (1 when left out). */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "service/stages.h"
+
+enum { rebuilds_max = 3 };
+static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
+
+struct gpu {
+    struct spl_pipeline *pipeline;
+    struct spl_renderer *renderer;    // may be NULL
+    uint64_t losses_ns[rebuilds_max]; /* times of the latest losses, ring */
+    uint64_t losses;
+    uint64_t frames, inject_every, inject_left, inject_at;
+};
+
+static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
+{
+    atomic_store(&pipeline->state, (int)state);
+    pipeline->options.wake(pipeline->options.wake_context);
+}
+
+static int build(struct gpu *gpu, struct spl_error *err)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    const struct spl_pipeline_options *options = &pipeline->options;
+    int rc = spl_renderer_create(&options->renderer, &gpu->renderer, err);
+    if (rc)
+        return rc;
+    pthread_mutex_lock(&pipeline->mutex);
+    pipeline->device = *spl_renderer_get_device(gpu->renderer);
+    pthread_mutex_unlock(&pipeline->mutex);
+    for (size_t i = 0; !rc && i < options->dataset_count; i++)
+        rc = spl_renderer_add(gpu->renderer, options->datasets[i], err);
+    for (size_t i = 0; !rc && i < options->dataset_count && !spl_queue_is_closed(pipeline->render); i++)
+        rc = spl_renderer_preload(gpu->renderer, options->datasets[i], err);
+    if (!rc)
+        atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
+    return rc;
+}
+
+static void tear_down(struct gpu *gpu)
+{
+    if (!gpu->renderer)
+        return;
+    for (size_t i = 0; i < gpu->pipeline->options.dataset_count; i++)
+        spl_renderer_remove(gpu->renderer, gpu->pipeline->options.datasets[i]);
+    spl_renderer_destroy(gpu->renderer);
+    gpu->renderer = NULL;
+    atomic_store(&gpu->pipeline->device_bytes, 0);
+}
+
+/* Answers everything that waits. */
+static void refuse_waiting(struct gpu *gpu)
+{
+    for (struct spl_job *job; (job = spl_queue_pop(gpu->pipeline->render, 0));) {
+        spl_fail(&job->err, SPL_E_DEVICE_LOST, "the device was lost; it is being reopened");
+        spl_pipeline_finish_job(gpu->pipeline, job);
+    }
+}
+
+static void give_up(struct gpu *gpu, const struct spl_error *why)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    pipeline->failure = *why;
+    spl_queue_close(pipeline->render);
+    refuse_waiting(gpu);
+    set_state(pipeline, SPL_PIPELINE_FAILED);
+}
+
+/* False when the bound on losses is reached; counts this one. */
+static bool may_rebuild(struct gpu *gpu)
+{
+    uint64_t now = spl_now_ns(), *slot = &gpu->losses_ns[gpu->losses % rebuilds_max];
+    bool allowed = gpu->losses < rebuilds_max || now - *slot > rebuild_window_ns;
+    *slot = now;
+    gpu->losses++;
+    spl_count(gpu->pipeline->options.counters, device_losses);
+    return allowed;
+}
+
+/* Makes a new renderer after a loss; false when the process had better end. */
+static bool recover(struct gpu *gpu, const struct spl_error *why)
+{
+    struct spl_error err = *why;
+    set_state(gpu->pipeline, SPL_PIPELINE_REBUILDING);
+    for (;;) {
+        spl_log_warn("device lost: %s", err.message);
+        refuse_waiting(gpu);
+        tear_down(gpu);
+        if (!may_rebuild(gpu)) {
+            struct spl_error last = {0};
+            spl_fail(&last, SPL_E_DEVICE_LOST, "the device was lost more than %d times within %d s; last: %.300s",
+                     (int)rebuilds_max, (int)(rebuild_window_ns / SPL_NS_PER_S), err.message);
+            give_up(gpu, &last);
+            return false;
+        }
+        err = (struct spl_error){0};
+        if (!build(gpu, &err))
+            break;
+    }
+    spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
+    set_state(gpu->pipeline, SPL_PIPELINE_READY);
+    return true;
+}
+
+static void inject(struct gpu *gpu)
+{
+    if (!gpu->inject_left || gpu->frames < gpu->inject_at)
+        return;
+    gpu->inject_left--;
+    gpu->inject_at = gpu->frames + gpu->inject_every;
+    spl_renderer_inject_loss(gpu->renderer);
+}
+
+/* Renders one job and passes it on; false when the thread must end. */
+static bool serve(struct gpu *gpu, struct spl_job *job)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    uint64_t began = spl_now_ns();
+    job->queue_ms = (double)(began - job->accepted_ns) / SPL_NS_PER_MS;
+    if (spl_job_is_over(job)) {
+        spl_pipeline_finish_job(pipeline, job);
+        return true;
+    }
+    inject(gpu);
+    job->request.view.deadline_ns = job->deadline_ns;
+    int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
+    struct spl_error err = job->err;
+    if (!rc) {
+        gpu->frames++;
+        spl_count(pipeline->options.counters, frames);
+        uint64_t took = spl_now_ns() - began, mean = atomic_load(&pipeline->frame_ns);
+        atomic_store(&pipeline->frame_ns, mean ? (7 * mean + took) / 8 : took);
+        atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
+        job->stats = job->frame.stats;
+        rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
+    }
+    if (rc)
+        spl_pipeline_finish_job(pipeline, job);
+    return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
+}
+
+void *spl_gpu_thread_run(void *argument)
+{
+    struct gpu gpu = {.pipeline = argument};
+    struct spl_error err = {0};
+    const char *plan = getenv("SPLATD_INJECT_LOSS_AFTER");
+    if (plan && sscanf(plan, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
+        gpu.inject_left = 1;
+    gpu.inject_at = gpu.inject_every;
+    if (build(&gpu, &err)) {
+        give_up(&gpu, &err);
+    } else {
+        set_state(gpu.pipeline, SPL_PIPELINE_READY);
+        for (struct spl_job *job; (job = spl_queue_pop(gpu.pipeline->render, SPL_NEVER));)
+            if (!serve(&gpu, job))
+                break;
+    }
+    tear_down(&gpu);
+    return NULL;
+}

@@ -1,0 +1,283 @@
+/* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer, and
+ * a request whose view is being made is suspended, so that nothing here ever blocks.
+ *
+ * Limits: the connection pool bounds request line and headers together; the request line has its own, smaller bound, so
+ * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
+ * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes does
+ * not extend. Invariant: a suspended request is in `waiting` and has a job. Owned by the loop's thread. */
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/state.h"
+
+enum {
+    connections_max = 1024,
+    connections_per_address_max = 512,
+    connection_memory = 128 * 1024,
+    drain_max = 8 * body_max,
+    idle_s = 30,
+    slow_sweep_ms = 500,
+};
+
+/* How long a connection may stay in a phase; MHD's own limit (idle_s) is about silence only. */
+static const uint64_t phase_max_ns[] = {
+    [PHASE_IDLE] = 40 * SPL_NS_PER_S,
+    [PHASE_READING] = 10 * SPL_NS_PER_S,
+    [PHASE_WORKING] = SPL_NEVER, // views have deadlines
+    [PHASE_WRITING] = 120 * SPL_NS_PER_S,
+};
+
+static void enter(struct connection *connection, enum phase phase)
+{
+    connection->phase = phase;
+    connection->since_ns = spl_now_ns();
+}
+
+static void on_connection(void *context, struct MHD_Connection *handle, void **socket_context,
+                          enum MHD_ConnectionNotificationCode code)
+{
+    struct spl_service *service = context;
+    struct connection *connection = *socket_context;
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+        if (!connection)
+            return;
+        LIST_REMOVE(connection, link);
+        service->connections_open--;
+        free(connection);
+        return;
+    }
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (!info || !(connection = spl_alloc(1, sizeof *connection, NULL)))
+        return; // its requests are refused
+    connection->service = service;
+    connection->fd = info->connect_fd;
+    enter(connection, PHASE_READING);
+    LIST_INSERT_HEAD(&service->connections, connection, link);
+    service->connections_open++;
+    *socket_context = connection;
+}
+
+/* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
+static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
+{
+    struct spl_service *service = context;
+    struct request *request = spl_alloc(1, sizeof *request, NULL);
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    if (!request || !info || !info->socket_context) {
+        free(request);
+        return NULL;
+    }
+    request->service = service;
+    request->handle = handle;
+    request->connection = info->socket_context;
+    request->began_ns = spl_now_ns();
+    request->query = "";
+    size_t length = strnlen(uri, uri_max + 1);
+    if (length <= uri_max && !(request->uri = strdup(uri))) {
+        free(request);
+        return NULL;
+    }
+    char *mark = request->uri ? strchr(request->uri, '?') : NULL;
+    if (mark) {
+        *mark = '\0';
+        request->query = mark + 1;
+    }
+    request->id = spl_count(&service->counters, requests) + 1;
+    enter(request->connection, PHASE_READING);
+    service->requests_open++;
+    return request;
+}
+
+static void on_completed(void *context, struct MHD_Connection *handle, void **request_context,
+                         enum MHD_RequestTerminationCode code)
+{
+    (void)handle;
+    (void)code;
+    struct spl_service *service = context;
+    struct request *request = *request_context;
+    if (!request)
+        return;
+    spl_assert(!request->job);
+    enter(request->connection, PHASE_IDLE);
+    service->requests_open--;
+    if (request->response)
+        MHD_destroy_response(request->response);
+    free(request->body);
+    free(request->uri);
+    free(request);
+    *request_context = NULL;
+}
+
+static void count_reply(struct request *request)
+{
+    struct spl_counters *counters = &request->service->counters;
+    if (request->status < 300)
+        spl_count(counters, replies_2xx);
+    else if (request->status < 500)
+        spl_count(counters, replies_4xx);
+    else
+        spl_count(counters, replies_5xx);
+}
+
+static enum MHD_Result send_reply(struct request *request)
+{
+    if (!request->response)
+        return MHD_NO;
+    if (request->service->draining)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
+    count_reply(request);
+    enter(request->connection, PHASE_WRITING);
+    return MHD_queue_response(request->handle, request->status, request->response);
+}
+
+static bool append_body(struct request *request, const char *data, size_t length)
+{
+    request->body_seen += length;
+    if (request->body_seen > body_max)
+        return request->body_seen <= drain_max;
+    if (request->body_seen > request->body_capacity) {
+        size_t capacity = request->body_capacity ? request->body_capacity : 4096;
+        while (capacity < request->body_seen)
+            capacity *= 2;
+        char *grown = spl_realloc(request->body, capacity, 1, NULL);
+        if (!grown)
+            return false;
+        request->body = grown;
+        request->body_capacity = capacity;
+    }
+    memcpy(request->body + request->body_length, data, length);
+    request->body_length += length;
+    return true;
+}
+
+static void refuse_body(struct request *request)
+{
+    spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", "the body is larger than 1 MiB");
+}
+
+/* Replies at once to a body that is announced as too large, where the client waits for our word before it sends or means
+ * to send more than we care to read. */
+static bool refuse_announced_body(struct request *request)
+{
+    const char *length = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_LENGTH);
+    bool asks = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_EXPECT);
+    unsigned long long announced = length ? strtoull(length, NULL, 10) : 0;
+    if (announced <= (asks ? (unsigned long long)body_max : (unsigned long long)drain_max))
+        return false;
+    refuse_body(request);
+    return true;
+}
+
+static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, const char *url, const char *method,
+                                  const char *version, const char *data, size_t *length, void **request_context)
+{
+    (void)context;
+    (void)handle;
+    (void)url;
+    (void)version;
+    struct request *request = *request_context;
+    if (!request || request->abandoned)
+        return MHD_NO;
+    if (!request->started) {
+        request->started = true;
+        return refuse_announced_body(request) ? send_reply(request) : MHD_YES;
+    }
+    if (*length) {
+        bool taken = append_body(request, data, *length);
+        *length = 0;
+        return taken ? MHD_YES : MHD_NO;
+    }
+    if (!request->response) {
+        enter(request->connection, PHASE_WORKING);
+        if (request->body_seen > body_max)
+            refuse_body(request);
+        else
+            spl_route(request, method);
+    }
+    return request->job ? MHD_YES : send_reply(request);
+}
+
+static void on_timer(uv_timer_t *timer)
+{
+    spl_http_pump(timer->data);
+}
+
+static void on_poll(uv_poll_t *poll, int status, int events)
+{
+    (void)status;
+    (void)events;
+    spl_http_pump(poll->data);
+}
+
+void spl_http_pump(struct spl_service *service)
+{
+    if (!service->daemon)
+        return;
+    MHD_run(service->daemon);
+    MHD_UNSIGNED_LONG_LONG timeout_ms;
+    if (MHD_get_timeout(service->daemon, &timeout_ms) == MHD_YES)
+        uv_timer_start(&service->http_timer, on_timer, timeout_ms, 0);
+    else
+        uv_timer_stop(&service->http_timer);
+}
+
+/* Cuts connections whose phase lasts too long; MHD then sees them closed. */
+static void on_slow_timer(uv_timer_t *timer)
+{
+    struct spl_service *service = timer->data;
+    uint64_t now = spl_now_ns();
+    struct connection *connection;
+    LIST_FOREACH(connection, &service->connections, link) {
+        if (now - connection->since_ns <= phase_max_ns[connection->phase])
+            continue;
+        spl_count(&service->counters, slow_closed);
+        shutdown(connection->fd, SHUT_RDWR);
+        connection->since_ns = now;
+    }
+}
+
+int spl_http_start(struct spl_service *service, struct spl_error *err)
+{
+    service->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET,
+        service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
+        service, MHD_OPTION_NOTIFY_CONNECTION, on_connection, service, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)connections_max, MHD_OPTION_PER_IP_CONNECTION_LIMIT, (unsigned)connections_per_address_max,
+        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)connection_memory,
+        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    if (!service->daemon)
+        return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start");
+    service->listen_fd = -1;
+    const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->daemon, MHD_DAEMON_INFO_EPOLL_FD);
+    int rc = info ? uv_poll_init(&service->loop, &service->http_poll, info->epoll_fd) : UV_EINVAL;
+    if (rc)
+        return spl_fail(err, SPL_E_IO, "the loop cannot poll libmicrohttpd: %s", uv_strerror(rc));
+    service->http_poll.data = service;
+    uv_poll_start(&service->http_poll, UV_READABLE, on_poll);
+    uv_timer_start(&service->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);
+    spl_http_pump(service);
+    return 0;
+}
+
+void spl_http_quiesce(struct spl_service *service)
+{
+    if (!service->daemon)
+        return;
+    spl_http_pump(service); // what is in the backlog is still served
+    int fd = MHD_quiesce_daemon(service->daemon);
+    if (fd >= 0)
+        close(fd);
+}
+
+void spl_http_stop(struct spl_service *service)
+{
+    if (!service->daemon)
+        return;
+    uv_close((uv_handle_t *)&service->http_poll, NULL);
+    MHD_stop_daemon(service->daemon);
+    service->daemon = NULL;
+}

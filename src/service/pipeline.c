@@ -1,0 +1,145 @@
+/* Life of the pipeline and the loop's side of it; the threads are in gpu_thread.c and encode_thread.c.
+ *
+ * Invariant: in_flight counts the jobs between submit() and take(); it never exceeds the capacity of the done queue,
+ * so finishing a job never waits. Closing runs downstream: the render queue first, the encode queue once the gpu
+ * thread has gone, so every job inside comes out. */
+#include "service/pipeline.h"
+
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/stages.h"
+
+void spl_job_destroy(struct spl_job *job)
+{
+    if (!job)
+        return;
+    spl_frame_finish(&job->frame);
+    spl_encoded_finish(&job->encoded);
+    free(job);
+}
+
+bool spl_job_is_over(struct spl_job *job)
+{
+    if (atomic_load(&job->dropped))
+        spl_fail(&job->err, SPL_E_CANCELLED, "the client has left");
+    else if (!spl_remaining_ns(job->deadline_ns))
+        spl_fail(&job->err, SPL_E_TIMEOUT, "the deadline of %.0f ms passed before the view was ready",
+                 (double)(job->deadline_ns - job->accepted_ns) / SPL_NS_PER_MS);
+    return job->err.code != SPL_OK;
+}
+
+void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
+{
+    spl_frame_finish(&job->frame);
+    bool room = spl_queue_try_push(pipeline->done, job);
+    spl_assert(room);
+    pipeline->options.wake(pipeline->options.wake_context);
+}
+
+int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err)
+{
+    spl_assert(options->queue && options->encoders && options->encoders <= ENCODERS_MAX);
+    struct spl_pipeline *pipeline = spl_alloc(1, sizeof *pipeline, err);
+    if (!pipeline)
+        return SPL_E_NOMEM;
+    pipeline->options = *options;
+    pthread_mutex_init(&pipeline->mutex, NULL);
+    int rc;
+    if ((rc = spl_queue_create(options->queue, &pipeline->render, err)) ||
+        (rc = spl_queue_create(options->encoders, &pipeline->encode, err)) ||
+        (rc = spl_queue_create(2 * options->queue + 2 * options->encoders + 1, &pipeline->done, err)))
+        goto fail;
+    for (; pipeline->encode_started < options->encoders; pipeline->encode_started++) {
+        pthread_t *thread = &pipeline->encode_threads[pipeline->encode_started];
+        if ((rc = pthread_create(thread, NULL, spl_encode_thread_run, pipeline))) {
+            rc = spl_fail_errno(err, rc, "cannot start an encode thread");
+            goto fail;
+        }
+    }
+    if ((rc = pthread_create(&pipeline->gpu_thread, NULL, spl_gpu_thread_run, pipeline))) {
+        rc = spl_fail_errno(err, rc, "cannot start the gpu thread");
+        goto fail;
+    }
+    pipeline->gpu_started = true;
+    *out = pipeline;
+    return 0;
+fail:
+    spl_pipeline_destroy(pipeline);
+    return rc;
+}
+
+void spl_pipeline_destroy(struct spl_pipeline *pipeline)
+{
+    if (!pipeline)
+        return;
+    if (pipeline->render)
+        spl_queue_close(pipeline->render);
+    if (pipeline->gpu_started)
+        pthread_join(pipeline->gpu_thread, NULL);
+    if (pipeline->encode)
+        spl_queue_close(pipeline->encode);
+    for (size_t i = 0; i < pipeline->encode_started; i++)
+        pthread_join(pipeline->encode_threads[i], NULL);
+    if (pipeline->done)
+        for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
+            spl_job_destroy(job);
+    spl_queue_destroy(pipeline->done);
+    spl_queue_destroy(pipeline->encode);
+    spl_queue_destroy(pipeline->render);
+    pthread_mutex_destroy(&pipeline->mutex);
+    free(pipeline);
+}
+
+int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err)
+{
+    if (atomic_fetch_add(&pipeline->in_flight, 1) < spl_queue_get_capacity(pipeline->done) &&
+        spl_queue_try_push(pipeline->render, job))
+        return 0;
+    atomic_fetch_sub(&pipeline->in_flight, 1);
+    return spl_fail(err, SPL_E_BUSY, "the queue of %zu views is full; come back later",
+                    spl_queue_get_capacity(pipeline->render));
+}
+
+struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline)
+{
+    struct spl_job *job = spl_queue_pop(pipeline->done, 0);
+    if (job)
+        atomic_fetch_sub(&pipeline->in_flight, 1);
+    return job;
+}
+
+enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline)
+{
+    return (enum spl_pipeline_state)atomic_load(&pipeline->state);
+}
+
+const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline)
+{
+    spl_assert(spl_pipeline_get_state(pipeline) == SPL_PIPELINE_FAILED);
+    return &pipeline->failure;
+}
+
+void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status)
+{
+    *status = (struct spl_pipeline_status){
+        .device_bytes = atomic_load(&pipeline->device_bytes),
+        .render_length = spl_queue_get_length(pipeline->render),
+        .render_capacity = spl_queue_get_capacity(pipeline->render),
+        .encode_length = spl_queue_get_length(pipeline->encode),
+        .encode_capacity = spl_queue_get_capacity(pipeline->encode),
+        .frame_ms = (double)atomic_load(&pipeline->frame_ns) / SPL_NS_PER_MS,
+    };
+    pthread_mutex_lock(&pipeline->mutex);
+    status->device = pipeline->device;
+    pthread_mutex_unlock(&pipeline->mutex);
+}
+
+unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline)
+{
+    enum { longest_s = 60 };
+    uint64_t waiting = spl_queue_get_length(pipeline->render) + 1;
+    uint64_t seconds = waiting * atomic_load(&pipeline->frame_ns) / SPL_NS_PER_S + 1;
+    return seconds < longest_s ? (unsigned)seconds : longest_s;
+}

@@ -1,0 +1,82 @@
+/* From a checked view to encoded bytes: the gpu thread and the encode threads, tied by bounded queues.
+ *
+ *     submit → [render queue] → gpu → [encode queue] → encode → [done queue] → take
+ *
+ * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
+ * back, always with either `encoded` filled or `err` set. */
+#ifndef SPL_SERVICE_PIPELINE_H
+#define SPL_SERVICE_PIPELINE_H
+
+#include <stdatomic.h>
+
+#include <splatd/render.h>
+
+#include "base/error.h"
+#include "service/counters.h"
+#include "service/request.h"
+
+struct spl_job {
+    const struct spl_dataset *dataset;
+    struct spl_view_request request;
+    uint64_t accepted_ns, deadline_ns;
+    atomic_bool dropped; /* set by the loop at any time: nobody waits for it, skip the work */
+    void *owner;         // owned by: loop
+
+    struct spl_frame frame;     /* between gpu and encode */
+    struct spl_frame_stats stats;
+    struct spl_encoded encoded;
+    double queue_ms, encode_ms;
+    struct spl_error err;
+};
+
+/* Releases everything and the job itself; NULL-safe. */
+void spl_job_destroy(struct spl_job *job);
+
+struct spl_pipeline_options {
+    struct spl_renderer_options renderer;
+    const struct spl_dataset *const *datasets; /* borrowed until destroy */
+    size_t dataset_count;
+    size_t queue, encoders;
+    struct spl_counters *counters;
+    void (*wake)(void *context); /* called from any thread: a job is done, or the state changed */
+    void *wake_context;
+};
+
+enum spl_pipeline_state {
+    SPL_PIPELINE_STARTING,   /* device and datasets are being loaded */
+    SPL_PIPELINE_READY,
+    SPL_PIPELINE_REBUILDING, /* the device was lost */
+    SPL_PIPELINE_FAILED,     /* for good; see spl_pipeline_get_failure() */
+};
+
+struct spl_pipeline;
+
+/* Starts the threads; the gpu thread makes renderer and residency and reports through `wake`. */
+int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err);
+
+/* Stops taking jobs, finishes those inside, joins the threads, destroys what was not taken. NULL-safe. */
+void spl_pipeline_destroy(struct spl_pipeline *pipeline);
+
+/* Never blocks. SPL_E_BUSY when the queue is full. */
+int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
+
+/* A finished job or NULL; never blocks. */
+struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline);
+
+enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline);
+
+/* Why it failed; only once the state is SPL_PIPELINE_FAILED. */
+const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);
+
+struct spl_pipeline_status {
+    struct spl_device_info device; /* of the last renderer that worked; zero before the first */
+    uint64_t device_bytes;
+    size_t render_length, render_capacity, encode_length, encode_capacity;
+    double frame_ms; /* moving mean */
+};
+void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status);
+
+/* Seconds after which a refused request may be repeated with hope, at least 1. */
+unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline);
+
+#endif

@@ -1,0 +1,43 @@
+/* What a client wants to see: bytes of a query string or a JSON body in, a checked view out. Pure functions: no I/O, no
+ * state, any thread. Errors are SPL_E_INPUT with the parameter's name as the client wrote it. */
+#ifndef SPL_SERVICE_REQUEST_H
+#define SPL_SERVICE_REQUEST_H
+
+#include <stddef.h>
+
+#include <splatd/image.h>
+#include <splatd/render.h>
+
+/* The dataset's default view: what stands in for parameters that were left out. */
+struct spl_view_defaults {
+    double eye[3], target[3], up[3], fov, near, far;
+};
+
+/* The server's caps; no request can lift them. */
+struct spl_view_limits {
+    uint32_t side_px;
+    uint64_t pixels;
+};
+
+struct spl_view_request {
+    struct spl_view view; /* deadline_ns is left at "none" */
+    enum spl_layer layer; /* the one bit of view.layers */
+    struct spl_encode_options encode;
+};
+
+/* `query` is what stands behind '?', still percent-encoded; it need not end in NUL. */
+int spl_view_request_from_query(const char *query, size_t length, const struct spl_view_defaults *defaults,
+                                const struct spl_view_limits *limits, struct spl_view_request *out,
+                                struct spl_error *err);
+
+/* An empty body is the default view. */
+int spl_view_request_from_json(const char *body, size_t length, const struct spl_view_defaults *defaults,
+                               const struct spl_view_limits *limits, struct spl_view_request *out,
+                               struct spl_error *err);
+
+/* Decodes %XX of `text[0..length)` into `out` with a closing NUL. Refuses stray '%', control characters and more than
+ * `capacity` - 1 bytes, naming `field`. '+' stays '+', so that 1e+3 means what it says. */
+int spl_percent_decode(const char *text, size_t length, char *out, size_t capacity, const char *field,
+                       struct spl_error *err);
+
+#endif

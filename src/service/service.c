@@ -1,0 +1,208 @@
+/* The loop's life: open datasets, bind, start the pipeline, serve once it is ready, drain on a signal.
+ *
+ * SIGTERM or SIGINT: no new connections, what runs is finished and answered with "Connection: close", then 0. A second
+ * signal ends the process at once. A pipeline that failed for good is drained the same way and its error returned.
+ * Everything here runs on the loop's thread, which is the caller's. */
+#include "service/service.h"
+
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "service/listen.h"
+#include "service/state.h"
+
+enum {
+    drain_check_ms = 20,
+    drain_least_ms = 250,  /* clients whose next request is on its way already are still served */
+    drain_grace_ms = 5000, /* beyond the deadline of the last view */
+};
+
+void spl_service_options_init(struct spl_service_options *options)
+{
+    *options = (struct spl_service_options){
+        .listen = "127.0.0.1:8080",
+        .queue = 32,
+        .deadline_ms = 10000,
+        .encoders = 2,
+        .pixels_max = 64ull << 20,
+        .verify = true,
+    };
+}
+
+static void on_drain_timer(uv_timer_t *timer)
+{
+    struct spl_service *service = timer->data;
+    uint64_t elapsed_ms = (spl_now_ns() - service->drain_began_ns) / SPL_NS_PER_MS;
+    if (elapsed_ms > service->options->deadline_ms + drain_grace_ms) {
+        spl_waiting_refuse_all(service);
+        uv_stop(&service->loop);
+    } else if (elapsed_ms >= drain_least_ms && !service->requests_open) {
+        uv_stop(&service->loop);
+    }
+}
+
+static void drain(struct spl_service *service)
+{
+    if (service->draining)
+        return;
+    service->draining = true;
+    service->drain_began_ns = spl_now_ns();
+    if (!service->daemon) {
+        uv_stop(&service->loop);
+        return;
+    }
+    spl_http_quiesce(service);
+    uv_timer_start(&service->drain_timer, on_drain_timer, drain_check_ms, drain_check_ms);
+}
+
+static void on_signal(uv_signal_t *handle, int number)
+{
+    struct spl_service *service = handle->data;
+    if (service->draining)
+        _exit(1);
+    spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
+                 service->requests_open);
+    drain(service);
+}
+
+static void announce(struct spl_service *service)
+{
+    struct spl_pipeline_status status;
+    spl_pipeline_get_status(service->pipeline, &status);
+    spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
+                 status.device.driver, status.device.software ? ", software" : "");
+    for (size_t i = 0; i < service->catalog.count; i++) {
+        const struct spl_dataset_info *info = service->catalog.entries[i].info;
+        spl_log_info("dataset %s: %llu splats, %llu bytes, %s/view", info->id, (unsigned long long)info->splats,
+                     (unsigned long long)info->file_bytes, service->catalog.entries[i].uri);
+    }
+    spl_log_info("listening on %s", service->url);
+    spl_log_info("ready");
+}
+
+static void on_wake(uv_async_t *handle)
+{
+    struct spl_service *service = handle->data;
+    enum spl_pipeline_state state = spl_pipeline_get_state(service->pipeline);
+    if (state == SPL_PIPELINE_READY && !service->daemon && !service->draining) {
+        if (spl_http_start(service, &service->failure))
+            drain(service);
+        else
+            announce(service);
+    }
+    spl_waiting_complete(service);
+    if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
+        service->failure = *spl_pipeline_get_failure(service->pipeline);
+        drain(service);
+    }
+}
+
+static void wake(void *context)
+{
+    struct spl_service *service = context;
+    uv_async_send(&service->wake);
+}
+
+/* Every connection is a descriptor. */
+static void raise_descriptor_limit(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= 4096)
+        return;
+    limit.rlim_cur = limit.rlim_max < 4096 ? limit.rlim_max : 4096;
+    setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+static int init_loop(struct spl_service *service, struct spl_error *err)
+{
+    static const int numbers[] = {SIGTERM, SIGINT};
+    uv_timer_t *timers[] = {&service->http_timer, &service->wait_timer, &service->slow_timer, &service->drain_timer};
+    int rc = uv_loop_init(&service->loop);
+    if (rc)
+        return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
+    uv_async_init(&service->loop, &service->wake, on_wake);
+    service->wake.data = service;
+    for (size_t i = 0; i < sizeof timers / sizeof *timers; i++) {
+        uv_timer_init(&service->loop, timers[i]);
+        timers[i]->data = service;
+    }
+    for (size_t i = 0; i < 2; i++) {
+        uv_signal_init(&service->loop, &service->signals[i]);
+        service->signals[i].data = service;
+        uv_signal_start(&service->signals[i], on_signal, numbers[i]);
+    }
+    signal(SIGPIPE, SIG_IGN);
+    return 0;
+}
+
+static void close_handle(uv_handle_t *handle, void *context)
+{
+    (void)context;
+    if (!uv_is_closing(handle))
+        uv_close(handle, NULL);
+}
+
+static void finish_loop(struct spl_service *service)
+{
+    uv_walk(&service->loop, close_handle, NULL);
+    uv_run(&service->loop, UV_RUN_DEFAULT);
+    uv_loop_close(&service->loop);
+}
+
+static int start_pipeline(struct spl_service *service, struct spl_error *err)
+{
+    const struct spl_dataset **datasets = spl_alloc(service->catalog.count, sizeof *datasets, err);
+    if (!datasets)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < service->catalog.count; i++)
+        datasets[i] = service->catalog.entries[i].dataset;
+    service->datasets = datasets;
+    struct spl_pipeline_options options = {
+        .renderer = service->options->renderer,
+        .datasets = datasets,
+        .dataset_count = service->catalog.count,
+        .queue = service->options->queue,
+        .encoders = service->options->encoders,
+        .counters = &service->counters,
+        .wake = wake,
+        .wake_context = service,
+    };
+    return spl_pipeline_create(&options, &service->pipeline, err);
+}
+
+int spl_service_run(const struct spl_service_options *options, struct spl_error *err)
+{
+    struct spl_service *service = spl_alloc(1, sizeof *service, err);
+    if (!service)
+        return SPL_E_NOMEM;
+    service->options = options;
+    service->listen_fd = -1;
+    service->started_ns = spl_now_ns();
+    raise_descriptor_limit();
+    int rc = init_loop(service, err);
+    if (rc)
+        goto free_service;
+    if ((rc = spl_listen(options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
+        (rc = spl_catalog_open(&service->catalog, options->paths, options->path_count, options->verify, err)) ||
+        (rc = start_pipeline(service, err)))
+        goto done;
+    uv_run(&service->loop, UV_RUN_DEFAULT);
+    spl_http_stop(service);
+    if ((rc = service->failure.code) && err)
+        *err = service->failure;
+done:
+    spl_pipeline_destroy(service->pipeline);
+    free(service->datasets);
+    spl_catalog_finish(&service->catalog);
+    if (service->listen_fd >= 0)
+        close(service->listen_fd);
+    finish_loop(service);
+free_service:
+    free(service);
+    return rc;
+}

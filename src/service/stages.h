@@ -1,0 +1,36 @@
+/* What the pipeline's threads share; only pipeline.c, gpu_thread.c and encode_thread.c include it. */
+#ifndef SPL_SERVICE_STAGES_H
+#define SPL_SERVICE_STAGES_H
+
+#include <pthread.h>
+
+#include "base/queue.h"
+#include "service/pipeline.h"
+
+enum { ENCODERS_MAX = 16 };
+
+struct spl_pipeline {
+    struct spl_pipeline_options options; // read-only
+    struct spl_queue *render, *encode, *done;
+    pthread_t gpu_thread, encode_threads[ENCODERS_MAX];
+    size_t encode_started;
+    bool gpu_started;
+    atomic_size_t in_flight;     /* jobs inside; bounded, so that `done` always has room */
+    _Atomic uint64_t device_bytes, frame_ns;
+    atomic_int state;            /* enum spl_pipeline_state */
+    struct spl_error failure;    /* written by the gpu thread before state becomes FAILED */
+    pthread_mutex_t mutex;
+    struct spl_device_info device; // guarded by: mutex
+};
+
+/* Thread bodies; `argument` is the pipeline. */
+void *spl_gpu_thread_run(void *argument);
+void *spl_encode_thread_run(void *argument);
+
+/* Hands a job back to the loop, with `err` set or `encoded` filled. */
+void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);
+
+/* Sets the error of a job that nobody waits for, or whose deadline has passed; true then. */
+bool spl_job_is_over(struct spl_job *job);
+
+#endif

@@ -1,0 +1,122 @@
+/* Requests whose view is in the pipeline: their MHD connection is suspended until a job comes back, the deadline passes
+ * or the client leaves.
+ *
+ * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
+ * closed its sending side counts as gone, as with nginx. Invariant: request->job is set exactly while the request is in
+ * the list; a job that was let go keeps no owner and is destroyed when it comes back. Owned by the loop's thread. */
+#include <poll.h>
+
+#include "base/clock.h"
+#include "service/state.h"
+
+enum { sweep_ms = 20, sweep_sockets = 64 };
+
+static void on_timer(uv_timer_t *timer)
+{
+    spl_waiting_sweep(timer->data);
+}
+
+void spl_waiting_add(struct request *request, struct spl_job *job)
+{
+    struct spl_service *service = request->service;
+    request->job = job;
+    LIST_INSERT_HEAD(&service->waiting, request, link);
+    if (!service->waiting_count++)
+        uv_timer_start(&service->wait_timer, on_timer, sweep_ms, sweep_ms);
+    MHD_suspend_connection(request->handle);
+}
+
+/* Takes the request off the list and lets MHD go on with it. */
+static void resume(struct request *request)
+{
+    struct spl_service *service = request->service;
+    LIST_REMOVE(request, link);
+    request->job = NULL;
+    if (!--service->waiting_count)
+        uv_timer_stop(&service->wait_timer);
+    MHD_resume_connection(request->handle);
+}
+
+/* The pipeline may still hold the job: it is marked, and destroyed when it comes back. */
+static void let_go(struct request *request)
+{
+    request->job->owner = NULL;
+    atomic_store(&request->job->dropped, true);
+    resume(request);
+}
+
+void spl_waiting_complete(struct spl_service *service)
+{
+    for (struct spl_job *job; (job = spl_pipeline_take(service->pipeline));) {
+        struct request *request = job->owner;
+        if (request) {
+            if (job->err.code == SPL_E_TIMEOUT)
+                spl_count(&service->counters, deadline_missed);
+            if (job->err.code)
+                spl_reply_error(request, &job->err);
+            else
+                spl_reply_view(request, job);
+            resume(request);
+        }
+        spl_job_destroy(job);
+    }
+    spl_http_pump(service);
+}
+
+static void give_up(struct request *request)
+{
+    struct spl_error err = {0};
+    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %u ms passed before the view was ready",
+             request->service->options->deadline_ms);
+    spl_count(&request->service->counters, deadline_missed);
+    spl_reply_error(request, &err);
+    let_go(request);
+}
+
+static void let_departed_go(struct request **requests, struct pollfd *sockets, nfds_t count)
+{
+    if (poll(sockets, count, 0) <= 0)
+        return;
+    for (nfds_t i = 0; i < count; i++) {
+        if (!(sockets[i].revents & (POLLRDHUP | POLLHUP | POLLERR)))
+            continue;
+        spl_count(&requests[i]->service->counters, clients_left);
+        requests[i]->abandoned = true;
+        let_go(requests[i]);
+    }
+}
+
+void spl_waiting_sweep(struct spl_service *service)
+{
+    struct request *batch[sweep_sockets], *request, *next;
+    struct pollfd sockets[sweep_sockets];
+    nfds_t count = 0;
+    uint64_t now = spl_now_ns();
+    for (request = LIST_FIRST(&service->waiting); request; request = next) {
+        next = LIST_NEXT(request, link);
+        if (now >= request->job->deadline_ns) {
+            give_up(request);
+            continue;
+        }
+        batch[count] = request;
+        sockets[count++] = (struct pollfd){.fd = request->connection->fd, .events = POLLRDHUP};
+        if (count == sweep_sockets) {
+            let_departed_go(batch, sockets, count);
+            count = 0;
+        }
+    }
+    let_departed_go(batch, sockets, count);
+    spl_http_pump(service);
+}
+
+void spl_waiting_refuse_all(struct spl_service *service)
+{
+    while (!LIST_EMPTY(&service->waiting)) {
+        struct spl_error err = {0};
+        spl_fail(&err, SPL_E_CANCELLED, "the service is stopping");
+        struct request *request = LIST_FIRST(&service->waiting);
+        spl_reply_error(request, &err);
+        let_go(request);
+    }
+    spl_http_pump(service);
+}

@@ -1,0 +1,120 @@
+/* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
+ * colour that take as long as FAKE_FRAME_MS says, losses on demand, failures to open after FAKE_OPEN_LIMIT times.
+ * TSan sees all of it, which it cannot with a driver that compiles its own code. */
+#include <splatd/render.h>
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/memory.h"
+
+struct spl_renderer {
+    struct spl_device_info device;
+    bool lose_next, lost;
+};
+
+static long setting(const char *name, long otherwise)
+{
+    const char *text = getenv(name);
+    return text ? strtol(text, NULL, 10) : otherwise;
+}
+
+int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
+{
+    static long opened;
+    if (options->require_gpu || opened++ >= setting("FAKE_OPEN_LIMIT", 1000))
+        return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
+    if (!(*out = spl_alloc(1, sizeof **out, err)))
+        return SPL_E_NOMEM;
+    (*out)->device = (struct spl_device_info){.backend = "fake", .name = "flat colour", .driver = "tests", .software = true};
+    return 0;
+}
+
+void spl_renderer_destroy(struct spl_renderer *renderer)
+{
+    free(renderer);
+}
+
+const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer)
+{
+    return &renderer->device;
+}
+
+int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    (void)renderer;
+    (void)dataset;
+    (void)err;
+    return 0;
+}
+
+void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+{
+    (void)renderer;
+    (void)dataset;
+}
+
+int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    return spl_renderer_add(renderer, dataset, err);
+}
+
+static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_view *view, struct spl_error *err)
+{
+    static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32,
+                                                               SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32};
+    const struct spl_camera *camera = &view->camera;
+    size_t pixels = (size_t)camera->width * camera->height;
+    *image = (struct spl_image){layer, types[layer], camera->width, camera->height, NULL};
+    uint32_t words = spl_pixel_bytes(image->type) / 4;
+    uint32_t *out = image->pixels = spl_alloc_raw(pixels * words, 4, err);
+    if (!out)
+        return SPL_E_NOMEM;
+    float depth = (float)camera->eye[2] + 100; // beyond 65.535 m where a test wants saturation
+    uint32_t word;
+    memcpy(&word, &depth, 4);
+    if (image->type == SPL_PIXEL_RGBA8)
+        memcpy(&word, view->background, 4);
+    for (size_t i = 0; i < pixels * words; i++)
+        out[i] = word;
+    return 0;
+}
+
+int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err)
+{
+    (void)dataset;
+    memset(frame, 0, sizeof *frame);
+    if (renderer->lose_next || renderer->lost) {
+        renderer->lost = true;
+        return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
+    }
+    uint64_t until = spl_now_ns() + (uint64_t)setting("FAKE_FRAME_MS", 1) * SPL_NS_PER_MS;
+    while (spl_remaining_ns(until)) {
+        if (!spl_remaining_ns(view->deadline_ns))
+            return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+        usleep(500);
+    }
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        if (!(view->layers >> layer & 1) || !fill(&frame->images[layer], (enum spl_layer)layer, view, err))
+            continue;
+        spl_frame_finish(frame);
+        return SPL_E_NOMEM;
+    }
+    frame->stats.complete = true;
+    return 0;
+}
+
+uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer)
+{
+    (void)renderer;
+    return 1 << 20;
+}
+
+void spl_renderer_inject_loss(struct spl_renderer *renderer)
+{
+    renderer->lose_next = true;
+}

@@ -1,0 +1,175 @@
+/* The pipeline without HTTP, on a fake renderer: every job comes back once, with bytes or a reason. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "service/pipeline.h"
+
+static struct spl_counters counters;
+
+static void no_wake(void *context)
+{
+    (void)context;
+}
+
+static struct spl_pipeline *start(size_t queue)
+{
+    struct spl_pipeline_options options = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake};
+    struct spl_pipeline *pipeline = NULL;
+    struct spl_error err = {0};
+    memset(&counters, 0, sizeof counters);
+    assert_int_equal(spl_pipeline_create(&options, &pipeline, &err), 0);
+    while (spl_pipeline_get_state(pipeline) == SPL_PIPELINE_STARTING)
+        usleep(1000);
+    return pipeline;
+}
+
+static struct spl_job *make_job(unsigned deadline_ms)
+{
+    static const struct spl_view_defaults defaults = {.eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
+    static const struct spl_view_limits limits = {.side_px = 64, .pixels = 4096};
+    struct spl_job *job = calloc(1, sizeof *job);
+    const char *query = "width=8&height=4&format=raw";
+    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
+    job->accepted_ns = spl_now_ns();
+    job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
+    return job;
+}
+
+static struct spl_job *take(struct spl_pipeline *pipeline)
+{
+    struct spl_job *job;
+    while (!(job = spl_pipeline_take(pipeline)))
+        usleep(500);
+    return job;
+}
+
+static void jobs_come_back_with_bytes(void **state)
+{
+    (void)state;
+    struct spl_pipeline *pipeline = start(8);
+    for (int i = 0; i < 8; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, make_job(10000), NULL), 0);
+    for (int i = 0; i < 8; i++) {
+        struct spl_job *job = take(pipeline);
+        assert_int_equal(job->err.code, 0);
+        assert_int_equal(job->encoded.length, 8 * 4 * 4);
+        spl_job_destroy(job);
+    }
+    assert_int_equal(counters.frames, 8);
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_full_queue_refuses(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "100", 1);
+    struct spl_pipeline *pipeline = start(2);
+    struct spl_error err = {0};
+    int accepted = 0, rc;
+    struct spl_job *job;
+    while (!(rc = spl_pipeline_submit(pipeline, job = make_job(10000), &err)))
+        accepted++;
+    assert_int_equal(rc, SPL_E_BUSY);
+    assert_in_range(accepted, 2, 3);
+    assert_in_range(spl_pipeline_get_retry_after(pipeline), 1, 60);
+    spl_job_destroy(job);
+    unsetenv("FAKE_FRAME_MS");
+    spl_pipeline_destroy(pipeline); // what was accepted is finished and released
+    assert_int_equal(counters.frames, accepted);
+}
+
+static void dropped_and_late_jobs_are_not_rendered(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "60", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *first = make_job(10000), *late = make_job(20), *left = make_job(10000), *job;
+    assert_int_equal(spl_pipeline_submit(pipeline, first, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
+    atomic_store(&left->dropped, true);
+    for (int i = 0; i < 3; i++) {
+        job = take(pipeline);
+        assert_int_equal(job->err.code, job == late ? SPL_E_TIMEOUT : job == left ? SPL_E_CANCELLED : 0);
+        spl_job_destroy(job);
+    }
+    assert_int_equal(counters.frames, 1);
+    unsetenv("FAKE_FRAME_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_lost_device_is_reopened(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "2", 1);
+    struct spl_pipeline *pipeline = start(8);
+    int lost = 0, drawn = 0;
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(spl_pipeline_submit(pipeline, make_job(10000), NULL), 0);
+        struct spl_job *job = take(pipeline);
+        lost += job->err.code == SPL_E_DEVICE_LOST;
+        drawn += job->err.code == 0;
+        spl_job_destroy(job);
+    }
+    assert_int_equal(lost, 1);
+    assert_int_equal(drawn, 5);
+    assert_int_equal(counters.device_losses, 1);
+    assert_int_equal(spl_pipeline_get_state(pipeline), SPL_PIPELINE_READY);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void losses_are_bounded(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x100", 1);
+    struct spl_pipeline *pipeline = start(8);
+    for (int i = 0; i < 20; i++) {
+        struct spl_job *job = make_job(10000);
+        if (spl_pipeline_submit(pipeline, job, NULL)) {
+            spl_job_destroy(job);
+            break;
+        }
+        spl_job_destroy(take(pipeline));
+    }
+    while (spl_pipeline_get_state(pipeline) != SPL_PIPELINE_FAILED)
+        usleep(1000);
+    assert_int_equal(spl_pipeline_get_failure(pipeline)->code, SPL_E_DEVICE_LOST);
+    assert_int_equal(counters.device_losses, 4);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_device_that_does_not_open_is_a_failure(void **state)
+{
+    (void)state;
+    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    struct spl_pipeline *pipeline = start(8);
+    assert_int_equal(spl_pipeline_get_state(pipeline), SPL_PIPELINE_FAILED);
+    assert_int_equal(spl_pipeline_get_failure(pipeline)->code, SPL_E_NO_DEVICE);
+    struct spl_job *job = make_job(1000);
+    assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), SPL_E_BUSY);
+    spl_job_destroy(job);
+    unsetenv("FAKE_OPEN_LIMIT");
+    spl_pipeline_destroy(pipeline);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(jobs_come_back_with_bytes),
+        cmocka_unit_test(a_full_queue_refuses),
+        cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
+        cmocka_unit_test(a_lost_device_is_reopened),
+        cmocka_unit_test(losses_are_bounded),
+        cmocka_unit_test(a_device_that_does_not_open_is_a_failure),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
