@@ -1,5 +1,5 @@
-/* Progress lines: "stage  42 %  1.2 M/s  3 s left", rewritten in place on a terminal. A log gets two plain lines a stage
- * instead, so that it stays readable and short. A stage ends where the next begins or the work is over. */
+/* Progress lines: "stage  42 %  1.2 M/s  3 s left", rewritten in place on a terminal. A log gets two plain lines a
+ * stage instead, so that it stays readable and short. A stage ends where the next begins or the work is over. */
 #include "cmd/progress.h"
 
 #include <math.h>

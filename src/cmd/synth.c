@@ -58,15 +58,19 @@ int spl_cmd_synth(int argc, char **argv)
 {
     enum { opt_noise = 256, opt_format, opt_threads, opt_list };
     static const struct option options[] = {
-        {"points", required_argument, NULL, 'n'},         {"seed", required_argument, NULL, 's'},
-        {"noise", required_argument, NULL, opt_noise},    {"format", required_argument, NULL, opt_format},
-        {"threads", required_argument, NULL, opt_threads}, {"output", required_argument, NULL, 'o'},
-        {"list", no_argument, NULL, opt_list},            {"help", no_argument, NULL, 'h'},
+        {"points", required_argument, NULL, 'n'},
+        {"seed", required_argument, NULL, 's'},
+        {"noise", required_argument, NULL, opt_noise},
+        {"format", required_argument, NULL, opt_format},
+        {"threads", required_argument, NULL, opt_threads},
+        {"output", required_argument, NULL, 'o'},
+        {"list", no_argument, NULL, opt_list},
+        {"help", no_argument, NULL, 'h'},
         {0},
     };
     struct spl_cmd_progress progress = {0};
-    struct spl_synth_options o = {.points = 1000000, .seed = 1, .noise = -1, .progress = spl_cmd_progress,
-                                  .progress_context = &progress};
+    struct spl_synth_options o = {
+        .points = 1000000, .seed = 1, .noise = -1, .progress = spl_cmd_progress, .progress_context = &progress};
     uint64_t threads = 0, written = 0;
     struct spl_error err = {0};
     int result = 0;

@@ -7,17 +7,6 @@
 #include "synth/random.h"
 #include "synth/vector.h"
 
-uint32_t spl_build_material(struct spl_scene *scene, struct spl_material material)
-{
-    struct spl_material *grown =
-        spl_realloc(scene->materials, scene->material_count + 1, sizeof *grown, &scene->error);
-    if (!grown)
-        return 0;
-    scene->materials = grown;
-    grown[scene->material_count] = material;
-    return (uint32_t)scene->material_count++;
-}
-
 uint32_t spl_build_object(struct spl_scene *scene, const char *name)
 {
     const char **grown = spl_realloc(scene->objects, scene->object_count + 1, sizeof *grown, &scene->error);

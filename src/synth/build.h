@@ -6,10 +6,9 @@
 #include "synth/scene.h"
 
 struct spl_skin {              /* what a primitive looks like and belongs to */
-    uint32_t material, object;
+    uint32_t material, object; /* indices in scene->materials and scene->objects */
 };
 
-uint32_t spl_build_material(struct spl_scene *scene, struct spl_material material);
 uint32_t spl_build_object(struct spl_scene *scene, const char *name);
 /* A scanner at `position`, turned by `yaw` around z after tilting by `tilt` around its x axis; degrees. */
 void spl_build_station(struct spl_scene *scene, const double position[3], double yaw, double tilt);
@@ -34,7 +33,7 @@ void spl_build_wire(struct spl_scene *scene, struct spl_skin skin, const double 
 void spl_build_tree(struct spl_scene *scene, struct spl_skin bark, struct spl_skin leaf, const double foot[3],
                     double height, uint64_t seed);
 
-/* The scenes; one file each. */
+/* The scenes; one file each. They set materials and noise as well. */
 void spl_build_courtyard(struct spl_scene *scene);
 
 #endif

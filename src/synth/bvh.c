@@ -19,7 +19,7 @@ struct item {
 
 struct build {
     struct item *items;
-    double *area;               /* of what lies right of a split, scratch */
+    double *area; /* of what lies right of a split, scratch */
     struct spl_bvh_node *nodes;
     uint32_t used;
 };

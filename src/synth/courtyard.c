@@ -8,15 +8,43 @@
 static const double width = 20, depth = 16, height = 7;
 static const double east[3] = {1, 0, 0}, north[3] = {0, 1, 0}, up[3] = {0, 0, 1};
 
+enum { paving, stone, brick, ashlar, marbled, plaster, glass, bark, wood, glaze, green, black, grey, red, lettering };
+static const struct spl_material materials[] = {
+    [paving] = {.kind = SPL_MATERIAL_MASONRY, .colors = {{132, 128, 120}, {158, 152, 142}, {86, 84, 78}},
+                .size = {0.6, 0.4}, .joint = 0.014, .grain = 0.3, .seed = 3},
+    [brick] = {.kind = SPL_MATERIAL_MASONRY, .colors = {{150, 70, 52}, {184, 104, 74}, {198, 190, 176}},
+               .size = {0.25, 0.0833}, .joint = 0.012, .grain = 0.2, .seed = 11},
+    [ashlar] = {.kind = SPL_MATERIAL_MASONRY, .colors = {{196, 182, 150}, {216, 204, 176}, {128, 118, 100}},
+                .size = {0.9, 0.45}, .joint = 0.02, .grain = 0.35, .seed = 23},
+    [marbled] = {.kind = SPL_MATERIAL_PLASTER, .colors = {{92, 120, 134}, {206, 196, 170}, {170, 108, 70}},
+                 .size = {1.4, 1.4}, .seed = 37},
+    [plaster] = {.kind = SPL_MATERIAL_PLASTER, .colors = {{214, 190, 140}, {228, 210, 168}, {240, 226, 192}},
+                 .size = {0.4, 0.4}, .seed = 41},
+    [stone] = {.kind = SPL_MATERIAL_SOLID, .colors = {{176, 170, 158}, {206, 200, 188}, {228, 224, 214}},
+               .size = {0.3, 0.3}, .seed = 53},
+    [bark] = {.kind = SPL_MATERIAL_SOLID, .colors = {{58, 42, 30}, {104, 82, 60}, {140, 118, 92}},
+              .size = {0.08, 0.3}, .seed = 61},
+    [wood] = {.kind = SPL_MATERIAL_SOLID, .colors = {{92, 56, 30}, {142, 92, 52}, {176, 126, 78}},
+              .size = {0.1, 0.1}, .seed = 67},
+    [glaze] = {.kind = SPL_MATERIAL_SOLID, .colors = {{24, 60, 120}, {60, 130, 170}, {230, 220, 150}},
+               .size = {0.45, 0.45}, .seed = 71},
+    [glass] = {.kind = SPL_MATERIAL_WINDOW, .colors = {{40, 52, 66}, {128, 150, 168}, {236, 234, 226}}},
+    [green] = {.kind = SPL_MATERIAL_LEAF, .colors = {{54, 96, 34}, {116, 150, 52}, {176, 190, 110}}},
+    [lettering] = {.kind = SPL_MATERIAL_PLAQUE, .colors = {{238, 236, 228}, {28, 30, 36}}},
+    [black] = {.kind = SPL_MATERIAL_FLAT, .colors = {{38, 38, 42}}},
+    [grey] = {.kind = SPL_MATERIAL_FLAT, .colors = {{120, 120, 120}}},
+    [red] = {.kind = SPL_MATERIAL_FLAT, .colors = {{255, 0, 0}}},
+};
+
 struct opening_row {
-    double low, high;      /* metres above the ground */
-    int count;             /* openings, evenly spaced */
+    double low, high; /* metres above the ground */
+    int count;        /* openings, evenly spaced */
     double width;
 };
 
 struct facade {
-    double corner[3];      /* its left end on the ground, seen from the court */
-    double right[3];       /* the court lies on the side of right × up */
+    double corner[3]; /* its left end on the ground, seen from the court */
+    double right[3];  /* the court lies on the side of right × up */
     double width;
     struct spl_skin wall, reveal, pane;
     struct opening_row rows[2];
@@ -31,8 +59,8 @@ static void wall_part(struct spl_scene *scene, const struct facade *f, struct sp
     mad3(f->corner, middle[0], f->right, center);
     mad3(center, middle[1], up, center);
     mad3(center, -recess, inwards, center);
-    spl_build_rectangle(scene, skin, center, f->right, up,
-                        (double[2]){(high[0] - low[0]) / 2, (high[1] - low[1]) / 2}, textured_across ? middle : NULL);
+    spl_build_rectangle(scene, skin, center, f->right, up, (double[2]){(high[0] - low[0]) / 2, (high[1] - low[1]) / 2},
+                        textured_across ? middle : NULL);
 }
 
 static void opening(struct spl_scene *scene, const struct facade *f, const double low[2], const double high[2])
@@ -48,8 +76,8 @@ static void opening(struct spl_scene *scene, const struct facade *f, const doubl
         mad3(center, z, up, center);
         mad3(center, -recess / 2, inwards, center);
         double along = (side < 2 ? high[1] - low[1] : high[0] - low[0]) / 2;
-        spl_build_rectangle(scene, f->reveal, center, inwards, side < 2 ? up : f->right,
-                            (double[2]){recess / 2, along}, (double[2]){s, z});
+        spl_build_rectangle(scene, f->reveal, center, inwards, side < 2 ? up : f->right, (double[2]){recess / 2, along},
+                            (double[2]){s, z});
     }
     mad3(f->corner, (low[0] + high[0]) / 2, f->right, center);
     mad3(center, low[1] - 0.04, up, center);
@@ -84,22 +112,8 @@ static void facade(struct spl_scene *scene, const struct facade *f)
     spl_build_box(scene, f->reveal, center, f->right, (double[3]){f->width / 2, 0.08, 0.15});
 }
 
-static void facades(struct spl_scene *scene, uint32_t stone)
+static void facades(struct spl_scene *scene)
 {
-    uint32_t brick = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_MASONRY, .colors = {{150, 70, 52}, {184, 104, 74}, {198, 190, 176}},
-        .size = {0.25, 0.0833}, .joint = 0.012, .grain = 0.2, .seed = 11});
-    uint32_t ashlar = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_MASONRY, .colors = {{196, 182, 150}, {216, 204, 176}, {128, 118, 100}},
-        .size = {0.9, 0.45}, .joint = 0.02, .grain = 0.35, .seed = 23});
-    uint32_t marbled = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_PLASTER, .colors = {{92, 120, 134}, {206, 196, 170}, {170, 108, 70}}, .size = {1.4, 1.4},
-        .seed = 37});
-    uint32_t plaster = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_PLASTER, .colors = {{214, 190, 140}, {228, 210, 168}, {240, 226, 192}}, .size = {0.4, 0.4},
-        .seed = 41});
-    uint32_t glass = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_WINDOW, .colors = {{40, 52, 66}, {128, 150, 168}, {236, 234, 226}}});
     const char *const names[4] = {"facade-north", "facade-east", "facade-south", "facade-west"};
     const uint32_t walls[4] = {brick, marbled, ashlar, plaster};
     const struct opening_row rows[4][2] = {
@@ -108,14 +122,17 @@ static void facades(struct spl_scene *scene, uint32_t stone)
         {{0.48, 2.9, 5, 1.3}, {4.0, 5.8, 7, 1.1}},
         {{0}, {4.2, 5.8, 5, 1.0}},
     };
-    const double corners[4][3] = {{-width / 2, depth / 2, 0}, {width / 2, depth / 2, 0}, {width / 2, -depth / 2, 0},
-                                  {-width / 2, -depth / 2, 0}};
+    const double corners[4][3] = {
+        {-width / 2, depth / 2, 0}, {width / 2, depth / 2, 0}, {width / 2, -depth / 2, 0}, {-width / 2, -depth / 2, 0}};
     const double rights[4][3] = {{1, 0, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 1, 0}};
     uint32_t windows = spl_build_object(scene, "windows");
     for (int i = 0; i < 4; i++) {
         uint32_t object = spl_build_object(scene, names[i]);
-        struct facade f = {.width = i % 2 ? depth : width, .wall = {walls[i], object}, .reveal = {stone, object},
-                           .pane = {glass, windows}, .rows = {rows[i][0], rows[i][1]}};
+        struct facade f = {.width = i % 2 ? depth : width,
+                           .wall = {walls[i], object},
+                           .reveal = {stone, object},
+                           .pane = {glass, windows},
+                           .rows = {rows[i][0], rows[i][1]}};
         for (int a = 0; a < 3; a++) {
             f.corner[a] = corners[i][a];
             f.right[a] = rights[i][a];
@@ -124,7 +141,7 @@ static void facades(struct spl_scene *scene, uint32_t stone)
     }
 }
 
-static void arcade(struct spl_scene *scene, uint32_t stone)
+static void arcade(struct spl_scene *scene)
 {
     struct spl_skin columns = {stone, spl_build_object(scene, "columns")};
     struct spl_skin beam = {stone, spl_build_object(scene, "architrave")};
@@ -138,7 +155,7 @@ static void arcade(struct spl_scene *scene, uint32_t stone)
     spl_build_box(scene, beam, (double[3]){8.475, 0, 3.6}, north, (double[3]){5.5, 1.525, 0.05});
 }
 
-static void furniture(struct spl_scene *scene, uint32_t stone, uint32_t wood)
+static void furniture(struct spl_scene *scene)
 {
     struct spl_skin bench = {wood, spl_build_object(scene, "bench")};
     struct spl_skin steps = {stone, spl_build_object(scene, "steps")};
@@ -157,13 +174,7 @@ static void furniture(struct spl_scene *scene, uint32_t stone, uint32_t wood)
 
 static void panels(struct spl_scene *scene)
 {
-    uint32_t text = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_PLAQUE, .colors = {{238, 236, 228}, {28, 30, 36}}});
-    uint32_t red = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_FLAT, .colors = {{255, 0, 0}}});
-    uint32_t grey = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_FLAT, .colors = {{120, 120, 120}}});
-    struct spl_skin plaque = {text, spl_build_object(scene, "plaque")};
+    struct spl_skin plaque = {lettering, spl_build_object(scene, "plaque")};
     struct spl_skin rim = {grey, plaque.object};
     struct spl_skin panel = {red, spl_build_object(scene, "red-panel")};
     /* On the west wall; u runs along +y, which is rightwards for who reads it. */
@@ -174,31 +185,12 @@ static void panels(struct spl_scene *scene)
 
 void spl_build_courtyard(struct spl_scene *scene)
 {
-    uint32_t paving = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_MASONRY, .colors = {{132, 128, 120}, {158, 152, 142}, {86, 84, 78}}, .size = {0.6, 0.4},
-        .joint = 0.014, .grain = 0.3, .seed = 3});
-    uint32_t stone = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_SOLID, .colors = {{176, 170, 158}, {206, 200, 188}, {228, 224, 214}}, .size = {0.3, 0.3},
-        .seed = 53});
-    uint32_t bark = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_SOLID, .colors = {{58, 42, 30}, {104, 82, 60}, {140, 118, 92}}, .size = {0.08, 0.3},
-        .seed = 61});
-    uint32_t wood = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_SOLID, .colors = {{92, 56, 30}, {142, 92, 52}, {176, 126, 78}}, .size = {0.1, 0.1},
-        .seed = 67});
-    uint32_t glaze = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_SOLID, .colors = {{24, 60, 120}, {60, 130, 170}, {230, 220, 150}}, .size = {0.45, 0.45},
-        .seed = 71});
-    uint32_t green = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_LEAF, .colors = {{54, 96, 34}, {116, 150, 52}, {176, 190, 110}}});
-    uint32_t black = spl_build_material(scene, (struct spl_material){
-        .kind = SPL_MATERIAL_FLAT, .colors = {{38, 38, 42}}});
-
+    scene->materials = materials;
     spl_build_rectangle(scene, (struct spl_skin){paving, spl_build_object(scene, "ground")}, (double[3]){0}, east,
                         north, (double[2]){width / 2, depth / 2}, NULL);
-    facades(scene, stone);
-    arcade(scene, stone);
-    furniture(scene, stone, wood);
+    facades(scene);
+    arcade(scene);
+    furniture(scene);
     panels(scene);
 
     struct spl_skin sphere = {glaze, spl_build_object(scene, "sphere")};

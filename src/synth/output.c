@@ -1,6 +1,6 @@
-/* PTX as Leica's tools write it (columns, rows, the scanner's pose twice, then a line a cell in the scanner's frame) and
- * PLY, binary little-endian, world coordinates as floats: a scene of 20 m keeps a micrometre. Numbers are formatted by
- * hand because printf would take most of a scan's time. */
+/* PTX as Leica's tools write it (columns, rows, the scanner's pose twice, then a line a cell in the scanner's frame)
+ * and PLY, binary little-endian, world coordinates as floats: a scene of 20 m keeps a micrometre. Numbers are formatted
+ * by hand because printf would take most of a scan's time. */
 #include "synth/output.h"
 
 #include <errno.h>
@@ -43,8 +43,7 @@ int spl_output_write(struct spl_output *out, const void *bytes, size_t count, st
     return 0;
 }
 
-int spl_output_write_at(struct spl_output *out, const void *bytes, size_t count, uint64_t offset,
-                        struct spl_error *err)
+int spl_output_write_at(struct spl_output *out, const void *bytes, size_t count, uint64_t offset, struct spl_error *err)
 {
     if (lseek(out->fd, (off_t)offset, SEEK_SET) < 0)
         return spl_fail_errno(err, errno, "seeking in %s", out->temporary);
@@ -107,8 +106,8 @@ size_t spl_ptx_header(char to[SPL_PTX_HEADER_MAX], const struct spl_scan_grid *g
     for (int i = 0; i < 3; i++)
         used += snprintf(to + used, SPL_PTX_HEADER_MAX - (size_t)used, "%.15f %.15f %.15f\n", r[i], r[i + 3], r[i + 6]);
     for (int i = 0; i < 3; i++)
-        used += snprintf(to + used, SPL_PTX_HEADER_MAX - (size_t)used, "%.15f %.15f %.15f 0\n", r[i], r[i + 3],
-                         r[i + 6]);
+        used +=
+            snprintf(to + used, SPL_PTX_HEADER_MAX - (size_t)used, "%.15f %.15f %.15f 0\n", r[i], r[i + 3], r[i + 6]);
     used += snprintf(to + used, SPL_PTX_HEADER_MAX - (size_t)used, "%.6f %.6f %.6f 1\n", p[0], p[1], p[2]);
     return (size_t)used;
 }

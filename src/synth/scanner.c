@@ -8,8 +8,8 @@
 #include "synth/random.h"
 #include "synth/vector.h"
 
-static const double lowest = -60, highest = 90;        /* elevations, degrees */
-static const double rows_per_column = 150.0 / 360.0;   /* equal steps both ways */
+static const double lowest = -60, highest = 90;      /* elevations, degrees */
+static const double rows_per_column = 150.0 / 360.0; /* equal steps both ways */
 enum {
     coarse_columns = 1440,       /* 3.5 million rays over four stations tell the share of returns within 0.1 % */
     counted_points_max = 200000, /* up to here a grid's returns are counted, above they are inferred */
@@ -94,13 +94,15 @@ static uint64_t count_returns(const struct spl_scene *scene, const struct spl_sc
 
 struct spl_scan_grid spl_scanner_fit(const struct spl_scene *scene, uint64_t points, unsigned threads)
 {
-    struct spl_scan_grid grid = {.columns = coarse_columns / 4, .rows = (uint64_t)(coarse_columns / 4 * rows_per_column)};
+    struct spl_scan_grid grid = {.columns = coarse_columns / 4,
+                                 .rows = (uint64_t)(coarse_columns / 4 * rows_per_column)};
     if (points > counted_points_max) {
         grid.columns = coarse_columns;
         grid.rows = (uint64_t)(coarse_columns * rows_per_column);
     }
     double cells = (double)grid.columns * (double)grid.rows;
-    double share = (double)count_returns(scene, &grid, threads) / cells; /* returns of all stations for a cell of each */
+    /* Returns of all stations for a cell of each. */
+    double share = (double)count_returns(scene, &grid, threads) / cells;
     double wanted = (double)points / share;
     grid.columns = (uint64_t)llround(sqrt(wanted / rows_per_column));
     grid.rows = (uint64_t)llround(wanted / (double)grid.columns);

@@ -1,5 +1,5 @@
-/* The table of scenes, and exact answers to rays. A scene is a list of primitives under a bounding volume hierarchy; the
- * user's seed never changes it. */
+/* The table of scenes, and exact answers to rays. A scene is a list of primitives under a bounding volume hierarchy;
+ * the user's seed never changes it. */
 #include "synth/scene.h"
 
 #include <math.h>
@@ -70,7 +70,6 @@ void spl_scene_destroy(struct spl_scene *scene)
         return;
     free(scene->primitives);
     free(scene->nodes);
-    free(scene->materials);
     free(scene->objects);
     free(scene->stations);
     free(scene);

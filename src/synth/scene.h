@@ -23,8 +23,7 @@ struct spl_scene {
     struct spl_primitive *primitives;
     size_t primitive_count, primitive_capacity;
     struct spl_bvh_node *nodes;   /* over the primitives once they are complete */
-    struct spl_material *materials;
-    size_t material_count;
+    const struct spl_material *materials; /* static */
     const char **objects;         /* names, static; an object's id is its index */
     size_t object_count;
     struct spl_station *stations;

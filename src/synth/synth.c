@@ -1,5 +1,5 @@
 /* A scan, streamed: a batch of grid columns is cast and formatted by all threads, each column into its own slot, and
- * written in order by the caller's thread. So the files are the same for any number of threads, and memory is a batch. */
+ * written in order by the caller's thread. So the files are the same for any number of threads, and memory stays small. */
 #include <splatd/synth.h>
 
 #include <errno.h>
@@ -16,7 +16,7 @@
 #include "synth/scanner.h"
 
 static const uint64_t points_min = 1000, points_max = 10000000000;
-enum { batch_cells = 1 << 18 };  /* about 0.1 s of casting, 20 MB of text */
+enum { batch_cells = 1 << 18 }; /* about 0.1 s of casting, 20 MB of text */
 
 struct column {
     size_t ptx_bytes, ply_bytes, points;
@@ -28,9 +28,9 @@ struct scan {
     double sigma;
     uint64_t seed;
     size_t station;
-    uint64_t first_column;       /* of the batch */
-    struct column *columns;      /* of the batch */
-    char *ptx, *ply;             /* a slot a column; NULL when not asked for */
+    uint64_t first_column;  /* of the batch */
+    struct column *columns; /* of the batch */
+    char *ptx, *ply;        /* a slot a column; NULL when not asked for */
 };
 
 static void cast_columns(void *context, size_t begin, size_t end, unsigned worker)
@@ -42,8 +42,8 @@ static void cast_columns(void *context, size_t begin, size_t end, unsigned worke
         char *ply = s->ply ? s->ply + i * s->grid.rows * SPL_PLY_POINT_BYTES : NULL;
         struct column column = {0};
         for (uint64_t row = 0; row < s->grid.rows; row++) {
-            struct spl_return r = spl_scanner_cast(s->scene, &s->grid, s->station, s->first_column + i, row, s->sigma,
-                                                   s->seed);
+            struct spl_return r =
+                spl_scanner_cast(s->scene, &s->grid, s->station, s->first_column + i, row, s->sigma, s->seed);
             if (ptx)
                 column.ptx_bytes += spl_ptx_cell(ptx + column.ptx_bytes, &r);
             if (ply && r.hit)
@@ -119,9 +119,11 @@ static void report(struct report *r, uint64_t done, bool last)
     if (!r->options->progress || (!last && now - r->last_ns < 100 * SPL_NS_PER_MS))
         return;
     r->last_ns = now;
-    r->options->progress(r->options->progress_context, &(struct spl_progress){
-        .stage = r->stage, .done = done, .total = last || done > r->total ? done : r->total,
-        .rate = (double)done / ((double)(now - r->start_ns + 1) / 1e9)});
+    r->options->progress(r->options->progress_context,
+                         &(struct spl_progress){.stage = r->stage,
+                                                .done = done,
+                                                .total = last || done > r->total ? done : r->total,
+                                                .rate = (double)done / ((double)(now - r->start_ns + 1) / 1e9)});
 }
 
 static int scan_station(struct scan *s, const struct spl_synth_options *options, struct spl_output *ptx,
@@ -136,11 +138,11 @@ static int scan_station(struct scan *s, const struct spl_synth_options *options,
         spl_parallel_for(options->threads, count, 1, cast_columns, s);
         for (uint64_t i = 0; i < count && !result; i++) {
             if (s->ptx)
-                result = spl_output_write(ptx, s->ptx + i * s->grid.rows * SPL_PTX_CELL_MAX, s->columns[i].ptx_bytes,
-                                          err);
+                result =
+                    spl_output_write(ptx, s->ptx + i * s->grid.rows * SPL_PTX_CELL_MAX, s->columns[i].ptx_bytes, err);
             if (s->ply && !result)
-                result = spl_output_write(ply, s->ply + i * s->grid.rows * SPL_PLY_POINT_BYTES,
-                                          s->columns[i].ply_bytes, err);
+                result = spl_output_write(ply, s->ply + i * s->grid.rows * SPL_PLY_POINT_BYTES, s->columns[i].ply_bytes,
+                                          err);
             *points += s->columns[i].points;
         }
         report(progress, *points, false);

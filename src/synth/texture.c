@@ -117,8 +117,8 @@ static const uint8_t letters[26][5] = {
 };
 enum { line_letters = 18, line_count = 6, letter_width = 6, letter_height = 10 };
 static const char inscription[line_count][line_letters + 1] = {
-    "MEASURE WHAT CAN  ", "BE MEASURED AND   ", "MAKE MEASURABLE   ", "WHAT CANNOT BE    ", "SPLATS JUDGED BY  ",
-    "VEXING QUARTZ FORM",
+    "MEASURE WHAT CAN  ", "BE MEASURED AND   ", "MAKE MEASURABLE   ",
+    "WHAT CANNOT BE    ", "SPLATS JUDGED BY  ", "VEXING QUARTZ FORM",
 };
 
 /* Whether letter-pixel (x, y) of the inscription is inked; y grows downwards. */

@@ -59,8 +59,8 @@ static size_t file_count(const char *path)
 
 static struct spl_synth_options options_for(const char *directory, uint64_t points)
 {
-    return (struct spl_synth_options){.scene = "courtyard", .directory = directory, .points = points, .seed = 1,
-                                      .noise = -1, .threads = 2};
+    return (struct spl_synth_options){
+        .scene = "courtyard", .directory = directory, .points = points, .seed = 1, .noise = -1, .threads = 2};
 }
 
 static uint64_t scan(struct spl_synth_options o)
@@ -153,8 +153,8 @@ static void check_truth(const char *directory, uint64_t points, double sigma)
             int rgb[3];
             float stored[3];
             struct spl_hit h;
-            assert_int_equal(fscanf(ptx, "%lf %lf %lf %lf %d %d %d", &x[0], &x[1], &x[2], &intensity, &rgb[0], &rgb[1],
-                                    &rgb[2]), 7);
+            assert_int_equal(
+                fscanf(ptx, "%lf %lf %lf %lf %d %d %d", &x[0], &x[1], &x[2], &intensity, &rgb[0], &rgb[1], &rgb[2]), 7);
             assert_true(intensity >= 0 && intensity <= 1);
             if (x[0] == 0 && x[1] == 0 && x[2] == 0) {
                 assert_true(intensity == 0.5 && !rgb[0] && !rgb[1] && !rgb[2]);

@@ -33,7 +33,6 @@ static double hit(const struct spl_scene *scene, const double o[3], const double
 static void unbuild(struct spl_scene *scene)
 {
     free(scene->primitives);
-    free(scene->materials);
     free(scene->objects);
     free(scene->stations);
 }
@@ -50,9 +49,9 @@ static void plane_shapes_end_where_they_should(void **state)
     assert_near(hit(&s, (double[3]){1.499999, 2.249999, 4}, down), 1, 1e-15);
     assert_true(isnan(hit(&s, (double[3]){1.500001, 2, 4}, down)));
     assert_true(isnan(hit(&s, (double[3]){1, 2.250001, 4}, down)));
-    assert_true(isnan(hit(&s, (double[3]){1, 2, 4}, z)));  /* behind the origin */
-    assert_true(isnan(hit(&s, (double[3]){0, 2, 4}, x)));  /* parallel */
-    assert_true(isnan(hit(&s, (double[3]){0, 2, 3}, x)));  /* in the plane */
+    assert_true(isnan(hit(&s, (double[3]){1, 2, 4}, z))); /* behind the origin */
+    assert_true(isnan(hit(&s, (double[3]){0, 2, 4}, x))); /* parallel */
+    assert_true(isnan(hit(&s, (double[3]){0, 2, 3}, x))); /* in the plane */
     spl_build_disc(&s, (struct spl_skin){0}, (double[3]){1, 2, 3}, (double[3]){0, 0, 5}, 0.5);
     assert_near(hit(&s, (double[3]){1.3, 2.39, 7}, down), 4, 1e-15);
     assert_true(isnan(hit(&s, (double[3]){1.4, 2.4, 7}, down)));
@@ -76,14 +75,14 @@ static void round_shapes_are_exact_from_near_and_far(void **state)
     assert_near(hit(&s, (double[3]){0, 0.0024, 0.5}, x), 10 - 0.0032, 1e-12);
     assert_near(hit(&s, (double[3]){-1e6, 0.0024, 0.5}, x), 1e6 + 10 - 0.0032, 1e-9);
     assert_near(hit(&s, (double[3]){10, 0, 0}, x), 0.004, 1e-12);
-    assert_true(isnan(hit(&s, (double[3]){0, 0, 1.001}, x)));  /* beyond its end */
+    assert_true(isnan(hit(&s, (double[3]){0, 0, 1.001}, x)));                  /* beyond its end */
     assert_true(isnan(hit(&s, (double[3]){10, 0, -5}, (double[3]){0, 0, 1}))); /* through the open ends */
     assert_true(isnan(hit(&s, (double[3]){10.003, 0, -5}, (double[3]){0, 0, 1})));
 
     spl_build_cone(&s, (struct spl_skin){0}, (double[3]){10, 0, 0}, (double[3]){10, 0, 4}, 2, 0);
     assert_near(hit(&s, (double[3]){0, 0, 1}, x), 8.5, 1e-14);
     assert_near(hit(&s, (double[3]){0, 0, 3}, x), 9.5, 1e-14);
-    assert_true(isnan(hit(&s, (double[3]){0, 0, 4.5}, x)));    /* not its mirror image above the tip */
+    assert_true(isnan(hit(&s, (double[3]){0, 0, 4.5}, x))); /* not its mirror image above the tip */
     assert_near(hit(&s, (double[3]){11, 0, 9}, (double[3]){0, 0, -1}), 7, 1e-14);
     double normal[3];
     spl_primitive_normal(&s.primitives[s.primitive_count - 1], (double[3]){8.5, 0, 1}, normal);
@@ -154,7 +153,8 @@ static void hierarchy_agrees_with_every_primitive(void **state)
     struct spl_scene *scene = courtyard();
     uint64_t random = 77;
     for (int n = 0; n < 3000; n++) {
-        double o[3] = {random_between(&random, -12, 12), random_between(&random, -10, 10), random_between(&random, 0, 9)};
+        double o[3] = {random_between(&random, -12, 12), random_between(&random, -10, 10),
+                       random_between(&random, 0, 9)};
         double d[3] = {random_between(&random, -1, 1), random_between(&random, -1, 1), random_between(&random, -1, 1)};
         switch (n % 8) { /* the awkward ones: parallel to the axes, in a wall's or the ground's plane, from far away */
         case 0:
@@ -268,7 +268,7 @@ static void textures_are_band_limited_and_do_not_repeat(void **state)
     };
     const double step = 0.0002;
     enum { steps = 10000 };
-    uint8_t (*colors)[3] = calloc(steps, sizeof *colors);
+    uint8_t(*colors)[3] = calloc(steps, sizeof *colors);
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
         int distinct = 0, repeated = 0;
         size_t period = (size_t)llround(lines[i].period / step);
