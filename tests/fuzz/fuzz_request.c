@@ -1,0 +1,30 @@
+/* The request parser: the first byte chooses query or JSON, the rest is the request. Whatever is accepted must be a view
+ * that the renderer takes, within the limits. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "service/request.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const struct spl_view_defaults defaults = {
+        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};
+    static const struct spl_view_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    struct spl_view_request request;
+    struct spl_error err = {0};
+    if (!size)
+        return 0;
+    const char *text = (const char *)data + 1;
+    int rc = data[0] == '?' ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
+                            : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);
+    if (rc ? err.code != rc || !err.message[0] : err.code != 0)
+        abort();
+    const struct spl_camera *camera = &request.view.camera;
+    if (!rc && (spl_view_check(&request.view, &err) || camera->width > limits.side_px || camera->height > limits.side_px ||
+                (uint64_t)camera->width * camera->height > limits.pixels || request.view.layers != 1u << request.layer))
+        abort();
+    return 0;
+}
