@@ -14,10 +14,11 @@
 static void usage(FILE *out)
 {
     fprintf(out,
-            "usage: splatd synth SCENE [--points N] [--seed S] [--noise SIGMA] [--format ptx,ply] [--threads N] -o DIR\n"
+            "usage: splatd synth SCENE [--points N] [--seed S] [--noise SIGMA] [--format LIST] [--threads N] -o DIR\n"
             "       splatd synth --list\n\n"
             "Scans an analytic scene from its stations and writes DIR/SCENE.ptx (structured, one pose a station) and\n"
-            "DIR/SCENE.ply (all stations, world coordinates). Equal arguments give equal files on any number of threads.\n\n"
+            "DIR/SCENE.ply (all stations, world coordinates). Equal arguments give equal files on any number of\n"
+            "threads.\n\n"
             "A scan to play with, packed:\n"
             "  splatd synth courtyard -o scan && splatd pack scan/courtyard.ptx -o courtyard.spld\n"
             "Five million points, another noise pattern, PTX only:\n"

@@ -16,7 +16,8 @@ struct spl_bvh_node {
     uint16_t axis;       /* along which the children were parted */
 };
 
-/* Reorders `primitives` (count >= 1) so that each leaf's lie together. *nodes belongs to the caller, released with free(). */
+/* Reorders `primitives` (count >= 1) so that each leaf's lie together. *nodes belongs to the caller, released
+ * with free(). */
 int spl_bvh_build(struct spl_primitive *primitives, size_t count, struct spl_bvh_node **nodes, struct spl_error *err);
 
 /* The nearest hit with 0 < t < *t: updates *t and the index. */

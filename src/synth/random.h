@@ -1,5 +1,5 @@
-/* Counter-based random numbers: a value depends on what it is for, never on how many were drawn before, so a scan is the
- * same for any number of threads. The mixer is splitmix64's finaliser. */
+/* Counter-based random numbers: a value depends on what it is for, never on how many were drawn before, so a scan is
+ * the same for any number of threads. The mixer is splitmix64's finaliser. */
 #ifndef SPL_SYNTH_RANDOM_H
 #define SPL_SYNTH_RANDOM_H
 

@@ -18,7 +18,8 @@ struct spl_return {
 };
 
 /* The grid whose number of returns comes within 2 % of `points` (1e3 .. 1e10), found by casting it, or a coarse one
- * where it is fine enough for that to tell. Uses `threads` threads (0 = all cores); the result does not depend on them. */
+ * where it is fine enough for that to tell. Uses `threads` threads (0 = all cores); the result does not depend on
+ * them. */
 struct spl_scan_grid spl_scanner_fit(const struct spl_scene *scene, uint64_t points, unsigned threads);
 
 /* The cell's measurement. The noise depends on (seed, station, column, row) alone. Any thread. */

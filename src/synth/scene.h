@@ -45,7 +45,8 @@ struct spl_hit {
 int spl_scene_create(const char *name, struct spl_scene **out, struct spl_error *err);
 void spl_scene_destroy(struct spl_scene *scene); /* NULL-safe */
 
-/* The first surface along origin + t direction, t > 0 (a direction of any length but 0); false (hit untouched) for sky. */
+/* The first surface along origin + t direction, t > 0 (a direction of any length but 0); false for sky, and *hit is
+ * untouched. */
 bool spl_scene_hit(const struct spl_scene *scene, const double origin[3], const double direction[3],
                    struct spl_hit *hit);
 

@@ -1,5 +1,5 @@
 /* A scan, streamed: a batch of grid columns is cast and formatted by all threads, each column into its own slot, and
- * written in order by the caller's thread. So the files are the same for any number of threads, and memory stays small. */
+ * written in order by the caller's thread: the files are the same for any number of threads, and memory stays small. */
 #include <splatd/synth.h>
 
 #include <errno.h>
