@@ -1,0 +1,157 @@
+/* Opening a packed dataset: the file is mapped read-only, then checked from the outside in (sections.c, meta.c,
+ * structure.c) before anyone else sees it. After that nothing changes, so every accessor runs on any thread. What is
+ * trusted without a look is only the pages' codes, and any code decodes to finite numbers. */
+#include "dataset/dataset.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/memory.h"
+#include "dataset/open.h"
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
+
+/* The id is the file's name without folder and extension; it becomes part of URLs, so it is kept plain. */
+static int set_id(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const char *slash = strrchr(dataset->path, '/'), *stem = slash ? slash + 1 : dataset->path;
+    const char *dot = strrchr(stem, '.');
+    size_t length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
+    static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+    if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, allowed) < length)
+        return spl_fail(err, SPL_E_INPUT,
+                        "%s: '%.*s' cannot be a dataset's id; rename the file to at most %zu letters, digits, '.', '_' "
+                        "and '-', the first of them not a '.'",
+                        dataset->path, (int)length, stem, sizeof dataset->info.id - 1);
+    memcpy(dataset->info.id, stem, length);
+    return SPL_OK;
+}
+
+static int map_file(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct stat status;
+    int fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), rc = SPL_OK;
+    if (fd < 0 && errno == ENOENT)
+        return spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", dataset->path);
+    if (fd < 0)
+        return spl_fail_errno(err, errno, "cannot open %s", dataset->path);
+    if (fstat(fd, &status))
+        rc = spl_fail_errno(err, errno, "cannot examine %s", dataset->path);
+    else if (!S_ISREG(status.st_mode))
+        rc = spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
+    else if (status.st_size == 0)
+        rc = spl_fail(err, SPL_E_INPUT, "%s is empty", dataset->path);
+    if (!rc) {
+        void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, fd, 0);
+        if (map == MAP_FAILED) {
+            rc = spl_fail_errno(err, errno, "cannot map %s", dataset->path);
+        } else {
+            dataset->map = map;
+            dataset->map_bytes = (size_t)status.st_size;
+            dataset->info.file_bytes = dataset->map_bytes;
+        }
+    }
+    close(fd);
+    return rc;
+}
+
+int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
+{
+    *out = NULL;
+    struct spl_dataset *dataset = spl_alloc(1, sizeof *dataset, err);
+    if (!dataset)
+        return SPL_E_NOMEM;
+    int rc = SPL_E_NOMEM;
+    dataset->path = spl_alloc_raw(strlen(path) + 1, 1, err);
+    if (!dataset->path)
+        goto done;
+    strcpy(dataset->path, path);
+    rc = map_file(dataset, err);
+    if (!rc)
+        rc = spl_dataset_read_sections(dataset, verify, err);
+    if (!rc)
+        rc = spl_dataset_read_meta(dataset, err);
+    if (!rc)
+        rc = spl_dataset_check_structure(dataset, err);
+    if (!rc)
+        rc = set_id(dataset, err);
+done:
+    if (rc)
+        spl_dataset_close(dataset);
+    else
+        *out = dataset;
+    return rc;
+}
+
+void spl_dataset_close(struct spl_dataset *dataset)
+{
+    if (!dataset)
+        return;
+    if (dataset->map)
+        munmap((void *)dataset->map, dataset->map_bytes);
+    json_decref(dataset->meta);
+    free(dataset->pages);
+    free(dataset->path);
+    free(dataset);
+}
+
+const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset)
+{
+    return &dataset->info;
+}
+
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count)
+{
+    *count = dataset->info.nodes;
+    return dataset->nodes;
+}
+
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count)
+{
+    *count = dataset->info.chunks;
+    return dataset->chunks;
+}
+
+const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
+{
+    return dataset->meta;
+}
+
+const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes)
+{
+    spl_assert(index < dataset->info.pages);
+    *bytes = dataset->pages[index]->bytes;
+    return (const uint32_t *)(const void *)(dataset->map + dataset->pages[index]->offset);
+}
+
+int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
+                                   struct spl_camera *camera, struct spl_error *err)
+{
+    const struct spl_dataset_info *info = &dataset->info;
+    double square = 0;
+    for (int a = 0; a < 3; a++)
+        square += (info->bounds_max[a] - info->bounds_min[a]) * (info->bounds_max[a] - info->bounds_min[a]);
+    int rc = spl_camera_set_fov(camera, info->default_fov, width, height, err);
+    if (!rc)
+        rc = spl_camera_look_at(camera, info->default_eye, info->default_target, info->default_up, err);
+    camera->near = fmax(1e-4 * sqrt(square), info->splat_radius);
+    camera->far = INFINITY;
+    return rc;
+}
+
+const char *spl_attribute_name(enum spl_attribute attribute)
+{
+    static const char *const names[SPL_ATTRIBUTE_COUNT] = {
+        [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
+        [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
+        [SPL_ATTRIBUTE_CLASS] = "class",       [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
+        [SPL_ATTRIBUTE_CHUNK] = "chunk",
+    };
+    return names[attribute];
+}
