@@ -18,7 +18,7 @@ const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,
- *   "uncertainty": bool}, "bits" {attribute name: int}, "sources" [string], "pack" {...} (free: settings, statistics),
- *   "stations" [[16 reals: row-major station-to-world]] (optional). */
+ *   "uncertainty": bool}, "sources" [string], "pack" {...} (optional, free: settings, statistics), "stations"
+ *   [[16 reals: row-major station-to-world]] (optional). */
 
 #endif

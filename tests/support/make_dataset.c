@@ -1,0 +1,196 @@
+/* A packer without any packing: consecutive splats become chunks, boxes come from what the chunks decode to. */
+#include "support/make_dataset.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <jansson.h>
+
+#include "base/error.h"
+#include "dataset/chunk.h"
+#include "dataset/writer.h"
+
+enum { node_splats_max = SPL_NODE_CHUNKS_MAX * SPL_CHUNK_SPLATS };
+
+struct build {
+    struct spl_dataset_writer *writer;
+    struct spl_node nodes[9];
+    uint32_t node_count;
+    struct spl_chunk *chunks;
+    size_t chunk_count, chunk_capacity;
+    uint32_t splats;
+};
+
+static void must(int rc, const struct spl_error *err)
+{
+    if (!rc)
+        return;
+    fprintf(stderr, "make_dataset: %s\n", err->message);
+    abort();
+}
+
+static void *must_have(void *p)
+{
+    must(p ? 0 : -1, &(struct spl_error){.message = "out of memory"});
+    return p;
+}
+
+/* Writes `count` splats as the node's chunks and sets what follows from them. */
+static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count)
+{
+    static const struct spl_chunk_options options = {.position_error = 0.016, .normal_error = M_PI / 180,
+                                                     .radius_error = 0.05, .has_class = true, .has_uncertainty = true};
+    size_t chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS, used = 0;
+    spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity);
+    uint32_t *words = must_have(malloc(chunk_count * SPL_CHUNK_WORDS_MAX * sizeof *words));
+    struct spl_chunk *chunks = b->chunks + b->chunk_count;
+    double radius_sum = 0;
+    for (int a = 0; a < 3; a++) {
+        node->box_min[a] = FLT_MAX;
+        node->box_max[a] = -FLT_MAX;
+    }
+    for (size_t c = 0; c < chunk_count; c++) {
+        struct spl_splat part[SPL_CHUNK_SPLATS];
+        double position[SPL_CHUNK_SPLATS][3];
+        const struct make_splat *from = splats + c * SPL_CHUNK_SPLATS;
+        size_t left = count - c * SPL_CHUNK_SPLATS;
+        uint32_t n = left < SPL_CHUNK_SPLATS ? (uint32_t)left : SPL_CHUNK_SPLATS;
+        for (uint32_t i = 0; i < n; i++) {
+            part[i] = (struct spl_splat){.radius = from[i].radius, .uncertainty = from[i].uncertainty,
+                                         .classification = from[i].classification};
+            memcpy(part[i].normal, from[i].normal, sizeof part[i].normal);
+            memcpy(part[i].color, from[i].color, sizeof part[i].color);
+            for (int a = 0; a < 3; a++)
+                position[i][a] = from[i].position[a] - node->origin[a];
+        }
+        uint32_t length = spl_chunk_encode(part, (const double(*)[3])position, n, &options, &chunks[c], words + used, NULL);
+        for (uint32_t i = 0; i < n; i++) {
+            struct spl_splat out;
+            spl_chunk_decode(&chunks[c], words + used, i, &out);
+            radius_sum += out.radius;
+            for (int a = 0; a < 3; a++) {
+                node->box_min[a] = fminf(node->box_min[a], out.position[a] - out.radius);
+                node->box_max[a] = fmaxf(node->box_max[a], out.position[a] + out.radius);
+            }
+        }
+        chunks[c].geometry_word = (uint32_t)used;
+        chunks[c].first_id = b->splats;
+        b->splats += n;
+        used += length;
+    }
+    struct spl_error err = {0};
+    must(spl_dataset_writer_add_node(b->writer, words, used, chunks, chunk_count, &node->page, &err), &err);
+    node->spacing = (float)(radius_sum / (double)count / SPL_RADIUS_SPACING);
+    node->first_chunk = (uint32_t)b->chunk_count;
+    node->chunk_count = (uint32_t)chunk_count;
+    b->chunk_count += chunk_count;
+    free(words);
+}
+
+/* The root's selection, then one child for each octant that holds splats. */
+static void add_two_levels(struct build *b, const struct make_splat *splats, size_t count)
+{
+    size_t stride = count < 8 ? 1 : 8, kept = 0, all = 0;
+    struct make_splat *part = must_have(malloc(count * sizeof *part));
+    for (size_t i = 0; i < count; i += stride) {
+        part[kept] = splats[i];
+        part[kept++].radius *= sqrtf((float)stride);
+    }
+    struct spl_node *root = &b->nodes[0];
+    add_node(b, root, part, kept);
+    root->first_child = 1;
+    for (unsigned octant = 0; octant < 8; octant++) {
+        struct spl_node *child = &b->nodes[1 + root->child_count];
+        *child = (struct spl_node){.size = 0.5f * root->size, .depth = 1};
+        for (int a = 0; a < 3; a++)
+            child->origin[a] = root->origin[a] + (octant >> a & 1) * 0.5 * root->size;
+        kept = 0;
+        for (size_t i = 0; i < count; i++) {
+            unsigned at = 0;
+            for (int a = 0; a < 3; a++)
+                at |= (splats[i].position[a] >= root->origin[a] + 0.5 * root->size ? 1u : 0u) << a;
+            if (at == octant)
+                part[kept++] = splats[i];
+        }
+        all += kept;
+        if (kept == 0)
+            continue;
+        add_node(b, child, part, kept);
+        root->child_count++;
+        for (int a = 0; a < 3; a++) {
+            float shift = (float)(child->origin[a] - root->origin[a]);
+            root->box_min[a] = fminf(root->box_min[a], child->box_min[a] + shift);
+            root->box_max[a] = fmaxf(root->box_max[a], child->box_max[a] + shift);
+        }
+    }
+    spl_assert(all == count);
+    b->node_count = 1 + root->child_count;
+    free(part);
+}
+
+void make_dataset_file(const char *path, const struct make_splat *splats, size_t count, int levels)
+{
+    struct build b = {.node_count = 1, .chunk_capacity = 2 * (count / SPL_CHUNK_SPLATS) + 10};
+    double low[3], high[3], middle[3], size = 1e-3;
+    b.chunks = must_have(malloc(b.chunk_capacity * sizeof *b.chunks));
+    for (int a = 0; a < 3; a++) {
+        low[a] = high[a] = splats[0].position[a];
+        for (size_t i = 1; i < count; i++) {
+            low[a] = fmin(low[a], splats[i].position[a]);
+            high[a] = fmax(high[a], splats[i].position[a]);
+        }
+        middle[a] = 0.5 * (low[a] + high[a]);
+        size = fmax(size, high[a] - low[a]);
+    }
+    b.nodes[0].size = (float)(size * 1.000001);
+    memcpy(b.nodes[0].origin, low, sizeof low);
+    struct spl_error err = {0};
+    must(spl_dataset_writer_create(path, &b.writer, &err), &err);
+    if (levels == 1)
+        add_node(&b, &b.nodes[0], splats, count);
+    else
+        add_two_levels(&b, splats, count);
+    json_t *meta = json_pack(
+        "{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b, s:b, s:b}, s:[s], s:{}}",
+        "points", (json_int_t)count, "leaf_splats", (json_int_t)count, "levels", levels, "splat_radius",
+        (double)splats[count / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1], high[2],
+        "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target", middle[0], middle[1],
+        middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "class", 1, "uncertainty", 1, "sources",
+        "made by a test", "pack");
+    must_have(meta);
+    must(spl_dataset_writer_finish(b.writer, b.nodes, b.node_count, b.chunks, b.chunk_count, meta, &err), &err);
+    json_decref(meta);
+    spl_dataset_writer_destroy(b.writer);
+    free(b.chunks);
+}
+
+void make_folder(char *path)
+{
+    const char *parent = getenv("TMPDIR");
+    snprintf(path, 256, "%s/splatd-test-XXXXXX", parent ? parent : "/tmp");
+    must_have(mkdtemp(path));
+}
+
+struct spl_dataset *make_dataset_levels(const struct make_splat *splats, size_t count, int levels)
+{
+    char folder[256], path[300];
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/made.spld", folder);
+    make_dataset_file(path, splats, count, levels);
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    int rc = spl_dataset_open(path, true, &dataset, &err);
+    unlink(path);
+    rmdir(folder);
+    must(rc, &err);
+    return dataset;
+}
+
+struct spl_dataset *make_dataset(const struct make_splat *splats, size_t count)
+{
+    return make_dataset_levels(splats, count, count <= node_splats_max ? 1 : 2);
+}

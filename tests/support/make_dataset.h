@@ -1,0 +1,33 @@
+/* Small datasets for tests, straight from an array of splats. Anything that goes wrong ends the test program. */
+#ifndef TEST_SUPPORT_MAKE_DATASET_H
+#define TEST_SUPPORT_MAKE_DATASET_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <splatd/dataset.h>
+
+struct make_splat {
+    double position[3];   /* world */
+    float normal[3];      /* unit */
+    float radius;
+    uint8_t color[3];
+    uint8_t classification;
+    float uncertainty;
+};
+
+/* Writes `count` (> 0) splats to `path` at default errors, with classes and uncertainties.
+ * One level: a single node that keeps the order given, so that a splat's id is its index (at most 524,288 splats).
+ * Two levels: the root holds every k-th splat, k <= 8, of radius * sqrt(k); its children are the cube's octants (their
+ * splats in the order given), of at most 524,288 splats each. */
+void make_dataset_file(const char *path, const struct make_splat *splats, size_t count, int levels);
+
+/* The same as an open dataset of id "made" whose file is gone already; one level where that holds all splats. */
+struct spl_dataset *make_dataset(const struct make_splat *splats, size_t count);
+struct spl_dataset *make_dataset_levels(const struct make_splat *splats, size_t count, int levels);
+
+/* A new folder for a test's files: mkdtemp's name in `path`, which has room for 256 bytes. */
+void make_folder(char *path);
+
+#endif
