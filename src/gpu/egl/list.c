@@ -132,7 +132,7 @@ static void describe(struct gl_gpu *gpu)
 
 bool gl_context_open(uint32_t index, bool debug, struct gl_gpu *gpu, struct spl_error *err)
 {
-    gpu->base.info = (struct spl_device_info){.backend = "egl", .index = index, .name = "unknown"};
+    gpu->base.info = (struct spl_device_info){.backend = "egl", .index = index, .name = "none"};
     if (!get_display(index, &gpu->display, err))
         return false;
     if (gpu->display == EGL_NO_DISPLAY)
