@@ -34,13 +34,12 @@ struct spl_gpu_kernel {
 
 struct spl_gpu_backend;
 
-/* First member of each backend's device. The backend's open fills info, limits (memory_bytes = the device's) and
- * complaints; everything else is gpu.c's. */
+/* First member of each backend's device. The backend's open fills info, limits (memory_bytes = the
+ * device's); everything else is gpu.c's. */
 struct spl_gpu {
     const struct spl_gpu_backend *backend;
     struct spl_device_info info;
     struct spl_gpu_limits limits;
-    uint64_t complaints;         /* messages of validation layers or GL debug output */
     uint64_t timestamps_ns[SPL_GPU_TIMESTAMPS_MAX]; /* filled by the backend's wait */
     uint64_t memory;             /* bytes of live buffers */
     uint32_t buffers, kernels;   /* live */
@@ -82,6 +81,9 @@ extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;
 
 /* Runs and checks the self-test kernels; SPL_E_NO_DEVICE names what differed. */
 int spl_gpu_selftest(struct spl_gpu *gpu, struct spl_error *err);
+
+/* Logs and counts a message of a validation layer or of GL debug output. Any thread. */
+void spl_gpu_complain(const char *backend, bool error, const char *message);
 
 /* Bytes of host memory that this process may use (physical or its cgroup's): the memory of a software device. */
 uint64_t spl_gpu_host_memory(void);

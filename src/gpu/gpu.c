@@ -6,10 +6,13 @@
 #include "gpu/backend.h"
 
 #include <inttypes.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/log.h"
+
+static _Atomic uint64_t complaints; /* of the process: closing a device may bring some, when nobody holds it any more */
 
 static int lost(struct spl_gpu *gpu, struct spl_error *err)
 {
@@ -32,9 +35,15 @@ uint64_t spl_gpu_get_memory(const struct spl_gpu *gpu)
     return gpu->memory;
 }
 
-uint64_t spl_gpu_get_complaints(const struct spl_gpu *gpu)
+uint64_t spl_gpu_count_complaints(void)
 {
-    return gpu->complaints;
+    return atomic_load(&complaints);
+}
+
+void spl_gpu_complain(const char *backend, bool error, const char *message)
+{
+    atomic_fetch_add(&complaints, 1);
+    spl_log(error ? SPL_LOG_ERROR : SPL_LOG_WARN, "%s: %s", backend, message);
 }
 
 /* Waits once for everything submitted (a missed deadline leaves work running) and says whether it never ended: then

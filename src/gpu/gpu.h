@@ -46,7 +46,9 @@ void spl_gpu_close(struct spl_gpu *gpu); /* NULL-safe; waits (bounded) for what 
 const struct spl_device_info *spl_gpu_get_device(const struct spl_gpu *gpu);
 const struct spl_gpu_limits *spl_gpu_get_limits(const struct spl_gpu *gpu);
 uint64_t spl_gpu_get_memory(const struct spl_gpu *gpu); /* bytes of all live buffers */
-uint64_t spl_gpu_get_complaints(const struct spl_gpu *gpu); /* with options.debug: warnings and errors of the driver */
+
+/* Warnings and errors of validation layers and GL debug output since the process began; any thread. */
+uint64_t spl_gpu_count_complaints(void);
 
 /* Every device of every backend, unusable ones with a reason; returns how many there are, writes at most capacity. */
 size_t spl_gpu_list(struct spl_device_info *devices, size_t capacity);

@@ -3,7 +3,6 @@
 
 #include <stdlib.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 
 /* Tokens of GL_NVX_gpu_memory_info, GL_ATI_meminfo and GL_KHR_shader_subgroup; memory is in KiB. */
@@ -27,12 +26,11 @@ static void APIENTRY on_message(GLenum source, GLenum type, GLuint id, GLenum se
     (void)source;
     (void)id;
     (void)length;
-    struct gl_gpu *gpu = (struct gl_gpu *)context;
+    (void)context;
     if (severity == GL_DEBUG_SEVERITY_NOTIFICATION || type == GL_DEBUG_TYPE_PERFORMANCE ||
         type == GL_DEBUG_TYPE_OTHER)
         return;
-    gpu->base.complaints++;
-    spl_log(type == GL_DEBUG_TYPE_ERROR ? SPL_LOG_ERROR : SPL_LOG_WARN, "egl: %s", message);
+    spl_gpu_complain("egl", type == GL_DEBUG_TYPE_ERROR, message);
 }
 
 static void read_limits(struct gl_gpu *gpu)
@@ -78,7 +76,7 @@ static int gl_open(uint32_t index, const struct spl_gpu_options *options, struct
         if (options->debug) {
             gpu->gl.Enable(GL_DEBUG_OUTPUT);
             gpu->gl.Enable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
-            gpu->gl.DebugMessageCallback(on_message, gpu);
+            gpu->gl.DebugMessageCallback(on_message, NULL);
         }
         read_limits(gpu);
         gl_frames_init(gpu);

@@ -142,7 +142,7 @@ static int vk_open(uint32_t index, const struct spl_gpu_options *options, struct
     if (!gpu)
         return SPL_E_NOMEM;
     gpu->base.backend = &spl_gpu_vulkan;
-    int code = vk_instance_create(options->debug, gpu, &gpu->instance, err);
+    int code = vk_instance_create(options->debug, &gpu->instance, &gpu->messenger, err);
     if (code < 0)
         goto failed;
     if (!vk_device_get(gpu->instance, index, &gpu->physical, &gpu->base.info, &gpu->family)) {

@@ -52,13 +52,11 @@ static VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlag
                                                  const VkDebugUtilsMessengerCallbackDataEXT *data, void *context)
 {
     (void)types;
-    struct vk_gpu *gpu = context;
+    (void)context;
     /* The loader's own remarks about other drivers are not about what we do. */
     if (data->pMessageIdName && !strncmp(data->pMessageIdName, "Loader", 6))
         return VK_FALSE;
-    gpu->base.complaints++;
-    spl_log(severity & VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT ? SPL_LOG_ERROR : SPL_LOG_WARN, "vulkan: %s",
-            data->pMessage);
+    spl_gpu_complain("vulkan", severity & VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT, data->pMessage);
     return VK_FALSE;
 }
 
@@ -74,7 +72,7 @@ static bool has_layer(const char *name)
     return false;
 }
 
-int vk_instance_create(bool debug, struct vk_gpu *owner, VkInstance *out, struct spl_error *err)
+int vk_instance_create(bool debug, VkInstance *out, VkDebugUtilsMessengerEXT *messenger, struct spl_error *err)
 {
     static const char *const layer = "VK_LAYER_KHRONOS_validation", *const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
     uint32_t version = 0;
@@ -85,19 +83,18 @@ int vk_instance_create(bool debug, struct vk_gpu *owner, VkInstance *out, struct
         spl_log_warn("%s is not installed (Debian: vulkan-validationlayers); rendering goes on unchecked", layer);
         debug = false;
     }
-    VkDebugUtilsMessengerCreateInfoEXT messenger = {
+    VkDebugUtilsMessengerCreateInfoEXT reports = {
         .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
         .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
                            VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
         .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT |
                        VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
         .pfnUserCallback = on_message,
-        .pUserData = owner,
     };
     VkResult result = vkCreateInstance(
         &(VkInstanceCreateInfo){
             .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
-            .pNext = debug ? &messenger : NULL,
+            .pNext = debug ? &reports : NULL,
             .pApplicationInfo = &(VkApplicationInfo){.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                                      .pApplicationName = "splatd",
                                                      .apiVersion = VK_API_VERSION_1_3},
@@ -112,7 +109,7 @@ int vk_instance_create(bool debug, struct vk_gpu *owner, VkInstance *out, struct
     if (debug) {
         PFN_vkCreateDebugUtilsMessengerEXT create =
             (PFN_vkCreateDebugUtilsMessengerEXT)vkGetInstanceProcAddr(*out, "vkCreateDebugUtilsMessengerEXT");
-        create(*out, &messenger, NULL, &owner->messenger);
+        create(*out, &reports, NULL, messenger);
     }
     return 0;
 }
@@ -178,10 +175,9 @@ size_t vk_list(struct spl_device_info *devices, size_t capacity)
 {
     struct spl_error err = {0};
     struct spl_device_info info = {.backend = "vulkan", .name = "none"};
-    struct vk_gpu owner = {0};
     VkInstance instance = VK_NULL_HANDLE;
     size_t count = 0;
-    if (vk_instance_create(false, &owner, &instance, &err) < 0) {
+    if (vk_instance_create(false, &instance, NULL, &err) < 0) {
         snprintf(info.unusable, sizeof info.unusable, "%.*s", (int)sizeof info.unusable - 1, err.message);
         if (capacity)
             devices[0] = info;

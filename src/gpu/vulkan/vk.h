@@ -51,7 +51,8 @@ struct vk_kernel {
 /* list.c. Fills `err` with `what` and the name of `result`; the code is SPL_E_DEVICE_LOST for a lost device, else
  * `code`. */
 int vk_fail(struct spl_error *err, int code, VkResult result, const char *what);
-int vk_instance_create(bool debug, struct vk_gpu *owner, VkInstance *out, struct spl_error *err);
+/* With `debug`, and where the layer is installed, also a messenger (else it stays as it is). */
+int vk_instance_create(bool debug, VkInstance *out, VkDebugUtilsMessengerEXT *messenger, struct spl_error *err);
 /* The index-th device, judged; `family` may be NULL. False past the end. */
 bool vk_device_get(VkInstance instance, uint32_t index, VkPhysicalDevice *out, struct spl_device_info *info,
                    uint32_t *family);
