@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <cmocka.h>
 
@@ -366,6 +367,59 @@ static void progress_ends_at_the_number_of_points(void **state)
     assert_int_equal(last.total, points);
 }
 
+/* Runs `splatd synth ARGUMENTS`; the exit code, and what came on stdout and stderr together. */
+static int run(const char *arguments, char *output, size_t bytes)
+{
+    char command[512];
+    snprintf(command, sizeof command, "(%s synth %s) 2>&1", getenv("SPLATD_BINARY"), arguments);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    size_t got = fread(output, 1, bytes - 1, pipe);
+    output[got] = 0;
+    int status = pclose(pipe);
+    assert_true(WIFEXITED(status));
+    return WEXITSTATUS(status);
+}
+
+static void the_command_line_names_what_is_wrong(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *arguments, *says;
+    } bad[] = {
+        {"", "one SCENE"},
+        {"courtyard courtyard -o x", "one SCENE"},
+        {"courtyard", "-o DIR"},
+        {"nowhere -o x", "courtyard"},
+        {"courtyard -o x --points 5.5", "--points"},
+        {"courtyard -o x --points 5k", "--points"},
+        {"courtyard -o x --points -5", "--points"},
+        {"courtyard -o x --points 1e12", "points"},
+        {"courtyard -o x --seed 1.5", "--seed"},
+        {"courtyard -o x --noise nan", "--noise"},
+        {"courtyard -o x --noise -1", "--noise"},
+        {"courtyard -o x --threads 0", "--threads"},
+        {"courtyard -o x --format e57", "e57"},
+        {"courtyard --output", "--help"},
+    };
+    char output[4096], arguments[256], expected[256];
+    if (!getenv("SPLATD_BINARY"))
+        skip();
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        int code = run(bad[i].arguments, output, sizeof output);
+        if (code != 2 || !strstr(output, bad[i].says))
+            fail_msg("'%s' exits with %d and says: %s", bad[i].arguments, code, output);
+    }
+    assert_int_equal(run("--list", output, sizeof output), 0);
+    assert_non_null(strstr(output, "courtyard "));
+    assert_int_equal(run("--help", output, sizeof output), 0);
+    assert_non_null(strstr(output, "splatd synth courtyard"));
+    snprintf(arguments, sizeof arguments, "courtyard -n 1e3 --format ply -o %s 2>/dev/null", in_folder("command"));
+    snprintf(expected, sizeof expected, "%s\n", in_folder("command/courtyard.ply"));
+    assert_int_equal(run(arguments, output, sizeof output), 0);
+    assert_string_equal(output, expected);
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -391,6 +445,7 @@ int main(void)
         cmocka_unit_test(a_full_disk_keeps_the_old_files),
         cmocka_unit_test(refused_memory_leaves_nothing),
         cmocka_unit_test(progress_ends_at_the_number_of_points),
+        cmocka_unit_test(the_command_line_names_what_is_wrong),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
