@@ -6,7 +6,9 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 int spl_cmd_parse_real(const char *option, const char *text, double min, double max, double *out,
                        struct spl_error *err)
@@ -61,5 +63,19 @@ int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, ui
                         text);
     *width = (uint32_t)w;
     *height = (uint32_t)h;
+    return 0;
+}
+
+int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err)
+{
+    unsigned char rgba[4] = {0, 0, 0, 255};
+    size_t digits = text[0] == '#' ? strspn(text + 1, "0123456789abcdefABCDEF") : 0;
+    if (!strcmp(text, "transparent"))
+        rgba[3] = 0;
+    else if ((digits != 6 && digits != 8) || text[1 + digits])
+        return spl_fail(err, SPL_E_USAGE, "%s takes #rrggbb, #rrggbbaa or transparent, not '%s'", option, text);
+    else
+        sscanf(text, "#%2hhx%2hhx%2hhx%2hhx", &rgba[0], &rgba[1], &rgba[2], &rgba[3]);
+    memcpy(out, rgba, sizeof rgba);
     return 0;
 }

@@ -21,4 +21,7 @@ int spl_cmd_parse_vector(const char *option, const char *text, double out[3], st
 int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height,
                        struct spl_error *err);
 
+/* "#rrggbb", "#rrggbbaa" or "transparent". */
+int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err);
+
 #endif

@@ -1,0 +1,302 @@
+/* splatd render: one view of a dataset as an image file.
+ *
+ * Options mean what the HTTP parameters of the same name mean; what is left out comes from the dataset's default view.
+ * Everything that can be refused without a device is refused before one is opened. */
+#include "cmd/cmd.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <splatd/dataset.h>
+#include <splatd/render.h>
+
+#include "cmd/options.h"
+#include "cmd/output.h"
+
+struct arguments {
+    const char *dataset, *output;
+    double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
+    uint32_t width, height;
+    int format, layer;                                               /* enum or -1 = not given */
+    bool no_verify;
+    struct spl_view view;                                            /* all but the camera */
+    struct spl_encode_options encode;
+    struct spl_renderer_options renderer;
+};
+
+static void usage(FILE *out)
+{
+    fprintf(out,
+            "usage: splatd render NAME.spld [OPTION…] -o OUT.{jpg,png,npy}\n\n"
+            "Renders one view of a packed dataset. Without a camera it is the dataset's default view.\n\n"
+            "A first look:\n"
+            "  splatd render courtyard.spld -o view.jpg\n"
+            "From a place, towards a place, metric depth in millimetres:\n"
+            "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --fov 70 --layer depth -o depth.png\n"
+            "A calibrated camera, float depth in metres, nothing = NaN:\n"
+            "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
+            "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+            "Cut out, four samples a pixel side, to another program:\n"
+            "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n"
+            "Camera, in the dataset's coordinates:\n"
+            "  --eye X,Y,Z --target X,Y,Z --up X,Y,Z    left out: the default view's\n"
+            "  --fov DEG                vertical field of view; or a pinhole in pixels:\n"
+            "  --fx F [--fy F --cx X --cy Y]            fy = fx, principal point in the middle when left out\n"
+            "  --size WxH               pixels (1280x720)\n"
+            "  --near N --far N         view depths that are drawn\n"
+            "Drawing:\n"
+            "  --method splat|points    oriented discs, or one pixel a splat (splat)\n"
+            "  --layer LAYER            color, depth (along the viewing axis), range (along the ray), normal, id,\n"
+            "                           coverage (color)\n"
+            "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
+            "  --supersample 1|2|4      samples per pixel side (1)\n"
+            "  --background COLOUR      #rrggbb, #rrggbbaa or transparent (#000000)\n"
+            "  --margin M               depth behind the first surface that is blended, in splat radii (1)\n"
+            "File:\n"
+            "  -o, --output FILE        written in one piece; '-' is stdout and wants --format\n"
+            "  --format jpeg|png|npy|raw  when the file's ending does not say it\n"
+            "  --quality Q              of a JPEG, 1 to 100 (90)\n"
+            "  --depth-scale S          steps per unit of a depth PNG (1000)\n"
+            "Machine:\n"
+            "  --device NAME            'vulkan', 'egl', 'vulkan:1', a UUID or part of a name; 'splatd devices' lists them\n"
+            "  --require-gpu            refuse software devices\n"
+            "  --memory-limit BYTES     of device memory\n"
+            "  --no-verify              trust the file's checksums\n");
+}
+
+static int parse_name(const char *option, const char *text, int (*from_name)(const char *), int *out,
+                      struct spl_error *err)
+{
+    *out = from_name(text);
+    return *out < 0 ? spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd render --help' lists what it knows",
+                               option, text)
+                    : SPL_OK;
+}
+
+enum option_id {
+    OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_SIZE, OPT_NEAR, OPT_FAR, OPT_METHOD,
+    OPT_LAYER, OPT_LOD, OPT_SUPERSAMPLE, OPT_BACKGROUND, OPT_MARGIN, OPT_FORMAT, OPT_QUALITY, OPT_DEPTH_SCALE,
+    OPT_DEVICE, OPT_REQUIRE_GPU, OPT_MEMORY_LIMIT, OPT_NO_VERIFY,
+};
+
+static const struct option options[] = {
+    {"eye", required_argument, NULL, OPT_EYE},
+    {"target", required_argument, NULL, OPT_TARGET},
+    {"up", required_argument, NULL, OPT_UP},
+    {"fov", required_argument, NULL, OPT_FOV},
+    {"fx", required_argument, NULL, OPT_FX},
+    {"fy", required_argument, NULL, OPT_FY},
+    {"cx", required_argument, NULL, OPT_CX},
+    {"cy", required_argument, NULL, OPT_CY},
+    {"size", required_argument, NULL, OPT_SIZE},
+    {"near", required_argument, NULL, OPT_NEAR},
+    {"far", required_argument, NULL, OPT_FAR},
+    {"method", required_argument, NULL, OPT_METHOD},
+    {"layer", required_argument, NULL, OPT_LAYER},
+    {"lod", required_argument, NULL, OPT_LOD},
+    {"supersample", required_argument, NULL, OPT_SUPERSAMPLE},
+    {"background", required_argument, NULL, OPT_BACKGROUND},
+    {"margin", required_argument, NULL, OPT_MARGIN},
+    {"format", required_argument, NULL, OPT_FORMAT},
+    {"quality", required_argument, NULL, OPT_QUALITY},
+    {"depth-scale", required_argument, NULL, OPT_DEPTH_SCALE},
+    {"device", required_argument, NULL, OPT_DEVICE},
+    {"require-gpu", no_argument, NULL, OPT_REQUIRE_GPU},
+    {"memory-limit", required_argument, NULL, OPT_MEMORY_LIMIT},
+    {"no-verify", no_argument, NULL, OPT_NO_VERIFY},
+    {"output", required_argument, NULL, 'o'},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
+{
+    int rc = SPL_OK, choice = 0;
+    uint64_t count = 0;
+    switch (id) {
+    case OPT_EYE:
+        return spl_cmd_parse_vector("--eye", text, a->eye, err);
+    case OPT_TARGET:
+        return spl_cmd_parse_vector("--target", text, a->target, err);
+    case OPT_UP:
+        return spl_cmd_parse_vector("--up", text, a->up, err);
+    case OPT_FOV:
+        return spl_cmd_parse_real("--fov", text, 1e-6, 179, &a->fov, err);
+    case OPT_FX:
+        return spl_cmd_parse_real("--fx", text, 1e-6, 1e9, &a->fx, err);
+    case OPT_FY:
+        return spl_cmd_parse_real("--fy", text, 1e-6, 1e9, &a->fy, err);
+    case OPT_CX:
+        return spl_cmd_parse_real("--cx", text, -1e9, 1e9, &a->cx, err);
+    case OPT_CY:
+        return spl_cmd_parse_real("--cy", text, -1e9, 1e9, &a->cy, err);
+    case OPT_SIZE:
+        return spl_cmd_parse_size("--size", text, &a->width, &a->height, err);
+    case OPT_NEAR:
+        return spl_cmd_parse_real("--near", text, 1e-9, 1e12, &a->near, err);
+    case OPT_FAR:
+        return spl_cmd_parse_real("--far", text, 1e-9, 1e12, &a->far, err);
+    case OPT_METHOD:
+        rc = parse_name("--method", text, spl_method_from_name, &choice, err);
+        a->view.method = (enum spl_method)choice;
+        return rc;
+    case OPT_LAYER:
+        return parse_name("--layer", text, spl_layer_from_name, &a->layer, err);
+    case OPT_LOD:
+        return spl_cmd_parse_real("--lod", text, 0, 64, &a->view.lod, err);
+    case OPT_SUPERSAMPLE:
+        rc = spl_cmd_parse_count("--supersample", text, 1, 4, &count, err);
+        a->view.supersample = (uint32_t)count;
+        return rc;
+    case OPT_BACKGROUND:
+        return spl_cmd_parse_color("--background", text, a->view.background, err);
+    case OPT_MARGIN:
+        return spl_cmd_parse_real("--margin", text, 0, 16, &a->view.margin, err);
+    case OPT_FORMAT:
+        return parse_name("--format", text, spl_format_from_name, &a->format, err);
+    case OPT_QUALITY:
+        rc = spl_cmd_parse_count("--quality", text, 1, 100, &count, err);
+        a->encode.quality = (int)count;
+        return rc;
+    case OPT_DEPTH_SCALE:
+        return spl_cmd_parse_real("--depth-scale", text, 1e-6, 1e9, &a->encode.depth_scale, err);
+    case OPT_DEVICE:
+        a->renderer.device = text;
+        return SPL_OK;
+    case OPT_REQUIRE_GPU:
+        a->renderer.require_gpu = true;
+        return SPL_OK;
+    case OPT_MEMORY_LIMIT:
+        return spl_cmd_parse_count("--memory-limit", text, 1, UINT64_MAX, &a->renderer.memory_limit, err);
+    case OPT_NO_VERIFY:
+        a->no_verify = true;
+        return SPL_OK;
+    default: /* 'o' */
+        a->output = text;
+        return SPL_OK;
+    }
+}
+
+/* --format, else what stands behind the last dot. */
+static int resolve_format(struct arguments *a, struct spl_error *err)
+{
+    if (!a->output)
+        return spl_fail(err, SPL_E_USAGE, "render needs a file to write to: -o OUT.jpg, .png or .npy");
+    if (a->format < 0) {
+        const char *dot = strrchr(a->output, '.');
+        a->format = dot ? spl_format_from_name(dot + 1) : -1;
+    }
+    if (a->format < 0)
+        return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
+                        a->output);
+    a->encode.format = (enum spl_format)a->format;
+    return SPL_OK;
+}
+
+static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    struct spl_camera *camera = &a->view.camera;
+    int rc = spl_dataset_get_default_camera(dataset, a->width, a->height, camera, err);
+    if (rc)
+        return rc;
+    if (!isnan(a->fov) && !isnan(a->fx))
+        return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");
+    if (!isnan(a->fy) && isnan(a->fx))
+        return spl_fail(err, SPL_E_USAGE, "--fy is given without --fx");
+    if (!isnan(a->fov) && (rc = spl_camera_set_fov(camera, a->fov, a->width, a->height, err)))
+        return rc;
+    if (!isnan(a->fx))
+        camera->fx = camera->fy = a->fx;
+    camera->fy = isnan(a->fy) ? camera->fy : a->fy;
+    camera->cx = isnan(a->cx) ? camera->cx : a->cx;
+    camera->cy = isnan(a->cy) ? camera->cy : a->cy;
+    if (!isnan(a->eye[0]) || !isnan(a->target[0]) || !isnan(a->up[0]))
+        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? info->default_eye : a->eye,
+                                isnan(a->target[0]) ? info->default_target : a->target,
+                                isnan(a->up[0]) ? info->default_up : a->up, err);
+    if (rc)
+        return rc;
+    camera->near = isnan(a->near) ? camera->near : a->near;
+    if (!isnan(a->far))
+        camera->far = a->far;
+    else if (camera->far <= camera->near) /* only near was moved, behind the default far */
+        camera->far = INFINITY;
+    return spl_view_check(&a->view, err);
+}
+
+static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats,
+                   const struct arguments *a, const struct spl_encoded *encoded)
+{
+    fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms%s\n", device->backend, device->name,
+            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms,
+            stats->complete ? "" : "; coarser than asked for: not everything fits the memory limit");
+    if (encoded->saturated)
+        fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
+                (unsigned long long)encoded->saturated);
+    if (encoded->far > 0 && a->layer != SPL_LAYER_COVERAGE)
+        fprintf(stderr, "splatd: colours from %g (light) to %g (dark)\n", (double)encoded->near, (double)encoded->far);
+}
+
+static int render(struct arguments *a, struct spl_error *err)
+{
+    struct spl_dataset *dataset = NULL;
+    struct spl_renderer *renderer = NULL;
+    struct spl_frame frame = {0};
+    struct spl_encoded encoded = {0};
+    int rc = spl_dataset_open(a->dataset, !a->no_verify, &dataset, err);
+    if (!rc)
+        rc = resolve_camera(a, dataset, err);
+    if (!rc)
+        rc = spl_renderer_create(&a->renderer, &renderer, err);
+    if (!rc)
+        rc = spl_renderer_add(renderer, dataset, err);
+    if (!rc)
+        rc = spl_renderer_render(renderer, dataset, &a->view, &frame, err);
+    if (!rc)
+        rc = spl_image_encode(&frame.images[a->layer], &a->encode, &encoded, err);
+    if (!rc)
+        rc = spl_cmd_write_output(a->output, encoded.bytes, encoded.length, err);
+    if (!rc)
+        report(spl_renderer_get_device(renderer), &frame.stats, a, &encoded);
+    spl_encoded_finish(&encoded);
+    spl_frame_finish(&frame);
+    if (renderer && dataset)
+        spl_renderer_remove(renderer, dataset);
+    spl_renderer_destroy(renderer);
+    spl_dataset_close(dataset);
+    return rc;
+}
+
+int spl_cmd_render(int argc, char **argv)
+{
+    struct arguments a = {
+        .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
+        .near = NAN, .far = NAN, .width = 1280, .height = 720, .format = -1, .layer = SPL_LAYER_COLOR,
+    };
+    spl_view_init(&a.view);
+    struct spl_error err = {0};
+    for (int id; (id = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
+        if (id == 'h') {
+            usage(stdout);
+            return 0;
+        }
+        if (id == '?') {
+            fprintf(stderr, "'splatd render --help' shows how\n");
+            return 2;
+        }
+        if (parse_option(id, optarg, &a, &err))
+            return spl_cmd_fail(&err);
+    }
+    if (argc - optind != 1) {
+        fprintf(stderr, "splatd: render takes one dataset, NAME.spld; 'splatd render --help' shows how\n");
+        return 2;
+    }
+    a.dataset = argv[optind];
+    a.view.layers = 1u << a.layer;
+    if (resolve_format(&a, &err) || render(&a, &err))
+        return spl_cmd_fail(&err);
+    return 0;
+}
