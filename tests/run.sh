@@ -102,9 +102,9 @@ if build asan gcc "${sanitised[@]}" -Db_sanitize=address,undefined; then
 fi
 if build tsan gcc "${sanitised[@]}" -Db_sanitize=thread; then
     if sanitiser_runs thread env; then
-        timeouts=10 suites tsan http
+        timeouts=10 suites tsan unit http
     elif sanitiser_runs thread setarch -R; then
-        timeouts=10 run_under="setarch -R" suites tsan http
+        timeouts=10 run_under="setarch -R" suites tsan unit http
     else
         echo "note: no thread check, TSan does not start on this kernel"
         skipped=$((skipped + 1))
@@ -118,5 +118,20 @@ if build no-egl gcc -Degl=disabled -Doptimization=1; then
 fi
 if build clang clang; then
     suites clang unit gpu
+fi
+if [ "$mode" = --full ] && build fuzz clang "${sanitised[@]}" -Db_sanitize=address,undefined -Dfuzz=true; then
+    for fuzzer in "$out"/fuzz/tests/fuzz/fuzzer-*; do
+        [ -x "$fuzzer" ] && [ -f "$fuzzer" ] || continue
+        target=${fuzzer##*/fuzzer-} found=$out/fuzz/found-${fuzzer##*/fuzzer-}
+        mkdir -p "$found"
+        if "$fuzzer" -max_total_time=60 -artifact_prefix="$found/crash-" "$found" "tests/fuzz/corpus/$target" \
+            >"$out/fuzz-$target.log" 2>&1; then
+            passed=$((passed + 1)) verdict=passed
+        else
+            tail -40 "$out/fuzz-$target.log"
+            failed=$((failed + 1)) verdict="FAILED, input in $found"
+        fi
+        printf '%-10s %-8s %s\n' fuzz "$target" "$verdict"
+    done
 fi
 finish

@@ -131,10 +131,10 @@ void spl_reply_view(struct request *request, struct spl_job *job)
     header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", job->encoded.media_type);
     const struct spl_frame_stats *s = &job->stats;
     header(request, "Server-Timing",
-           "queue;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, resolve;dur=%.3f, readback;dur=%.3f, "
-           "encode;dur=%.3f, total;dur=%.3f",
-           job->queue_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms, s->readback_ms, job->encode_ms,
-           (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
+           "queue;dur=%.3f, frame;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, resolve;dur=%.3f, "
+           "readback;dur=%.3f, encode;dur=%.3f, total;dur=%.3f",
+           job->queue_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms, s->readback_ms,
+           job->encode_ms, (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
     add_camera(request, &job->request.view.camera);
     add_depth(request, job);
     header(request, "Splatd-Complete", "%s", s->complete ? "true" : "false");
