@@ -61,6 +61,7 @@ void put_frame()
     put(frame.first_entry);
     put(frame.weight_max);
     put(frame.background);
+    put(frame.inverse_fx), put(frame.inverse_fy), put(frame.inverse_low_pass_squared);
     put(frame.output_word);
 }
 

@@ -100,12 +100,13 @@ struct spl_frame_params {
     SPL_U32 first_entry;
     SPL_U32 weight_max;                   /* largest fragment weight; chosen so that no sum can wrap */
     SPL_U32 background;                   /* RGBA8 */
+    SPL_F32 inverse_fx, inverse_fy, inverse_low_pass_squared;
     SPL_U32 output_word;                  /* resolve: where the layer's pixels start in the output buffer */
 };
 
 #ifndef SPL_GLSL
 _Static_assert(sizeof(struct spl_draw_chunk) == 64, "spl_draw_chunk is 64 bytes on both sides");
-_Static_assert(sizeof(struct spl_frame_params) == 112, "spl_frame_params is 112 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 124, "spl_frame_params is 124 bytes on both sides");
 #endif
 
 #endif

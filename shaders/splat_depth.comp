@@ -15,16 +15,14 @@ void main()
         return;
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
-    footprint f = disc_footprint(s);
-    for (int y = f.first.y; y <= f.last.y; y++) {
-        for (int x = f.first.x; x <= f.last.x; x++) {
-            float z;
-            if (disc_sample(s, f, ivec2(x, y), z) >= 1.0)
-                continue;
-            precise float pushed = z + f.margin;
-            uint bits = floatBitsToUint(pushed), at = sample_index(ivec2(x, y));
-            if (bits < depth[at])
-                atomicMin(depth[at], bits);
+    disc d = make_disc(s);
+    ivec2 at = d.first;
+    while (at.y <= d.last.y) {
+        float z;
+        if (disc_sample(d, at, z) < 1.0) {
+            precise float pushed = z + d.margin;
+            atomicMin(depth[sample_index(at)], floatBitsToUint(pushed));
         }
+        next_sample(d, at);
     }
 }

@@ -36,6 +36,27 @@ void add(uint pair, uint a, uint b)
 }
 #endif
 
+/* One fragment: view depth z within the margin in front of `first`, the sample's pushed depth. */
+void shade(uint at, float first, float z, float distance, float pushed, uvec3 value, uint id)
+{
+    if (GROUP == SPL_SUMS_ID) {
+        if (pushed == first)
+            atomicMin(ids[at], id);
+        return;
+    }
+    precise float share = (1.0 - distance) * float(frame.weight_max);
+    uint weight = max(uint(share + 0.5), 1u);
+    if (GROUP == SPL_SUMS_DEPTH) {
+        precise float offset = (first - z) / first * 262144.0;
+        uint sum = weight * min(uint(offset + 0.5), 262143u);
+        add(2u * at, sum & 511u, sum >> 9);
+        add(2u * at + 1u, 0u, weight);
+    } else {
+        add(2u * at, weight * value.x, weight * value.y);
+        add(2u * at + 1u, weight * value.z, weight);
+    }
+}
+
 void main()
 {
     uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
@@ -49,32 +70,17 @@ void main()
         value = load_color(s);
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
-    footprint f = disc_footprint(s);
-    for (int y = f.first.y; y <= f.last.y; y++) {
-        for (int x = f.first.x; x <= f.last.x; x++) {
-            float z;
-            float distance = disc_sample(s, f, ivec2(x, y), z);
-            uint at = sample_index(ivec2(x, y));
+    disc d = make_disc(s);
+    ivec2 sample_at = d.first;
+    while (sample_at.y <= d.last.y) {
+        float z;
+        float distance = disc_sample(d, sample_at, z);
+        uint at = sample_index(sample_at);
+        if (distance < 1.0) {
             float first = uintBitsToFloat(depth[at]);
-            if (distance >= 1.0 || z > first)
-                continue;
-            if (GROUP == SPL_SUMS_ID) {
-                precise float pushed = z + f.margin;
-                if (pushed == first)
-                    atomicMin(ids[at], draw_chunks[s.chunk].first_id + s.index);
-                continue;
-            }
-            precise float share = (1.0 - distance) * float(frame.weight_max);
-            uint weight = max(uint(share + 0.5), 1u);
-            if (GROUP == SPL_SUMS_DEPTH) {
-                precise float offset = (first - z) / first * 262144.0;
-                uint sum = weight * min(uint(offset + 0.5), 262143u);
-                add(2u * at, sum & 511u, sum >> 9);
-                add(2u * at + 1u, 0u, weight);
-            } else {
-                add(2u * at, weight * value.x, weight * value.y);
-                add(2u * at + 1u, weight * value.z, weight);
-            }
+            if (z <= first)
+                shade(at, first, z, distance, z + d.margin, value, draw_chunks[s.chunk].first_id + s.index);
         }
+        next_sample(d, sample_at);
     }
 }

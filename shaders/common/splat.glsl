@@ -16,13 +16,45 @@ struct splat {
     uint index;    /* within the chunk */
 };
 
-/* `width` (0..25) bits that start `bit` bits after word `word`. */
-uint read_bits(uint word, uint bit, uint width)
+/* A run of codes in registers: a load from memory costs more than the shifts that take a code off the low end. */
+struct bit_run {
+    uint a, b, c, d;
+};
+
+/* The word that `shift` (0..31) bits further up starts in `low` and ends in `high`. */
+uint funnel(uint low, uint high, uint shift)
+{
+    return low >> shift | (high << 1) << (31u - shift);
+}
+
+/* The `length` (0..97) bits that start `bit` bits after word `word`. A page ends in two words of zeros, so that reading a
+ * word too far is harmless. */
+bit_run load_run(uint word, uint bit, uint length)
 {
     uint at = word + (bit >> 5), shift = bit & 31u;
-    uint low = page_words[at] >> shift;
-    uint high = shift + width > 32u ? page_words[at + 1u] << (32u - shift) : 0u;
-    return bitfieldExtract(low | high, 0, int(width));
+    uint w0 = page_words[at], w1 = page_words[at + 1u], w2 = 0u, w3 = 0u;
+    if (length > 33u) {
+        w2 = page_words[at + 2u];
+        if (length > 65u)
+            w3 = page_words[at + 3u];
+    }
+    bit_run run;
+    run.a = funnel(w0, w1, shift);
+    run.b = funnel(w1, w2, shift);
+    run.c = funnel(w2, w3, shift);
+    run.d = w3 >> shift;
+    return run;
+}
+
+/* Takes the next `width` (0..24) bits. */
+uint take(inout bit_run run, uint width)
+{
+    uint code = run.a & ((1u << width) - 1u);
+    run.a = funnel(run.a, run.b, width);
+    run.b = funnel(run.b, run.c, width);
+    run.c = funnel(run.c, run.d, width);
+    run.d = run.d >> width;
+    return code;
 }
 
 vec3 octahedral_decode(vec2 e)
@@ -58,11 +90,12 @@ bool load_splat(uint entry, uint lane, bool position_only, out splat s)
     uint nx = bitfieldExtract(widths, SPL_GEOMETRY_X, 5), ny = bitfieldExtract(widths, SPL_GEOMETRY_Y, 5);
     uint nz = bitfieldExtract(widths, SPL_GEOMETRY_Z, 5), nu = bitfieldExtract(widths, SPL_GEOMETRY_U, 4);
     uint nv = bitfieldExtract(widths, SPL_GEOMETRY_V, 4), nr = bitfieldExtract(widths, SPL_GEOMETRY_RADIUS, 4);
-    uint bit = s.index * (nx + ny + nz + nu + nv + nr);
+    uint length = nx + ny + nz + nu + nv + nr;
+    bit_run run = load_run(word, s.index * length, position_only ? nx + ny + nz : length);
     vec3 code;
-    code.x = float(read_bits(word, bit, nx)), bit += nx;
-    code.y = float(read_bits(word, bit, ny)), bit += ny;
-    code.z = float(read_bits(word, bit, nz)), bit += nz;
+    code.x = float(take(run, nx));
+    code.y = float(take(run, ny));
+    code.z = float(take(run, nz));
     precise vec3 offset = rotate_to_view(code * draw_chunks[s.chunk].step);
     s.position = vec3(draw_chunks[s.chunk].origin_x, draw_chunks[s.chunk].origin_y, draw_chunks[s.chunk].origin_z) +
                  offset;
@@ -71,14 +104,14 @@ bool load_splat(uint entry, uint lane, bool position_only, out splat s)
     if (position_only)
         return true;
     precise vec2 e;
-    e.x = draw_chunks[s.chunk].normal_u + draw_chunks[s.chunk].normal_step * float(read_bits(word, bit, nu)), bit += nu;
-    e.y = draw_chunks[s.chunk].normal_v + draw_chunks[s.chunk].normal_step * float(read_bits(word, bit, nv)), bit += nv;
+    e.x = draw_chunks[s.chunk].normal_u + draw_chunks[s.chunk].normal_step * float(take(run, nu));
+    e.y = draw_chunks[s.chunk].normal_v + draw_chunks[s.chunk].normal_step * float(take(run, nv));
     vec3 n = octahedral_decode(e);
     uint axis = bitfieldExtract(widths, SPL_GEOMETRY_AXIS, 2);
     n = axis == 0u ? n.zxy : axis == 1u ? n.yzx : n;
     s.normal = rotate_to_view(bitfieldExtract(widths, SPL_GEOMETRY_AXIS + 2, 1) != 0u ? -n : n);
     precise float radius = draw_chunks[s.chunk].radius_min + draw_chunks[s.chunk].radius_step *
-                           float(read_bits(word, bit, nr));
+                           float(take(run, nr));
     s.radius = radius;
     return true;
 }
@@ -89,10 +122,11 @@ uvec3 load_color(splat s)
     uint widths = draw_chunks[s.chunk].color_bits, base = draw_chunks[s.chunk].color_base;
     uint word = draw_chunks[s.chunk].color_word;
     uint ny = bitfieldExtract(widths, SPL_COLOR_Y, 4), nu = bitfieldExtract(widths, SPL_COLOR_U, 4);
-    uint nv = bitfieldExtract(widths, SPL_COLOR_V, 4), bit = s.index * (ny + nu + nv);
-    int y = int(bitfieldExtract(widths, SPL_COLOR_BASE_Y, 8) + read_bits(word, bit, ny));
-    int u = bitfieldExtract(int(base), 0, 16) + int(read_bits(word, bit + ny, nu));
-    int v = bitfieldExtract(int(base), 16, 16) + int(read_bits(word, bit + ny + nu, nv));
+    uint nv = bitfieldExtract(widths, SPL_COLOR_V, 4), length = ny + nu + nv;
+    bit_run run = load_run(word, s.index * length, length);
+    int y = int(bitfieldExtract(widths, SPL_COLOR_BASE_Y, 8) + take(run, ny));
+    int u = bitfieldExtract(int(base), 0, 16) + int(take(run, nu));
+    int v = bitfieldExtract(int(base), 16, 16) + int(take(run, nv));
     int g = y - ((u + v) >> 2);
     return uvec3(ivec3(v + g, g, u + g) & 255);
 }
