@@ -60,6 +60,9 @@ static void fill_params(struct spl_tile *tile)
         .width = camera->width,
         .height = camera->height,
         .supersample = view->supersample,
+        .inverse_fx = 1 / (float)camera->fx,
+        .inverse_fy = 1 / (float)camera->fy,
+        .inverse_low_pass_squared = 2,
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
     };
     for (int row = 0; row < 3; row++)

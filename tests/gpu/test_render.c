@@ -228,7 +228,11 @@ static void small_tiles_give_the_same_image(void **state)
     assert_int_equal(frames[0].stats.tiles, 1);
     assert_true(frames[1].stats.tiles > 4);
     struct tally t = compare(&frames[0], &frames[1]);
-    assert_true(t.color_differs + t.depth_differs + t.id_differs + t.covered_differs <= 4 * (t.pixels / 10000 + 1));
+    /* Each tile has its own largest weight, whose rounding moves the mean depth where steep discs cross. */
+    size_t few = t.pixels / 10000 + 1;
+    if (t.color_differs > few || t.depth_differs > t.pixels / 500 || t.depth_worst > 1e-3 || t.id_differs > few || t.covered_differs > few)
+        fail_msg("of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu", t.pixels,
+                 t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst, t.id_differs);
     spl_frame_finish(&frames[0]);
     spl_frame_finish(&frames[1]);
     spl_renderer_destroy(small);

@@ -91,18 +91,16 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
 
 static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z)
 {
-    const float low_pass = 0.70710678f;
-    float ox = (float)x + 0.5f - center[0], oy = (float)y + 0.5f - center[1];
-    float near_center = (ox * ox + oy * oy) / (low_pass * low_pass);
-    float tx = ox / (float)s->camera.fx, ty = oy / (float)s->camera.fy;
+    float ox = (float)x + (0.5f - center[0]), oy = (float)y + (0.5f - center[1]);
+    float near_center = (ox * ox + oy * oy) * 2.0f;
     const float *p = d->p, *n = d->n;
-    float facing = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
-    float rise = p[2] * (n[0] * tx + n[1] * ty);
-    float dz = -p[2] * (rise / (facing + rise)), along = p[2] + dz;
-    float qx = p[0] / p[2] * dz + tx * along, qy = p[1] / p[2] * dz + ty * along;
-    float distance = (qx * qx + qy * qy + dz * dz) / (d->radius * d->radius);
-    bool on_disc = distance < 1 && along > 0;
-    *z = on_disc ? along : p[2];
+    float inverse = 1.0f / p[2], rx = p[0] * inverse, ry = p[1] * inverse;
+    float facing = n[0] * rx + n[1] * ry + n[2];
+    float k = facing / (facing + (n[0] / (float)s->camera.fx * ox + n[1] / (float)s->camera.fy * oy)), w = k - 1;
+    float qx = rx * w + ox * (1 / (float)s->camera.fx) * k, qy = ry * w + oy * (1 / (float)s->camera.fy) * k;
+    float scale = p[2] / d->radius, distance = (qx * qx + qy * qy + w * w) * (scale * scale);
+    bool on_disc = distance < 1 && k > 0;
+    *z = on_disc ? p[2] * k : p[2];
     return on_disc && distance < near_center ? distance : near_center;
 }
 
