@@ -1,0 +1,148 @@
+"""A daemon under test, and the client that talks to it. Every reply of status 400 or more is checked to be an RFC 9457
+problem; every daemon must end the way the test says. Standard library only."""
+import http.client
+import inspect
+import json
+import os
+import queue
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+import urllib.parse
+
+REAL, FAKE, WALL = (os.environ[name] for name in ("SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL"))
+VIEW = "/v1/datasets/wall/view"
+
+
+class Reply:
+    def __init__(self, status, headers, body):
+        self.status, self.headers, self.body = status, headers, body
+
+    def json(self):
+        return json.loads(self.body)
+
+
+def check_problem(reply, method):
+    assert reply.headers["Content-Type"] == "application/problem+json", (reply.status, reply.headers["Content-Type"])
+    if method == "HEAD":
+        return
+    problem = reply.json()
+    for name, kind in {"type": str, "title": str, "status": int, "detail": str, "instance": str}.items():
+        assert isinstance(problem.get(name), kind) and problem[name], (name, problem)
+    assert problem["status"] == reply.status, problem
+    assert problem["type"].startswith("urn:splatd:error:"), problem
+    assert not set(problem) - {"type", "title", "status", "detail", "instance", "field"}, problem
+    if reply.status == 503:
+        assert int(reply.headers["Retry-After"]) >= 1
+
+
+class Daemon:
+    """with Daemon(REAL) as d: …   ends it with SIGTERM and expects exit code 0, unless the test stopped it itself."""
+
+    def __init__(self, binary, *args, datasets=(WALL,), **environment):
+        self.process = subprocess.Popen(
+            [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0", *args, *datasets],
+            stderr=subprocess.PIPE, text=True, env={**os.environ, **{k: str(v) for k, v in environment.items()}})
+        self.lines, self.port, self.code = [], None, None
+        ready = queue.Queue()
+        threading.Thread(target=self._read, args=(ready,), daemon=True).start()
+        if not ready.get(timeout=60):
+            self.code = self.process.wait(10)
+            raise AssertionError(f"exit code {self.code} before ready:\n" + "".join(self.lines))
+
+    def _read(self, ready):
+        for line in self.process.stderr:
+            self.lines.append(line)
+            if found := re.search(r"listening on http://[^ ]*:(\d+)/", line):
+                self.port = int(found.group(1))
+            if line.endswith(" ready\n"):
+                ready.put(True)
+        ready.put(False)
+
+    def connect(self, timeout=60):
+        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
+
+    def ask(self, path, method="GET", body=None, headers={}, connection=None):
+        own = connection or self.connect()
+        own.request(method, path, body, headers)
+        answer = own.getresponse()
+        reply = Reply(answer.status, answer.headers, answer.read())
+        if not connection:
+            own.close()
+        if reply.status >= 400:
+            check_problem(reply, method)
+        return reply
+
+    def view(self, **params):
+        return self.ask(f"{VIEW}?{urllib.parse.urlencode(params, safe=',')}")
+
+    def post(self, document, path=VIEW):
+        body = document if isinstance(document, (str, bytes)) else json.dumps(document)
+        return self.ask(path, "POST", body, {"Content-Type": "application/json"})
+
+    def status(self):
+        return self.ask("/v1/status").json()
+
+    def wait_exit(self, timeout=60):
+        self.code = self.process.wait(timeout)
+        return self.code
+
+    def stop(self, number=signal.SIGTERM):
+        self.process.send_signal(number)
+        return self.wait_exit()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *rest):
+        if self.code is None and self.process.poll() is None:
+            code = self.stop()
+        else:
+            code = 0 if self.code is not None else self.process.wait()
+        if kind or code:
+            sys.stdout.write("".join(self.lines))
+        if not kind:
+            assert code == 0, f"exit code {code}"
+
+
+def eventually(condition, seconds=30):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "did not happen: " + inspect.getsource(condition)
+        time.sleep(0.01)
+
+
+def together(count, work):
+    """Runs work(i) in `count` threads at once; their results in order, exceptions included."""
+    results = [None] * count
+
+    def run(i):
+        try:
+            results[i] = work(i)
+        except Exception as error:
+            results[i] = error
+    threads = [threading.Thread(target=run, args=(i,)) for i in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return results
+
+
+def run(namespace):
+    failed = 0
+    for name, test in list(namespace.items()):
+        if not name.startswith("test_") or len(sys.argv) > 1 and name not in sys.argv[1:]:
+            continue
+        began = time.monotonic()
+        try:
+            test()
+            print(f"ok   {name} ({time.monotonic() - began:.2f} s)", flush=True)
+        except Exception:
+            failed += 1
+            print(f"FAIL {name}\n{traceback.format_exc()}", flush=True)
+    sys.exit(1 if failed else 0)

@@ -1,0 +1,199 @@
+"""What each route answers when all is well: listings, every format of every layer, every form of a camera."""
+import json
+import os
+import pathlib
+import re
+import struct
+import zlib
+
+from harness import REAL, VIEW, WALL, Daemon, run
+
+ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
+COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
+              "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4)}
+LOOK = dict(eye="3,0.2,1", target="0,0,1", up="0,0,1")
+
+
+def jpeg_size(data):
+    assert data[:2] == b"\xff\xd8" and data[-2:] == b"\xff\xd9"
+    at = 2
+    while not 0xC0 <= data[at + 1] <= 0xC2:
+        at += 2 + struct.unpack(">H", data[at + 2:at + 4])[0]
+    height, width = struct.unpack(">HH", data[at + 5:at + 9])
+    return width, height
+
+
+def png_pixels(data):
+    """(width, height, bit depth, colour type, unfiltered bytes per row)"""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[-12:] == b"\0\0\0\0IEND\xaeB`\x82"
+    at, idat = 8, b""
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        chunk = data[at + 8:at + 8 + length]
+        assert zlib.crc32(kind + chunk) == struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0]
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", chunk[:10])
+        idat += chunk if kind == b"IDAT" else b""
+        at += 12 + length
+    return width, height, depth, color, len(zlib.decompress(idat)) // height - 1
+
+
+def test_index_lists_what_there_is():
+    with Daemon(REAL) as d:
+        index = d.ask("/").json()
+        assert index["name"] == "splatd" and VIEW in index["views"]
+        assert d.ask(index["datasets"]).status == 200 and d.ask(index["status"]).status == 200
+
+
+def test_datasets_are_described():
+    with Daemon(REAL) as d:
+        [short] = d.ask("/v1/datasets").json()["datasets"]
+        full = d.ask("/v1/datasets/wall").json()
+        assert {k: full[k] for k in short} == short
+        assert full["id"] == "wall" and full["view"] == VIEW and full["unit"] == "m"
+        assert full["splats"] > 1600 and full["leaf_splats"] == 1600 and full["levels"] == 2
+        assert full["bytes"] == os.path.getsize(WALL)
+        assert re.fullmatch("[0-9a-f]{16}", full["version"])
+        low, high = full["bounds"]["min"], full["bounds"]["max"]
+        assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
+        assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points"]
+        assert full["formats"] == ["jpeg", "png", "npy", "raw"]
+        assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
+
+
+def test_status_says_how_it_is():
+    with Daemon(REAL) as d:
+        assert d.view(width=64, height=48).status == 200
+        status = d.status()
+        assert status["state"] == "ready" and status["datasets"] == ["wall"]
+        assert status["device"]["backend"] in ("vulkan", "egl") and status["device"]["name"] and status["device"]["driver"]
+        assert status["counters"]["frames"] == 1 and status["counters"]["replies_2xx"] == 1
+        assert status["memory"]["device_bytes"] > 0 and status["memory"]["resident_bytes"] > 0
+        assert status["queues"]["render"] == {"length": 0, "capacity": 32}
+        assert status["limits"]["deadline_ms"] == 10000
+
+
+def test_default_view_is_a_jpeg():
+    with Daemon(REAL) as d:
+        reply = d.ask(VIEW)
+        assert reply.headers["Content-Type"] == "image/jpeg" and jpeg_size(reply.body) == (1280, 720)
+        assert len(set(reply.body)) > 50, "an empty picture"
+        head = d.ask(VIEW, "HEAD")
+        assert head.body == b"" and int(head.headers["Content-Length"]) == len(reply.body)
+        assert d.post("").body == reply.body and d.post({}).body == reply.body
+
+
+def test_every_format_of_every_layer():
+    with Daemon(REAL) as d:
+        for layer, (dtype, components, size) in COMPONENTS.items():
+            raw = d.view(**LOOK, width=64, height=48, layer=layer, format="raw").body
+            assert len(raw) == 64 * 48 * components * size
+            assert len(set(raw)) > 1, f"{layer} is empty"
+            npy = d.view(**LOOK, width=64, height=48, layer=layer, format="npy").body
+            header = npy[10:10 + struct.unpack("<H", npy[8:10])[0]].decode()
+            shape = "(48, 64)" if components == 1 else f"(48, 64, {components})"
+            assert npy[:8] == b"\x93NUMPY\1\0" and f"'{dtype}'" in header and shape in header, header
+            assert npy[10 + len(header):] == raw
+            jpeg = d.view(**LOOK, width=64, height=48, layer=layer, format="jpg")
+            assert jpeg.headers["Content-Type"] == "image/jpeg" and jpeg_size(jpeg.body) == (64, 48)
+            width, height, depth, color, row = png_pixels(d.view(**LOOK, width=64, height=48, layer=layer, format="png").body)
+            wanted = {"depth": (16, 0), "range": (16, 0), "coverage": (8, 0), "normal": (8, 2)}.get(layer, (8, 6))
+            assert (width, height, (depth, color)) == (64, 48, wanted)
+            assert row == 64 * depth // 8 * {0: 1, 2: 3, 6: 4}[color]
+
+
+def test_depth_headers_say_what_pixels_mean():
+    with Daemon(REAL) as d:
+        png = d.view(**LOOK, layer="depth", width=64, height=48).headers
+        assert (png["Content-Type"], png["Splatd-Depth-Unit"], png["Splatd-Depth-Scale"], png["Splatd-Depth-Invalid"],
+                png["Splatd-Depth-Saturated"]) == ("image/png", "m", "1000", "0", "0")
+        fine = d.view(**LOOK, layer="range", width=64, height=48, depth_scale=50000).headers
+        assert fine["Splatd-Depth-Scale"] == "50000" and int(fine["Splatd-Depth-Saturated"]) > 100
+        npy = d.view(**LOOK, layer="depth", width=64, height=48, format="npy").headers
+        assert (npy["Splatd-Depth-Unit"], npy["Splatd-Depth-Scale"], npy["Splatd-Depth-Invalid"]) == ("m", "1", "NaN")
+        jpeg = d.view(**LOOK, layer="depth", width=64, height=48, format="jpeg").headers
+        assert 2 < float(jpeg["Splatd-Depth-Near"]) < float(jpeg["Splatd-Depth-Far"]) < 4
+        assert d.view(width=64, height=48).headers["Splatd-Depth-Unit"] is None
+
+
+def test_depth_is_metres_along_the_axis():
+    with Daemon(REAL) as d:
+        raw = d.view(eye="3,0,1", target="0,0,1", up="0,0,1", fov=60, width=65, height=49, layer="depth", format="raw").body
+        middle = struct.unpack("<f", raw[4 * (24 * 65 + 32):][:4])[0]
+        assert abs(middle - 3) < 0.01, middle
+
+
+def test_view_headers():
+    with Daemon(REAL) as d:
+        headers = d.view(eye="3,0.5,1", target="0,0,1", fx=100, fy=101, cx=30, cy=20, width=64, height=48, near=0.5, far=9).headers
+        stages = dict(re.findall(r"(\w+);dur=([\d.]+)", headers["Server-Timing"]))
+        assert list(stages) == ["queue", "select", "depth", "shade", "resolve", "readback", "encode", "total"]
+        assert float(stages["total"]) >= float(stages["encode"]) > 0
+        camera = json.loads(headers["Splatd-Camera"])
+        assert camera["eye"] == [3, 0.5, 1] and len(camera["rotation"]) == 9
+        assert [camera[k] for k in ("fx", "fy", "cx", "cy", "width", "height", "near", "far")] == [100, 101, 30, 20, 64, 48, 0.5, 9]
+        assert headers["Splatd-Complete"] == "true"
+        assert headers["Splatd-Device"].startswith(d.status()["device"]["backend"])
+
+
+def test_camera_forms_give_the_same_bytes():
+    size = dict(width=64, height=48, format="raw")
+    pinhole = dict(fx=50, fy=50, cx=32, cy=24)
+    forms = [
+        dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], **pinhole),
+        dict(matrix=[0, 0, -1, 3, 1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1], convention="opencv", **pinhole),
+        dict(matrix=[0, 0, 1, 3, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1], convention="opengl", **pinhole),
+        dict(q=[0.5, 0.5, 0.5, -0.5], t=[0, 1, 3], model="PINHOLE", params=[50, 50, 32, 24]),
+    ]
+    with Daemon(REAL) as d:
+        first = d.view(eye="3,0,1", target="0,0,1", up="0,0,1", **pinhole, **size)
+        assert d.view(POC="3,0,1", POI="0,0,1", UP="0,0,1", **pinhole, **size).body == first.body
+        for form in forms:
+            reply = d.post({"camera": form, **size})
+            assert reply.status == 200, reply.body
+            assert reply.body == first.body, (form, reply.headers["Splatd-Camera"], first.headers["Splatd-Camera"])
+
+
+def test_the_same_request_gives_the_same_bytes():
+    with Daemon(REAL) as d:
+        for form in ("jpeg", "png"):
+            connection = d.connect()
+            path = f"{VIEW}?width=320&height=180&format={form}"
+            bodies = {d.ask(path, connection=connection).body for _ in range(50)}
+            assert len(bodies) == 1
+
+
+def test_background_and_methods_change_the_picture():
+    with Daemon(REAL) as d:
+        away = dict(eye="3,0,1", target="9,0,1", up="0,0,1", width=8, height=4, format="raw")
+        assert d.view(**away).body == b"\0\0\0\xff" * 32
+        assert d.view(**away, background="#ff8000").body == b"\xff\x80\x00\xff" * 32
+        assert d.view(**away, transparent="true").body[3::4] == b"\0" * 32
+        near = dict(**LOOK, width=160, height=120, format="raw")
+        assert d.view(**near).body != d.view(**near, method="points").body
+
+
+def test_keep_alive_serves_one_after_the_other():
+    with Daemon(REAL) as d:
+        connection = d.connect()
+        for path in [VIEW + "?width=16&height=16", "/v1/datasets", VIEW + "?width=0", "/v1/status", "/nowhere"] * 4:
+            d.ask(path, connection=connection)
+        assert d.status()["counters"]["requests"] == 21
+
+
+def test_openapi_knows_every_parameter_and_route():
+    text = (ROOT / "api" / "openapi.yaml").read_text()
+    listed = set(re.findall(r"^        - name: (\w+)$", text, re.M))
+    schemas = {name: set(re.findall(r"^        (\w+):", body, re.M)) for name, body in
+               re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
+    rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z| ]+),', (ROOT / "src/service/view_params.def").read_text(), re.M)
+    assert len(rows) > 20
+    assert listed == {name for name, _, places in rows if "QUERY" in places}
+    assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
+    assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
+    assert all(f"Alias {alias}." in text for _, alias, _ in rows if alias)
+    routes = re.findall(r'^    \{"(/[^"]*)", ALLOW', (ROOT / "src/service/routes.c").read_text(), re.M)
+    assert sorted(routes) == sorted(re.findall(r"^  (/\S*):$", text, re.M))
+
+
+run(globals())
