@@ -70,7 +70,7 @@ uvec3 sample_color(uint at)
     if (POINTS != 0u)
         return (uvec3(payload(at)) >> uvec3(0u, 8u, 16u)) & 255u;
     uvec4 sum = sums[at];
-    return (sum.xyz + sum.w / 2u) / max(sum.w, 1u);
+    return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
 }
 
 void main()
@@ -78,7 +78,8 @@ void main()
     uint side = frame.supersample, width = frame.width / side, pixel = gl_GlobalInvocationID.x;
     if (pixel >= width * (frame.height / side))
         return;
-    ivec2 corner = ivec2(pixel % width, pixel / width) * int(side);
+    precise float row = floor((float(pixel) + 0.5) / float(width)); /* exact below 2^23 pixels */
+    ivec2 corner = ivec2(int(pixel) - int(row) * int(width), int(row)) * int(side);
     uint covered = 0u, nearest = SPL_NOTHING, id = SPL_NOTHING;
     uvec3 color = uvec3(0u);
     vec3 normal = vec3(0.0);
@@ -103,8 +104,8 @@ void main()
         uint total = side * side, back_alpha = frame.background >> 24, back_weight = back_alpha * (total - covered);
         uvec3 back = (uvec3(frame.background) >> uvec3(0u, 8u, 16u)) & 255u;
         uint weight = 255u * covered + back_weight;
-        uvec3 rgb = weight == 0u ? uvec3(0u) : (255u * color + back_weight * back + weight / 2u) / weight;
-        value = rgb.x | rgb.y << 8 | rgb.z << 16 | ((weight + total / 2u) / total) << 24;
+        uvec3 rgb = weight == 0u ? uvec3(0u) : uvec3(vec3(255u * color + back_weight * back) / float(weight) + 0.5);
+        value = rgb.x | rgb.y << 8 | rgb.z << 16 | uint(float(weight) / float(total) + 0.5) << 24;
     } else if (LAYER == SPL_RESOLVE_DEPTH || LAYER == SPL_RESOLVE_RANGE) {
         float sum = 0.0, count = 0.0;
         float limit = uintBitsToFloat(nearest) * 1.01;
