@@ -1,0 +1,302 @@
+/* Nodes are cut, ordered and encoded in parallel, a batch at a time, and written in order by the calling thread: the file
+ * is the same for any number of threads. Nodes go out breadth first, so the coarse levels share the first pages. */
+#include "pack/emit.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "pack/chunks.h"
+
+enum { batch_nodes = 256 };
+/* Quantised radii and positions may stand out of the exact disc a little. */
+static const float box_slack = 1.1f;
+
+struct encoded {                 /* one node of the batch; owned by the batch */
+    uint32_t *words;
+    struct spl_chunk *chunks;
+    size_t word_count;
+    uint32_t chunk_count;
+    struct spl_chunk_error error;
+};
+
+struct scratch {                 /* of one worker, for the largest node */
+    struct spl_cut *items;
+    uint32_t *words;
+    float *radii;
+};
+
+struct emit {
+    const struct spl_tree *tree;
+    const struct spl_points *points;
+    const struct spl_chunk_options *options;
+    struct spl_stage *stage;
+    struct scratch *scratch;
+    struct encoded *batch;
+    struct spl_node *nodes;
+    size_t first;                /* node of the batch's first element */
+    atomic_bool failed;
+};
+
+static void set_color(struct spl_splat *s, uint32_t color_class)
+{
+    for (int c = 0; c < 3; c++)
+        s->color[c] = color_class >> 8 * c & 255;
+    s->classification = color_class >> 24;
+}
+
+static void load_leaf(const struct spl_points *p, const struct spl_tree_node *node, uint32_t at, struct spl_splat *s,
+                      double position[3])
+{
+    size_t i = node->begin + at;
+    for (int c = 0; c < 3; c++) {
+        position[c] = p->axis[c][i] - node->origin[c];
+        s->normal[c] = p->normal[i][c];
+    }
+    s->radius = p->radius[i];
+    s->uncertainty = p->uncertainty[i];
+    set_color(s, p->color_class[i]);
+}
+
+static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl_splat *s, double position[3])
+{
+    const struct spl_inner_splat *from = &node->splats[at];
+    for (int c = 0; c < 3; c++) {
+        position[c] = from->position[c];
+        s->normal[c] = from->normal[c];
+    }
+    s->radius = from->radius;
+    s->uncertainty = from->uncertainty;
+    set_color(s, from->color_class);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
+{
+    const struct spl_tree_node *node = &e->tree->nodes[index];
+    const struct spl_points *p = e->points;
+    struct spl_node *header = &e->nodes[index];
+    bool leaf = !node->child_count;
+    uint32_t count = node->splat_count;
+    for (int c = 0; c < 3; c++) {
+        header->box_min[c] = INFINITY;
+        header->box_max[c] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        float radius = leaf ? p->radius[node->begin + i] : node->splats[i].radius;
+        for (int c = 0; c < 3; c++) {
+            float v = leaf ? (float)(p->axis[c][node->begin + i] - node->origin[c]) : node->splats[i].position[c];
+            w->items[i].position[c] = v;
+            header->box_min[c] = fminf(header->box_min[c], v - box_slack * radius);
+            header->box_max[c] = fmaxf(header->box_max[c], v + box_slack * radius);
+        }
+        w->items[i].index = i;
+        w->radii[i] = radius;
+    }
+    uint32_t sample = count < 1023 ? count : 1023;
+    for (uint32_t i = 0; i < sample; i++)
+        w->radii[i] = w->radii[(uint64_t)i * count / sample];
+    qsort(w->radii, sample, sizeof *w->radii, compare_floats);
+    header->spacing = w->radii[sample / 2] / SPL_RADIUS_SPACING;
+
+    spl_chunks_cut(w->items, count);
+    out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
+    out->chunks = spl_alloc_raw(out->chunk_count, sizeof *out->chunks, NULL);
+    if (!out->chunks)
+        return false;
+    for (uint32_t c = 0; c < out->chunk_count; c++) {
+        struct spl_splat splats[SPL_CHUNK_SPLATS];
+        double position[SPL_CHUNK_SPLATS][3];
+        uint32_t first = c * SPL_CHUNK_SPLATS;
+        uint32_t used = count - first < SPL_CHUNK_SPLATS ? count - first : SPL_CHUNK_SPLATS;
+        for (uint32_t i = 0; i < used; i++) {
+            uint32_t at = w->items[first + i].index;
+            if (leaf)
+                load_leaf(p, node, at, &splats[i], position[i]);
+            else
+                load_inner(node, at, &splats[i], position[i]);
+        }
+        struct spl_chunk_error error;
+        uint32_t words = spl_chunk_encode(splats, (const double(*)[3])position, used, e->options, &out->chunks[c],
+                                          w->words + out->word_count, &error);
+        out->chunks[c].geometry_word = (uint32_t)out->word_count;
+        out->word_count += words;
+        out->error.position_over_radius += error.position_over_radius;
+        out->error.normal_radians += error.normal_radians;
+    }
+    out->words = spl_alloc_raw(out->word_count, sizeof *out->words, NULL);
+    if (!out->words)
+        return false;
+    memcpy(out->words, w->words, out->word_count * sizeof *out->words);
+    return true;
+}
+
+static void encode_nodes(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct emit *e = context;
+    for (size_t i = begin; i < end; i++) {
+        if (!encode_node(e, &e->scratch[worker], e->first + i, &e->batch[i]))
+            atomic_store(&e->failed, true);
+        if (atomic_load(&e->failed))
+            return;
+        spl_stage_add(e->stage, e->tree->nodes[e->first + i].splat_count, worker);
+    }
+}
+
+static void count_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
+{
+    uint32_t g = chunk->geometry_bits, c = chunk->color_bits, e = chunk->extra_bits;
+    uint64_t n = chunk->count, streams = (uint64_t)spl_chunk_words(chunk) * 32;
+    uint64_t position = n * ((g >> SPL_GEOMETRY_X & 31) + (g >> SPL_GEOMETRY_Y & 31) + (g >> SPL_GEOMETRY_Z & 31));
+    uint64_t normal = n * ((g >> SPL_GEOMETRY_U & 15) + (g >> SPL_GEOMETRY_V & 15));
+    uint64_t radius = n * (g >> SPL_GEOMETRY_RADIUS & 15);
+    uint64_t color = n * ((c >> SPL_COLOR_Y & 15) + (c >> SPL_COLOR_U & 15) + (c >> SPL_COLOR_V & 15));
+    uint64_t classification = n * (e >> SPL_EXTRA_CLASS & 15), uncertainty = n * (e >> SPL_EXTRA_UNCERTAINTY & 15);
+    bits[SPL_ATTRIBUTE_POSITION] += position;
+    bits[SPL_ATTRIBUTE_NORMAL] += normal;
+    bits[SPL_ATTRIBUTE_RADIUS] += radius;
+    bits[SPL_ATTRIBUTE_COLOR] += color;
+    bits[SPL_ATTRIBUTE_CLASS] += classification;
+    bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
+    /* Streams end on whole words: what that wastes belongs to the chunk. */
+    bits[SPL_ATTRIBUTE_CHUNK] += sizeof *chunk * 8 + streams - position - normal - radius - color - classification -
+                                 uncertainty;
+}
+
+static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
+                      size_t *chunk_capacity, struct spl_emitted *out, struct spl_error *err)
+{
+    const struct spl_tree_node *from = &e->tree->nodes[index];
+    struct spl_node *node = &e->nodes[index];
+    for (uint32_t c = 0; c < encoded->chunk_count; c++) {
+        encoded->chunks[c].first_id = (uint32_t)out->splats;
+        out->splats += encoded->chunks[c].count;
+        count_bits(&encoded->chunks[c], out->bits);
+    }
+    if (out->splats > UINT32_MAX - 1)
+        return spl_fail(err, SPL_E_LIMIT, "more than %u splats; pack the scans as several datasets", UINT32_MAX - 1);
+    if (out->chunk_count + encoded->chunk_count > *chunk_capacity) {
+        size_t wanted = *chunk_capacity * 2 + encoded->chunk_count;
+        void *bigger = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
+        if (!bigger)
+            return SPL_E_NOMEM;
+        out->chunks = bigger;
+        *chunk_capacity = wanted;
+    }
+    int rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
+                                         encoded->chunk_count, &node->page, err);
+    if (rc)
+        return rc;
+    memcpy(out->chunks + out->chunk_count, encoded->chunks, encoded->chunk_count * sizeof *out->chunks);
+    for (int c = 0; c < 3; c++)
+        node->origin[c] = from->origin[c];
+    node->size = (float)from->size;
+    node->first_child = from->first_child;
+    node->child_count = from->child_count;
+    node->depth = from->depth;
+    node->first_chunk = out->chunk_count;
+    node->chunk_count = encoded->chunk_count;
+    out->chunk_count += encoded->chunk_count;
+    out->pages = node->page + 1;
+    out->error.position_over_radius += encoded->error.position_over_radius;
+    out->error.normal_radians += encoded->error.normal_radians;
+    return 0;
+}
+
+/* A node's box holds its descendants' too; rounded outwards where origins differ. */
+static void unite_boxes(struct spl_node *nodes, uint32_t count)
+{
+    for (uint32_t i = count; i-- > 0;)
+        for (uint32_t k = 0; k < nodes[i].child_count; k++) {
+            const struct spl_node *child = &nodes[nodes[i].first_child + k];
+            for (int c = 0; c < 3; c++) {
+                double shift = child->origin[c] - nodes[i].origin[c];
+                float low = nextafterf((float)(shift + child->box_min[c]), -INFINITY);
+                float high = nextafterf((float)(shift + child->box_max[c]), INFINITY);
+                nodes[i].box_min[c] = fminf(nodes[i].box_min[c], low);
+                nodes[i].box_max[c] = fmaxf(nodes[i].box_max[c], high);
+            }
+        }
+}
+
+static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *err)
+{
+    size_t largest = 0;
+    for (uint32_t i = 0; i < e->tree->count; i++)
+        largest = e->tree->nodes[i].splat_count > largest ? e->tree->nodes[i].splat_count : largest;
+    size_t chunks = (largest + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
+    spl_assert(chunks <= SPL_NODE_CHUNKS_MAX);
+    e->nodes = out->nodes = spl_alloc(e->tree->count, sizeof *out->nodes, err);
+    e->batch = spl_alloc(batch_nodes, sizeof *e->batch, err);
+    e->scratch = spl_alloc(e->stage->threads, sizeof *e->scratch, err);
+    if (!e->nodes || !e->batch || !e->scratch)
+        return SPL_E_NOMEM;
+    for (unsigned t = 0; t < e->stage->threads; t++) {
+        struct scratch *w = &e->scratch[t];
+        w->items = spl_alloc_raw(largest, sizeof *w->items, err);
+        w->radii = spl_alloc_raw(largest, sizeof *w->radii, err);
+        w->words = spl_alloc_raw(chunks, SPL_CHUNK_WORDS_MAX * sizeof *w->words, err);
+        if (!w->items || !w->radii || !w->words)
+            return SPL_E_NOMEM;
+    }
+    return 0;
+}
+
+static void clear_batch(struct encoded *batch)
+{
+    for (size_t i = 0; i < batch_nodes; i++) {
+        free(batch[i].words);
+        free(batch[i].chunks);
+        batch[i] = (struct encoded){0};
+    }
+}
+
+int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
+             struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out,
+             struct spl_error *err)
+{
+    struct emit e = {.tree = tree, .points = points, .options = options, .stage = stage};
+    size_t chunk_capacity = 0, splats = 0;
+    for (uint32_t i = 0; i < tree->count; i++)
+        splats += tree->nodes[i].splat_count;
+    spl_stage_begin(stage, "encoding", splats);
+    int rc = allocate(&e, out, err);
+    for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
+        size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;
+        spl_parallel_for(stage->threads, count, 1, encode_nodes, &e);
+        if (atomic_load(&e.failed))
+            rc = spl_fail(err, SPL_E_NOMEM, "out of memory while encoding %zu splats", splats);
+        for (size_t i = 0; !rc && i < count; i++)
+            rc = write_node(&e, e.first + i, &e.batch[i], writer, &chunk_capacity, out, err);
+        clear_batch(e.batch);
+    }
+    if (!rc) {
+        unite_boxes(out->nodes, tree->count);
+        out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * sizeof *out->nodes * 8;
+        spl_stage_end(stage);
+    }
+    for (unsigned t = 0; e.scratch && t < stage->threads; t++) {
+        free(e.scratch[t].items);
+        free(e.scratch[t].radii);
+        free(e.scratch[t].words);
+    }
+    if (e.batch)
+        clear_batch(e.batch);
+    free(e.batch);
+    free(e.scratch);
+    return rc;
+}
+
+void spl_emitted_finish(struct spl_emitted *emitted)
+{
+    free(emitted->nodes);
+    free(emitted->chunks);
+    *emitted = (struct spl_emitted){0};
+}

@@ -1,0 +1,285 @@
+/* Inner nodes: their children's splats, clustered on a grid.
+ *
+ * A cell gives one splat, or two where normals oppose, so that a thin wall keeps both its faces. The cell is as large as it
+ * must be for the node to hold about a quarter of its children's splats, which is what doubling the spacing of a surface
+ * means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts, reaches over
+ * them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
+ * Nodes of one depth are done in parallel; each is done by one worker in the order of its children, so the result does
+ * not depend on the number of threads. */
+#include "pack/tree.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+
+/* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level. */
+static const double most = 0.28, wanted = 0.25, least = 0.20;
+enum { attempts = 6, inner_most = 12288 };
+
+struct cluster {
+    uint64_t cell;
+    uint32_t other;              /* the cell's second cluster, 0 = none */
+    uint32_t votes;              /* of `classification`, majority by pairing off */
+    uint8_t classification;
+    float largest;
+    double weight, position[3], squared, normal[3], color[3], uncertainty;
+};
+
+struct scratch {                 /* of one worker */
+    struct spl_inner_splat *input;
+    struct cluster *clusters;
+    uint32_t *table;             /* cell -> cluster + 1 */
+    float *radii;
+    size_t input_capacity, table_size;
+};
+
+struct levels {
+    struct spl_tree *tree;
+    const struct spl_points *points;
+    struct spl_stage *stage;
+    struct scratch *scratch;
+    const uint32_t *order;       /* inner nodes of the depth at work */
+    atomic_bool failed;
+};
+
+/* The child's splats, their positions relative to the parent's origin. */
+static size_t take_child(const struct spl_points *p, const struct spl_tree_node *parent,
+                         const struct spl_tree_node *child, struct spl_inner_splat *out)
+{
+    if (child->child_count) {
+        double shift[3];
+        for (int c = 0; c < 3; c++)
+            shift[c] = child->origin[c] - parent->origin[c];
+        for (uint32_t i = 0; i < child->splat_count; i++) {
+            out[i] = child->splats[i];
+            for (int c = 0; c < 3; c++)
+                out[i].position[c] = (float)(shift[c] + child->splats[i].position[c]);
+        }
+        return child->splat_count;
+    }
+    for (size_t i = child->begin; i < child->end; i++, out++) {
+        for (int c = 0; c < 3; c++) {
+            out->position[c] = (float)(p->axis[c][i] - parent->origin[c]);
+            out->normal[c] = p->normal[i][c];
+        }
+        out->radius = p->radius[i];
+        out->uncertainty = p->uncertainty[i];
+        out->color_class = p->color_class[i];
+    }
+    return child->splat_count;
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double median_radius(const struct spl_inner_splat *splats, size_t count, float *radii)
+{
+    size_t sample = count < 255 ? count : 255;
+    for (size_t i = 0; i < sample; i++)
+        radii[i] = splats[i * count / sample].radius;
+    qsort(radii, sample, sizeof *radii, compare_floats);
+    return radii[sample / 2];
+}
+
+static uint64_t cell_of(const struct spl_inner_splat *s, double inverse)
+{
+    uint64_t cell = 0;
+    for (int c = 0; c < 3; c++) {
+        double v = s->position[c] * inverse;
+        v = v > 0 ? v : 0;
+        cell = cell << 21 | (uint64_t)(v < 2097151 ? v : 2097151);
+    }
+    return cell;
+}
+
+static double dot(const double a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void add_to(struct cluster *k, const struct spl_inner_splat *s)
+{
+    double w = (double)s->radius * s->radius;
+    for (int c = 0; c < 3; c++) {
+        k->position[c] += w * s->position[c];
+        k->normal[c] += w * s->normal[c];
+        k->color[c] += w * (s->color_class >> 8 * c & 255);
+        k->squared += w * s->position[c] * s->position[c];
+    }
+    k->weight += w;
+    k->uncertainty += w * s->uncertainty;
+    k->largest = fmaxf(k->largest, s->radius);
+    uint8_t classification = s->color_class >> 24;
+    if (k->votes == 0)
+        k->classification = classification;
+    k->votes += k->classification == classification ? 1 : -1u;
+}
+
+/* Clusters `count` splats; gives up once there are more than `limit` clusters. Cluster 0 is unused. */
+static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit)
+{
+    size_t clusters = 1, mask = w->table_size - 1;
+    double inverse = 1 / cell;
+    memset(w->table, 0, w->table_size * sizeof *w->table);
+    for (size_t i = 0; i < count && clusters <= limit; i++) {
+        const struct spl_inner_splat *s = &w->input[i];
+        uint64_t key = cell_of(s, inverse);
+        size_t slot = (size_t)(key * 0x9e3779b97f4a7c15ull >> 20) & mask;
+        while (w->table[slot] && w->clusters[w->table[slot]].cell != key)
+            slot = (slot + 1) & mask;
+        struct cluster *k = &w->clusters[w->table[slot]];
+        if (w->table[slot] && dot(k->normal, s->normal) < 0) {
+            struct cluster *other = &w->clusters[k->other];
+            if (!k->other) {
+                k->other = (uint32_t)clusters;
+                k = &w->clusters[clusters++];
+                *k = (struct cluster){.cell = UINT64_MAX};
+            } else if (dot(other->normal, s->normal) > dot(k->normal, s->normal)) {
+                k = other;
+            }
+        } else if (!w->table[slot]) {
+            w->table[slot] = (uint32_t)clusters;
+            k = &w->clusters[clusters++];
+            *k = (struct cluster){.cell = key};
+        }
+        add_to(k, s);
+    }
+    return clusters - 1;
+}
+
+static void finish_cluster(const struct cluster *k, double cell, struct spl_inner_splat *out)
+{
+    double mean2 = 0, length = 0, weight = k->weight;
+    for (int c = 0; c < 3; c++) {
+        double m = k->position[c] / weight;
+        mean2 += m * m;
+        length += k->normal[c] * k->normal[c];
+        out->position[c] = (float)m;
+    }
+    length = sqrt(length);
+    for (int c = 0; c < 3; c++)
+        out->normal[c] = length > 0 ? (float)(k->normal[c] / length) : c == 2;
+    double reach = sqrt(3 * fmax(0, k->squared / weight - mean2));
+    double radius = fmin(fmax(sqrt(weight), reach), 1.1284 * 1.4142 * cell);
+    out->radius = fmaxf((float)radius, k->largest);
+    out->uncertainty = (float)(k->uncertainty / weight);
+    out->color_class = (uint32_t)k->classification << 24;
+    for (int c = 0; c < 3; c++)
+        out->color_class |= (uint32_t)(k->color[c] / weight + 0.5) << 8 * c;
+}
+
+static bool reserve(struct scratch *w, size_t count)
+{
+    if (count <= w->input_capacity)
+        return true;
+    size_t table = 256;
+    while (table < count)
+        table *= 2;
+    free(w->input);
+    free(w->clusters);
+    free(w->table);
+    w->input_capacity = 0;
+    w->input = spl_alloc_raw(count, sizeof *w->input, NULL);
+    w->clusters = spl_alloc_raw(count / 3 + 8, sizeof *w->clusters, NULL);
+    w->table = spl_alloc_raw(table, sizeof *w->table, NULL);
+    if (!w->input || !w->clusters || !w->table)
+        return false;
+    w->input_capacity = count;
+    w->table_size = table;
+    return true;
+}
+
+static bool build_node(struct levels *l, struct scratch *w, struct spl_tree_node *node)
+{
+    const struct spl_tree_node *children = l->tree->nodes + node->first_child;
+    size_t count = 0, at = 0, clusters = 0;
+    float radii[255];
+    for (uint32_t c = 0; c < node->child_count; c++)
+        count += children[c].splat_count;
+    if (!reserve(w, count))
+        return false;
+    for (uint32_t c = 0; c < node->child_count; c++)
+        at += take_child(l->points, node, &children[c], w->input + at);
+
+    double base = fmin((double)count, inner_most / most);
+    size_t limit = base * most > 2 ? (size_t)(base * most) : 2; /* two opposed splats never become one */
+    double cell = 2 * median_radius(w->input, count, radii) / 1.128379, too_fine = 0;
+    for (int attempt = 0;; attempt++) {
+        clusters = cluster(w, count, cell, limit);
+        double share = (double)clusters / base;
+        if (clusters > limit) {
+            too_fine = cell;
+            cell *= attempt < attempts ? 1.25 : 2;
+        } else if (share < least && attempt < attempts && cell * sqrt(share / wanted) > too_fine * 1.1) {
+            cell *= sqrt(share / wanted);
+        } else {
+            break;
+        }
+    }
+    node->splats = spl_alloc_raw(clusters, sizeof *node->splats, NULL);
+    if (!node->splats)
+        return false;
+    for (size_t k = 0; k < clusters; k++)
+        finish_cluster(&w->clusters[k + 1], cell, &node->splats[k]);
+    node->splat_count = (uint32_t)clusters;
+    return true;
+}
+
+static void build_nodes(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct levels *l = context;
+    for (size_t i = begin; i < end; i++) {
+        struct spl_tree_node *node = &l->tree->nodes[l->order[i]];
+        if (!build_node(l, &l->scratch[worker], node))
+            atomic_store(&l->failed, true);
+        if (atomic_load(&l->failed))
+            return;
+        spl_stage_add(l->stage, 1, worker);
+    }
+}
+
+int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, struct spl_stage *stage,
+                     struct spl_error *err)
+{
+    struct levels l = {.tree = tree, .points = points, .stage = stage};
+    uint32_t *order = spl_alloc_raw(tree->count, sizeof *order, err);
+    size_t inner = 0;
+    int rc = 0;
+    l.scratch = spl_alloc(stage->threads, sizeof *l.scratch, err);
+    if (!order || !l.scratch) {
+        rc = SPL_E_NOMEM;
+        goto done;
+    }
+    l.order = order;
+    for (uint32_t i = 0; i < tree->count; i++)
+        if (tree->nodes[i].child_count)
+            order[inner++] = i;
+    spl_stage_begin(stage, "levels of detail", inner);
+    /* Breadth first order: each depth is a run of it. */
+    for (size_t end = inner, begin; end > 0; end = begin) {
+        for (begin = end; begin > 0 && tree->nodes[order[begin - 1]].depth == tree->nodes[order[end - 1]].depth;)
+            begin--;
+        l.order = order + begin;
+        spl_parallel_for(stage->threads, end - begin, 1, build_nodes, &l);
+        if (atomic_load(&l.failed)) {
+            rc = spl_fail(err, SPL_E_NOMEM, "out of memory while building the levels of detail");
+            goto done;
+        }
+    }
+    spl_stage_end(stage);
+done:
+    for (unsigned t = 0; l.scratch && t < stage->threads; t++) {
+        free(l.scratch[t].input);
+        free(l.scratch[t].clusters);
+        free(l.scratch[t].table);
+    }
+    free(l.scratch);
+    free(order);
+    return rc;
+}

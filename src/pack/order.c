@@ -1,0 +1,330 @@
+/* Morton order over the cubic bounds, and exact duplicates out.
+ *
+ * A stable parallel radix sort of (key, index) pairs: each pass counts per piece, one prefix sum, each piece scatters, so
+ * the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
+ * their own bounds, recursively, so that a dense cluster in a wide cloud is as well ordered as any other; equal
+ * coordinates can only lie in one such run. */
+#include "pack/points.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "geom/morton.h"
+#include "pack/order.h"
+
+enum { digits = 256, threads_max = 64, short_run = 32, grain = 1 << 16 };
+static const uint32_t dropped = UINT32_MAX;
+
+struct order {
+    struct spl_points *points;
+    uint64_t *key, *key_to;
+    uint32_t *index, *index_to;
+    size_t count, piece;
+    unsigned shift, pieces;
+    uint32_t (*histogram)[digits];
+    double low[threads_max][3], high[threads_max][3];
+    struct spl_stage *stage;
+    atomic_bool failed;
+};
+
+static void bounds_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    for (int c = 0; c < 3; c++) {
+        const double *v = o->points->axis[c];
+        double low = o->low[worker][c], high = o->high[worker][c];
+        for (size_t i = begin; i < end; i++) {
+            low = v[i] < low ? v[i] : low;
+            high = v[i] > high ? v[i] : high;
+        }
+        o->low[worker][c] = low;
+        o->high[worker][c] = high;
+    }
+}
+
+static void find_cube(struct order *o)
+{
+    struct spl_points *p = o->points;
+    for (unsigned t = 0; t < threads_max; t++)
+        for (int c = 0; c < 3; c++)
+            o->low[t][c] = o->high[t][c] = p->axis[c][0];
+    spl_parallel_for(o->stage->threads, p->count, grain, bounds_piece, o);
+    p->cube_size = 0;
+    for (int c = 0; c < 3; c++) {
+        p->bounds_min[c] = o->low[0][c];
+        p->bounds_max[c] = o->high[0][c];
+        for (unsigned t = 1; t < threads_max; t++) {
+            p->bounds_min[c] = fmin(p->bounds_min[c], o->low[t][c]);
+            p->bounds_max[c] = fmax(p->bounds_max[c], o->high[t][c]);
+        }
+        p->cube_size = fmax(p->cube_size, p->bounds_max[c] - p->bounds_min[c]);
+    }
+    /* The next float up, as the container keeps it: the cube of the file is the cube of the keys. */
+    p->cube_size = p->cube_size > 0 ? nextafterf((float)p->cube_size, INFINITY) : 1;
+}
+
+uint64_t spl_points_key(const struct spl_points *points, size_t i)
+{
+    uint32_t cell[3];
+    for (int c = 0; c < 3; c++)
+        cell[c] = spl_morton_cell(points->axis[c][i], points->bounds_min[c], points->cube_size);
+    return spl_morton_encode(cell[0], cell[1], cell[2]);
+}
+
+static void key_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    for (size_t i = begin; i < end; i++) {
+        o->key[i] = spl_points_key(o->points, i);
+        o->index[i] = (uint32_t)i;
+    }
+    spl_stage_add(o->stage, end - begin, worker);
+}
+
+static void count_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    uint32_t *histogram = o->histogram[begin / o->piece];
+    (void)worker;
+    memset(histogram, 0, sizeof *o->histogram);
+    for (size_t i = begin; i < end; i++)
+        histogram[o->key[i] >> o->shift & (digits - 1)]++;
+}
+
+static void scatter_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    uint32_t *at = o->histogram[begin / o->piece];
+    (void)worker;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t to = at[o->key[i] >> o->shift & (digits - 1)]++;
+        o->key_to[to] = o->key[i];
+        o->index_to[to] = o->index[i];
+    }
+}
+
+static void radix_sort(struct order *o)
+{
+    for (o->shift = 0; o->shift < 64; o->shift += 8) {
+        spl_parallel_for(o->stage->threads, o->count, o->piece, count_piece, o);
+        uint32_t sum = 0;
+        bool trivial = false;
+        for (unsigned d = 0; d < digits; d++) {
+            uint32_t before = sum;
+            for (unsigned t = 0; t < o->pieces; t++) {
+                uint32_t n = o->histogram[t][d];
+                o->histogram[t][d] = sum;
+                sum += n;
+            }
+            trivial |= sum - before == o->count;
+        }
+        if (trivial)
+            continue;
+        spl_parallel_for(o->stage->threads, o->count, o->piece, scatter_piece, o);
+        uint64_t *key = o->key;
+        uint32_t *index = o->index;
+        o->key = o->key_to;
+        o->index = o->index_to;
+        o->key_to = key;
+        o->index_to = index;
+    }
+}
+
+static int compare_places(const struct spl_points *p, uint32_t a, uint32_t b)
+{
+    for (int c = 0; c < 3; c++)
+        if (p->axis[c][a] != p->axis[c][b])
+            return p->axis[c][a] < p->axis[c][b] ? -1 : 1;
+    return 0;
+}
+
+static void order_short_run(const struct spl_points *p, uint32_t *index, size_t n)
+{
+    for (size_t i = 1; i < n; i++) {
+        uint32_t moved = index[i];
+        size_t k = i;
+        for (; k > 0 && compare_places(p, index[k - 1], moved) > 0; k--)
+            index[k] = index[k - 1];
+        index[k] = moved;
+    }
+    uint32_t kept = index[0];
+    for (size_t i = 1; i < n; i++) {
+        if (compare_places(p, kept, index[i]) == 0)
+            index[i] = dropped;
+        else
+            kept = index[i];
+    }
+}
+
+struct pair {
+    uint64_t key;
+    uint32_t index;
+};
+
+static int compare_pairs(const void *a, const void *b)
+{
+    const struct pair *p = a, *q = b;
+    if (p->key != q->key)
+        return p->key < q->key ? -1 : 1;
+    return p->index < q->index ? -1 : p->index > q->index;
+}
+
+/* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and so
+ * is each run of equal keys. */
+static void order_run(struct order *o, uint32_t *index, size_t n)
+{
+    const struct spl_points *p = o->points;
+    if (n <= short_run) {
+        order_short_run(p, index, n);
+        return;
+    }
+    double low[3], size = 0;
+    for (int c = 0; c < 3; c++) {
+        double high = low[c] = p->axis[c][index[0]];
+        for (size_t i = 1; i < n; i++) {
+            double v = p->axis[c][index[i]];
+            low[c] = v < low[c] ? v : low[c];
+            high = v > high ? v : high;
+        }
+        size = fmax(size, high - low[c]);
+    }
+    if (size == 0) {
+        for (size_t i = 1; i < n; i++)
+            index[i] = dropped;
+        return;
+    }
+    struct pair *pairs = spl_alloc_raw(n, sizeof *pairs, NULL);
+    if (!pairs) {
+        atomic_store(&o->failed, true);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        uint32_t cell[3];
+        for (int c = 0; c < 3; c++)
+            cell[c] = spl_morton_cell(p->axis[c][index[i]], low[c], size);
+        pairs[i] = (struct pair){spl_morton_encode(cell[0], cell[1], cell[2]), index[i]};
+    }
+    qsort(pairs, n, sizeof *pairs, compare_pairs);
+    for (size_t i = 0; i < n; i++)
+        index[i] = pairs[i].index;
+    for (size_t i = 0, end; i < n; i = end) {
+        for (end = i + 1; end < n && pairs[end].key == pairs[i].key;)
+            end++;
+        if (end - i > 1)
+            order_run(o, index + i, end - i);
+    }
+    free(pairs);
+}
+
+/* A piece does the runs that begin in it. */
+static void runs_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    size_t i = begin;
+    while (i < end && i > 0 && o->key[i] == o->key[i - 1])
+        i++;
+    for (size_t next; i < end; i = next) {
+        for (next = i + 1; next < o->count && o->key[next] == o->key[i];)
+            next++;
+        if (next - i > 1)
+            order_run(o, o->index + i, next - i);
+    }
+    spl_stage_add(o->stage, end - begin, worker);
+}
+
+struct permutation {
+    const uint32_t *index;
+    const char *from;
+    char *to;
+    size_t size;
+};
+
+static void permute_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct permutation *p = context;
+    (void)worker;
+    if (p->size == 8) {
+        for (size_t i = begin; i < end; i++)
+            ((uint64_t *)p->to)[i] = ((const uint64_t *)p->from)[p->index[i]];
+    } else {
+        for (size_t i = begin; i < end; i++)
+            memcpy(p->to + i * p->size, p->from + p->index[i] * p->size, p->size);
+    }
+}
+
+static int permute(struct order *o, void **array, size_t size, struct spl_error *err)
+{
+    if (!*array)
+        return 0;
+    struct permutation p = {.index = o->index, .from = *array, .size = size};
+    p.to = spl_alloc_raw(o->count + SPL_POINTS_PAD, size, err);
+    if (!p.to)
+        return SPL_E_NOMEM;
+    spl_parallel_for(o->stage->threads, o->count, grain, permute_piece, &p);
+    memset(p.to + o->count * size, 0, SPL_POINTS_PAD * size);
+    free(*array);
+    *array = p.to;
+    spl_stage_add(o->stage, o->count / 4, 0);
+    return 0;
+}
+
+static void drop_duplicates(struct order *o)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < o->count; i++)
+        if (o->index[i] != dropped)
+            o->index[kept++] = o->index[i];
+    o->points->duplicates = o->count - kept;
+    o->count = kept;
+}
+
+int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err)
+{
+    struct order o = {.points = points, .count = points->count, .stage = stage};
+    int rc = SPL_E_NOMEM;
+    o.pieces = stage->threads;
+    o.piece = (o.count + o.pieces - 1) / o.pieces;
+    spl_stage_begin(stage, "ordering", 3 * o.count);
+    o.key = spl_alloc_raw(o.count, sizeof *o.key, err);
+    o.key_to = spl_alloc_raw(o.count, sizeof *o.key, err);
+    o.index = spl_alloc_raw(o.count, sizeof *o.index, err);
+    o.index_to = spl_alloc_raw(o.count, sizeof *o.index, err);
+    o.histogram = spl_alloc_raw(o.pieces, sizeof *o.histogram, err);
+    if (!o.key || !o.key_to || !o.index || !o.index_to || !o.histogram)
+        goto done;
+    find_cube(&o);
+    spl_parallel_for(stage->threads, o.count, grain, key_piece, &o);
+    radix_sort(&o);
+    spl_parallel_for(stage->threads, o.count, grain, runs_piece, &o);
+    if (atomic_load(&o.failed)) {
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while ordering %zu points", o.count);
+        goto done;
+    }
+    drop_duplicates(&o);
+    free(o.key);
+    free(o.key_to);
+    free(o.index_to);
+    o.key = o.key_to = NULL;
+    o.index_to = NULL;
+    rc = 0;
+    for (int c = 0; c < 3 && !rc; c++)
+        rc = permute(&o, (void **)&points->axis[c], sizeof(double), err);
+    if (!rc)
+        rc = permute(&o, (void **)&points->color_class, sizeof *points->color_class, err);
+    if (!rc)
+        rc = permute(&o, (void **)&points->station, sizeof *points->station, err);
+    if (!rc)
+        rc = permute(&o, (void **)&points->normal, sizeof *points->normal, err);
+    points->count = points->capacity = o.count;
+    spl_stage_end(stage);
+done:
+    free(o.key);
+    free(o.key_to);
+    free(o.index);
+    free(o.index_to);
+    free(o.histogram);
+    return rc;
+}

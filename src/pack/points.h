@@ -1,0 +1,43 @@
+/* The cloud in memory while it is packed: structure of arrays, exact doubles, one element a point. */
+#ifndef SPL_PACK_POINTS_H
+#define SPL_PACK_POINTS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+#include "pack/stage.h"
+
+#define SPL_NO_STATION UINT16_MAX
+#define SPL_COORDINATE_MAX 1e12   /* as far as a camera can be */
+enum { SPL_POINTS_PAD = 16 };     /* elements behind the last one that vector loops may read */
+
+struct spl_points {
+    size_t count, capacity;       /* arrays have room for capacity + SPL_POINTS_PAD elements */
+    double *axis[3];              /* x, y, z; sorted in Morton order by spl_points_order() */
+    uint32_t *color_class;        /* r | g << 8 | b << 16 | class << 24 */
+    uint16_t *station;            /* index into stations or SPL_NO_STATION; NULL when no input has any */
+    float (*normal)[3];           /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
+    float *radius, *uncertainty;  /* made by spl_surface() */
+    double (*stations)[16];       /* row-major station-to-world */
+    uint32_t station_count;
+    bool has_color, has_class;
+    double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
+    uint64_t points_read, points_skipped, duplicates;
+};
+
+/* Reads all inputs. SPL_E_INPUT when no file has a usable point or a coordinate is beyond SPL_COORDINATE_MAX. */
+int spl_points_gather(struct spl_points *points, const char *const *inputs, size_t input_count, const char *columns,
+                      struct spl_stage *stage, struct spl_error *err);
+
+/* Sorts all arrays in Morton order and drops points with equal coordinates, keeping the first read. */
+int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
+
+/* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX); needs sorted points. */
+enum { SPL_NEIGHBOURS_MAX = 64 };
+int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err);
+
+void spl_points_finish(struct spl_points *points);
+
+#endif

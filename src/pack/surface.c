@@ -1,0 +1,373 @@
+/* What each point's surroundings say: normal, radius (soft-transparency paper, eq. 20), uncertainty (eq. 21).
+ *
+ * Blocks of sorted points are done in parallel, each in one go: neighbours, normals, radii, signs within the block. The
+ * neighbour lists live as long as their block; only points with a neighbour in another block keep theirs, a few percent,
+ * until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does the result.
+ *
+ * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K), with two limits that
+ * keep stray and edge points from becoming blobs:
+ * - the K neighbours of a point amid a surface fill a disc of radius d_K; at a border, on a wire or along a scan line
+ *   they fill less, and their covariance tells how much: d_K^2 may be at most 4 sigma_1 sigma_2, its value on a disc;
+ * - no radius exceeds a small multiple of the median radius around it. */
+#include "pack/points.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "geom/eigen.h"
+#include "pack/neighbours.h"
+#include "pack/orient.h"
+
+enum { block_points = 1 << 16 };
+static const float lone_radius = 0.01f;       /* of a point without any other, metres */
+static const float smallest_radius = 1e-9f;   /* keeps squares and quotients of floats in range */
+static const float stray_limit = 2.5f;        /* times the median radius of the neighbours */
+
+struct deferred {            /* a point with a neighbour in another block */
+    uint32_t point;
+    float radius, uncertainty;
+};
+
+struct block {
+    struct deferred *deferred;
+    uint32_t *neighbours;    /* k a deferred point */
+    size_t deferred_count;
+    struct spl_component *components;
+    uint32_t component_count, first_component;
+};
+
+struct scratch {             /* of one worker */
+    uint32_t *neighbours;    /* k a point, unused ones UINT32_MAX */
+    struct spl_orient orient;
+};
+
+struct surface {
+    struct spl_points *points;
+    struct spl_neighbours *neighbours;
+    struct spl_stage *stage;
+    struct scratch *scratch;
+    struct block *blocks;
+    size_t block_count;
+    uint32_t *label;         /* component of each point within its block; NULL when every side is known */
+    struct spl_component *components;
+    unsigned k;
+    atomic_bool failed;
+};
+
+/* Normal and radius of point i from its neighbours; true when the normal's side is known. */
+static bool estimate(struct spl_points *p, size_t i, const struct spl_nearest *near)
+{
+    double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+    double sum[3] = {0}, m[6] = {0};
+    for (unsigned a = 0; a < near->count; a++) {
+        uint32_t j = near->index[a];
+        double d[3] = {p->axis[0][j] - at[0], p->axis[1][j] - at[1], p->axis[2][j] - at[2]};
+        for (int c = 0; c < 3; c++)
+            sum[c] += d[c];
+        m[0] += d[0] * d[0];
+        m[1] += d[0] * d[1];
+        m[2] += d[0] * d[2];
+        m[3] += d[1] * d[1];
+        m[4] += d[1] * d[2];
+        m[5] += d[2] * d[2];
+    }
+    double n = near->count + 1, values[3], least[3], most[3];
+    static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int e = 0; e < 6; e++)
+        m[e] = m[e] / n - sum[row[e]] * sum[column[e]] / (n * n);
+    spl_eigen_symmetric(m, values, least, most);
+
+    double reach = near->farthest * near->farthest;
+    double filled = 4 * sqrt(fmax(0, values[1]) * fmax(0, values[2]));
+    /* Along a line the share is a length; the disc then reaches the next point. */
+    double line = near->farthest / near->count;
+    double radius = 2 * sqrt(fmin(reach, filled) / near->count);
+    radius = fmax(radius, 1.5 * line);
+    p->radius[i] = fmaxf((float)radius, smallest_radius);
+
+    float *normal = p->normal[i];
+    if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0)
+        return true;
+    double side = 1;
+    bool known = p->station && p->station[i] != SPL_NO_STATION;
+    if (known) {
+        const double *pose = p->stations[p->station[i]];
+        side = least[0] * (pose[3] - at[0]) + least[1] * (pose[7] - at[1]) + least[2] * (pose[11] - at[2]);
+    }
+    for (int c = 0; c < 3; c++)
+        normal[c] = (float)(side < 0 ? -least[c] : least[c]);
+    return known;
+}
+
+/* Radius and uncertainty of point i once the normals around it agree in sign. */
+static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float *radius,
+                   float *uncertainty)
+{
+    float around[SPL_NEIGHBOURS_MAX];
+    unsigned n = 0;
+    double sum = 0;
+    const float *a = p->normal[i];
+    for (; n < k && neighbours[n] != UINT32_MAX; n++) {
+        const float *b = p->normal[neighbours[n]];
+        float r = p->radius[neighbours[n]], bend = 2 - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+        sum += bend * bend;
+        unsigned at = n;
+        for (; at > 0 && around[at - 1] > r; at--)
+            around[at] = around[at - 1];
+        around[at] = r;
+    }
+    *radius = fminf(p->radius[i], stray_limit * around[n / 2]);
+    *uncertainty = (float)(*radius * sum / n);
+}
+
+static bool keep_deferred(struct surface *s, struct block *block, size_t begin, size_t end, const uint32_t *neighbours)
+{
+    unsigned k = s->k;
+    size_t count = 0, at = 0;
+    for (int store = 0; store < 2; store++) {
+        for (size_t i = 0; i < end - begin; i++) {
+            const uint32_t *list = neighbours + i * k;
+            bool outside = false;
+            for (unsigned a = 0; a < k && list[a] != UINT32_MAX; a++)
+                outside |= list[a] < begin || list[a] >= end;
+            if (!outside)
+                continue;
+            if (store) {
+                block->deferred[at].point = (uint32_t)(begin + i);
+                memcpy(block->neighbours + at++ * k, list, k * sizeof *list);
+            }
+            count += !store;
+        }
+        if (!store) {
+            block->deferred = spl_alloc_raw(count, sizeof *block->deferred, NULL);
+            block->neighbours = spl_alloc_raw(count, k * sizeof *block->neighbours, NULL);
+            block->deferred_count = count;
+            if (!block->deferred || !block->neighbours)
+                return false;
+        }
+    }
+    return true;
+}
+
+/* Settles what lies wholly in the block; raw radii are read until all are settled, so results wait in `neighbours`. */
+static void settle_inner(struct surface *s, const struct block *block, size_t begin, size_t end, uint32_t *neighbours)
+{
+    struct spl_points *p = s->points;
+    size_t next = 0;
+    for (size_t i = begin; i < end; i++) {
+        if (next < block->deferred_count && block->deferred[next].point == i) {
+            next++;
+            continue;
+        }
+        uint32_t *list = neighbours + (i - begin) * s->k;
+        float radius;
+        settle(p, i, list, s->k, &radius, &p->uncertainty[i]);
+        memcpy(list, &radius, sizeof radius);
+    }
+    next = 0;
+    for (size_t i = begin; i < end; i++) {
+        if (next < block->deferred_count && block->deferred[next].point == i)
+            next++;
+        else
+            memcpy(&p->radius[i], neighbours + (i - begin) * s->k, sizeof(float));
+    }
+}
+
+static bool orient_inner(struct surface *s, struct block *block, struct scratch *w, size_t begin, size_t end)
+{
+    struct spl_orient *o = &w->orient;
+    block->component_count = spl_orient_block(o, s->points, begin, end, w->neighbours, s->k);
+    block->components = spl_alloc(block->component_count, sizeof *block->components, NULL);
+    if (!block->components)
+        return false;
+    for (size_t i = begin; i < end; i++) {
+        struct spl_component *c = &block->components[o->label[i - begin]];
+        c->up += s->points->normal[i][2];
+        c->anchored |= o->anchored[i - begin];
+        s->label[i] = o->label[i - begin];
+    }
+    return true;
+}
+
+static void surface_block(void *context, size_t begin_block, size_t end_block, unsigned worker)
+{
+    struct surface *s = context;
+    struct scratch *w = &s->scratch[worker];
+    for (size_t b = begin_block; b < end_block; b++) {
+        size_t begin = b * block_points;
+        size_t end = begin + block_points < s->points->count ? begin + block_points : s->points->count;
+        struct spl_nearest near;
+        near.warm = false;
+        for (size_t i = begin; i < end; i++) {
+            spl_neighbours_find(s->neighbours, i, s->k, &near);
+            uint32_t *list = w->neighbours + (i - begin) * s->k;
+            for (unsigned a = 0; a < s->k; a++)
+                list[a] = a < near.count ? near.index[a] : UINT32_MAX;
+            w->orient.anchored[i - begin] = estimate(s->points, i, &near);
+            if ((i & 4095) == 4095)
+                spl_stage_add(s->stage, 4096, worker);
+        }
+        if (!keep_deferred(s, &s->blocks[b], begin, end, w->neighbours) ||
+            (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
+            atomic_store(&s->failed, true);
+            return;
+        }
+        settle_inner(s, &s->blocks[b], begin, end, w->neighbours);
+    }
+}
+
+static int join_blocks(struct surface *s, struct spl_error *err)
+{
+    size_t components = 0, edges = 0, count = 0;
+    for (size_t b = 0; b < s->block_count; b++) {
+        s->blocks[b].first_component = (uint32_t)components;
+        components += s->blocks[b].component_count;
+        edges += s->blocks[b].deferred_count * s->k;
+    }
+    struct spl_orient_edge *edge = spl_alloc_raw(edges, sizeof *edge, err);
+    s->components = spl_alloc_raw(components, sizeof *s->components, err);
+    int rc = edge && s->components ? 0 : SPL_E_NOMEM;
+    for (size_t b = 0; !rc && b < s->block_count; b++) {
+        struct block *block = &s->blocks[b];
+        memcpy(s->components + block->first_component, block->components,
+               block->component_count * sizeof *block->components);
+        for (size_t d = 0; d < block->deferred_count; d++) {
+            uint32_t i = block->deferred[d].point;
+            const uint32_t *list = block->neighbours + d * s->k;
+            for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
+                if (list[a] / block_points != b)
+                    edge[count++] = (struct spl_orient_edge){
+                        block->first_component + s->label[i],
+                        s->blocks[list[a] / block_points].first_component + s->label[list[a]],
+                        spl_orient_agreement(s->points, i, list[a])};
+        }
+    }
+    if (!rc)
+        rc = spl_orient_components(s->components, components, edge, count, err);
+    free(edge);
+    return rc;
+}
+
+static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct surface *s = context;
+    (void)worker;
+    for (size_t i = begin; i < end; i++)
+        if (s->components[s->blocks[i / block_points].first_component + s->label[i]].flip)
+            for (int c = 0; c < 3; c++)
+                s->points->normal[i][c] = -s->points->normal[i][c];
+}
+
+static void settle_deferred(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct surface *s = context;
+    (void)worker;
+    for (size_t b = begin; b < end; b++)
+        for (size_t d = 0; d < s->blocks[b].deferred_count; d++) {
+            struct deferred *deferred = &s->blocks[b].deferred[d];
+            settle(s->points, deferred->point, s->blocks[b].neighbours + d * s->k, s->k, &deferred->radius,
+                   &deferred->uncertainty);
+        }
+}
+
+static bool all_sides_known(const struct spl_points *p)
+{
+    for (size_t i = 0; i < p->count; i++) {
+        bool given = p->normal[i][0] != 0 || p->normal[i][1] != 0 || p->normal[i][2] != 0;
+        if (!given && !(p->station && p->station[i] != SPL_NO_STATION))
+            return false;
+    }
+    return true;
+}
+
+static int allocate(struct surface *s, struct spl_error *err)
+{
+    struct spl_points *p = s->points;
+    p->radius = spl_alloc_raw(p->count, sizeof *p->radius, err);
+    p->uncertainty = spl_alloc_raw(p->count, sizeof *p->uncertainty, err);
+    if (!p->normal)
+        p->normal = spl_alloc(p->count + SPL_POINTS_PAD, sizeof *p->normal, err);
+    if (!p->radius || !p->uncertainty || !p->normal)
+        return SPL_E_NOMEM;
+    s->block_count = (p->count + block_points - 1) / block_points;
+    s->blocks = spl_alloc(s->block_count, sizeof *s->blocks, err);
+    s->scratch = spl_alloc(s->stage->threads, sizeof *s->scratch, err);
+    if (!s->blocks || !s->scratch)
+        return SPL_E_NOMEM;
+    size_t capacity = p->count < block_points ? p->count : block_points;
+    for (unsigned t = 0; t < s->stage->threads; t++) {
+        s->scratch[t].neighbours = spl_alloc_raw(capacity, s->k * sizeof(uint32_t), err);
+        if (!s->scratch[t].neighbours || spl_orient_init(&s->scratch[t].orient, capacity, err))
+            return SPL_E_NOMEM;
+    }
+    if (!all_sides_known(p)) {
+        s->label = spl_alloc_raw(p->count, sizeof *s->label, err);
+        if (!s->label)
+            return SPL_E_NOMEM;
+    }
+    s->neighbours = spl_neighbours_create(p, s->stage->threads, err);
+    return s->neighbours ? 0 : SPL_E_NOMEM;
+}
+
+static void finish(struct surface *s)
+{
+    for (size_t b = 0; s->blocks && b < s->block_count; b++) {
+        free(s->blocks[b].deferred);
+        free(s->blocks[b].neighbours);
+        free(s->blocks[b].components);
+    }
+    for (unsigned t = 0; s->scratch && t < s->stage->threads; t++) {
+        free(s->scratch[t].neighbours);
+        spl_orient_finish(&s->scratch[t].orient);
+    }
+    free(s->blocks);
+    free(s->scratch);
+    free(s->label);
+    free(s->components);
+    spl_neighbours_destroy(s->neighbours);
+}
+
+static void lone_point(struct spl_points *p)
+{
+    p->radius[0] = lone_radius;
+    p->uncertainty[0] = lone_radius;
+    if (p->normal[0][0] == 0 && p->normal[0][1] == 0 && p->normal[0][2] == 0)
+        p->normal[0][2] = 1;
+}
+
+int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err)
+{
+    struct surface s = {.points = points, .stage = stage, .k = neighbours};
+    spl_stage_begin(stage, "normals and radii", points->count);
+    int rc = allocate(&s, err);
+    if (rc)
+        goto done;
+    if (points->count == 1) {
+        lone_point(points);
+        goto done;
+    }
+    spl_parallel_for(stage->threads, s.block_count, 1, surface_block, &s);
+    if (atomic_load(&s.failed)) {
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while estimating the normals of %zu points", points->count);
+        goto done;
+    }
+    if (s.label) {
+        rc = join_blocks(&s, err);
+        if (rc)
+            goto done;
+        spl_parallel_for(stage->threads, points->count, block_points, flip_block, &s);
+    }
+    spl_parallel_for(stage->threads, s.block_count, 1, settle_deferred, &s);
+    for (size_t b = 0; b < s.block_count; b++)
+        for (size_t d = 0; d < s.blocks[b].deferred_count; d++) {
+            points->radius[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].radius;
+            points->uncertainty[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].uncertainty;
+        }
+    spl_stage_end(stage);
+done:
+    finish(&s);
+    return rc;
+}

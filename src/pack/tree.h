@@ -1,0 +1,40 @@
+/* The octree over sorted points, and the splats of its inner nodes. */
+#ifndef SPL_PACK_TREE_H
+#define SPL_PACK_TREE_H
+
+#include "pack/points.h"
+
+enum { SPL_LEAF_POINTS = 8192 };
+
+/* A splat of an inner node; position relative to the node's origin. */
+struct spl_inner_splat {
+    float position[3], normal[3];
+    float radius, uncertainty;
+    uint32_t color_class;     /* as in struct spl_points */
+};
+
+struct spl_tree_node {
+    double origin[3];         /* least corner of its cube */
+    double size;
+    size_t begin, end;        /* points below it, in Morton order */
+    uint32_t first_child, child_count; /* 0 children: a leaf */
+    uint32_t depth;           /* of the tree: cubes that hold all points of their parent are skipped */
+    struct spl_inner_splat *splats; /* of an inner node, made by spl_levels_build() */
+    uint32_t splat_count;     /* leaf: end - begin */
+};
+
+struct spl_tree {
+    struct spl_tree_node *nodes; /* breadth first, siblings consecutive */
+    uint32_t count, levels;
+};
+
+/* Splits until no leaf has more than SPL_LEAF_POINTS points or is too wide for floats. `points` are sorted, with radii. */
+int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err);
+
+/* Fills the inner nodes, deepest first: clusters of their children's splats, at most about 28 % as many. */
+int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, struct spl_stage *stage,
+                     struct spl_error *err);
+
+void spl_tree_finish(struct spl_tree *tree);
+
+#endif

@@ -1,0 +1,95 @@
+/* The default view, from an even sample of the sorted points. z is up. */
+#include "pack/view.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+enum { sample_max = 100000, sectors = 36, sector_width = 3 }; /* a view spans 2 * width + 1 sectors of 10 degrees */
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static size_t sample_of(const struct spl_points *p)
+{
+    return p->count < sample_max ? p->count : sample_max;
+}
+
+static void view_from_station(const struct spl_points *p, struct spl_default_view *view)
+{
+    const double *pose = p->stations[0];
+    const double eye[3] = {pose[3], pose[7], pose[11]};
+    double weight[sectors] = {0}, height[sectors] = {0}, reach[sectors] = {0};
+    size_t sample = sample_of(p);
+    for (size_t s = 0; s < sample; s++) {
+        size_t i = s * p->count / sample;
+        double d[3] = {p->axis[0][i] - eye[0], p->axis[1][i] - eye[1], p->axis[2][i] - eye[2]};
+        double range = sqrt(d[0] * d[0] + d[1] * d[1]);
+        if (range == 0)
+            continue;
+        int sector = (int)((atan2(d[1], d[0]) + M_PI) / (2 * M_PI) * sectors) % sectors;
+        weight[sector] += 1;
+        height[sector] += fmin(1, fmax(-1, d[2] / range));
+        reach[sector] += range;
+    }
+    double best = -1, slope = 0, distance = 1;
+    int direction = 0;
+    for (int s = 0; s < sectors; s++) {
+        double w = 0, h = 0, r = 0;
+        for (int k = -sector_width; k <= sector_width; k++) {
+            int at = (s + k + sectors) % sectors;
+            w += weight[at];
+            h += height[at];
+            r += reach[at];
+        }
+        if (w > best) {
+            best = w;
+            direction = s;
+            slope = w > 0 ? h / w : 0;
+            distance = w > 0 ? r / w : 1;
+        }
+    }
+    double angle = (direction + 0.5) / sectors * 2 * M_PI - M_PI;
+    *view = (struct spl_default_view){{eye[0], eye[1], eye[2]},
+                                      {eye[0] + distance * cos(angle), eye[1] + distance * sin(angle),
+                                       eye[2] + distance * slope},
+                                      {0, 0, 1},
+                                      75};
+}
+
+int spl_default_view_find(const struct spl_points *p, struct spl_default_view *view, struct spl_error *err)
+{
+    if (p->station_count && p->station[0] != SPL_NO_STATION) {
+        view_from_station(p, view);
+        return 0;
+    }
+    size_t sample = sample_of(p);
+    double *values = spl_alloc_raw(sample, sizeof *values, err), half[3], diagonal = 0;
+    if (!values)
+        return SPL_E_NOMEM;
+    for (int c = 0; c < 3; c++) {
+        for (size_t s = 0; s < sample; s++)
+            values[s] = p->axis[c][s * p->count / sample];
+        qsort(values, sample, sizeof *values, compare_doubles);
+        double low = values[sample / 100], high = values[sample - 1 - sample / 100];
+        view->target[c] = 0.5 * (low + high);
+        half[c] = 0.5 * (high - low);
+        diagonal += half[c] * half[c];
+    }
+    free(values);
+    /* From the long side, a third above it: what is flat shows its top, what stands shows its front. */
+    static const double direction[3] = {-0.45, -0.75, 0.48};
+    double reach = fmax(sqrt(diagonal), 10 * p->radius[p->count / 2]);
+    bool turned = half[1] > half[0];
+    view->fov = 45;
+    for (int c = 0; c < 3; c++) {
+        double along = direction[turned && c < 2 ? 1 - c : c];
+        view->eye[c] = view->target[c] + 2.2 * reach * along;
+        view->up[c] = c == 2;
+    }
+    return 0;
+}
