@@ -26,13 +26,16 @@ size_t spl_device_list(struct spl_device_info *devices, size_t capacity)
 
 uint64_t spl_gpu_host_memory(void)
 {
+    /* A container's limit: control groups version 2, then 1. "max" does not parse and is none. */
+    static const char *const files[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
     uint64_t bytes = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGESIZE);
-    FILE *file = fopen("/sys/fs/cgroup/memory.max", "r");
-    if (file) {
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         unsigned long long limit;
-        if (fscanf(file, "%llu", &limit) == 1 && limit < bytes)
+        FILE *file = fopen(files[i], "r");
+        if (file && fscanf(file, "%llu", &limit) == 1 && limit < bytes)
             bytes = limit;
-        fclose(file);
+        if (file)
+            fclose(file);
     }
     return bytes;
 }

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
+#include "base/memory.h"
 #include "gpu/gpu.h"
 
 static const char *device; /* "vulkan" or "egl" */
@@ -320,7 +321,7 @@ static void timestamps_grow(void **state)
     close_checked(gpu);
 }
 
-/* A deadline that has passed: either it had ended (and is no loss), or the device is lost; both close cleanly. */
+/* A deadline that has passed: either the work had ended (and is no loss), or the device is lost; both close cleanly. */
 static void deadline_of_zero(void **state)
 {
     (void)state;
@@ -361,6 +362,29 @@ static void loss_is_survived(void **state)
         spl_gpu_buffer_destroy(gpu, work);
         close_checked(gpu);
     }
+}
+
+/* Whatever allocation fails while opening, the error is told and nothing stays behind. */
+static void opening_survives_refused_memory(void **state)
+{
+    (void)state;
+    int refused = 0;
+    for (long n = 1; n <= 16; n++) {
+        struct spl_gpu *gpu;
+        struct spl_error err = {0};
+        spl_memory_fail_after(n);
+        int code = spl_gpu_open(&(struct spl_gpu_options){.device = device, .cache_dir = ""}, &gpu, &err);
+        spl_memory_fail_after(0);
+        if (code == 0) {
+            close_checked(gpu);
+            continue;
+        }
+        refused++;
+        assert_null(gpu);
+        assert_int_equal(code, SPL_E_NO_DEVICE);
+        assert_true(err.message[0]);
+    }
+    assert_true(refused >= 5); /* the device, its buffers, the self-test's */
 }
 
 static void two_devices_on_one_thread(void **state)
@@ -478,6 +502,7 @@ int main(void)
         cmocka_unit_test(timestamps_grow),
         cmocka_unit_test(deadline_of_zero),
         cmocka_unit_test(loss_is_survived),
+        cmocka_unit_test(opening_survives_refused_memory),
         cmocka_unit_test(two_devices_on_one_thread),
         cmocka_unit_test(reopening_does_not_grow),
         cmocka_unit_test(pipeline_cache_is_only_a_cache),

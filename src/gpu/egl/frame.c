@@ -19,6 +19,8 @@ void gl_frames_finish(struct gl_gpu *gpu)
 
 static int check(struct gl_gpu *gpu, struct spl_error *err)
 {
+    if (!gl_use(gpu))
+        return spl_fail(err, SPL_E_DEVICE_LOST, "egl: the context of device '%s' is gone", gpu->base.info.name);
     if (gpu->gl.GetGraphicsResetStatus() != GL_NO_ERROR)
         return spl_fail(err, SPL_E_DEVICE_LOST, "egl: device '%s' was reset", gpu->base.info.name);
     GLenum error = gpu->gl.GetError();
@@ -97,7 +99,8 @@ int gl_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
     gl_barrier(base);
     gpu->slot->sync = gpu->gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     gpu->gl.Flush();
-    return check(gpu, err);
+    int code = check(gpu, err);
+    return code < 0 || gpu->slot->sync ? code : spl_fail(err, SPL_E_DEVICE_LOST, "egl: no fence");
 }
 
 int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
@@ -105,13 +108,14 @@ int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct s
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     if (ticket <= gpu->ended)
         return 0;
-    gl_use(gpu);
     GLsync sync = gpu->slots[(ticket - 1) % SPL_GPU_SLOTS].sync;
-    GLenum result = gpu->gl.ClientWaitSync(sync, GL_SYNC_FLUSH_COMMANDS_BIT,
-                                           timeout_ns < INT64_MAX ? timeout_ns : INT64_MAX);
+    GLenum result = GL_WAIT_FAILED;
+    if (gl_use(gpu))
+        result = gpu->gl.ClientWaitSync(sync, GL_SYNC_FLUSH_COMMANDS_BIT,
+                                        timeout_ns < INT64_MAX ? timeout_ns : INT64_MAX);
     if (result == GL_TIMEOUT_EXPIRED)
         return spl_fail(err, SPL_E_TIMEOUT, "device '%s' did not end its work in time", base->info.name);
-    if (result == GL_WAIT_FAILED) {
+    if (result != GL_ALREADY_SIGNALED && result != GL_CONDITION_SATISFIED) {
         int code = check(gpu, err);
         return code < 0 ? code : spl_fail(err, SPL_E_DEVICE_LOST, "egl: waiting failed");
     }

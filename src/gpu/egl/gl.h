@@ -90,8 +90,9 @@ struct gl_kernel {
  * with the reason; false only past the end. */
 bool gl_context_open(uint32_t index, bool debug, struct gl_gpu *gpu, struct spl_error *err);
 void gl_context_close(struct gl_gpu *gpu);
-/* Makes the device's context current on this thread; several devices may share one. */
-void gl_use(const struct gl_gpu *gpu);
+/* Makes the device's context current on this thread, which several devices may share. Where that fails (the context is
+ * lost) commands go nowhere, which submit reports. */
+bool gl_use(const struct gl_gpu *gpu);
 bool gl_has_extension(const struct gl_functions *gl, const char *name);
 size_t gl_list(struct spl_device_info *devices, size_t capacity);
 

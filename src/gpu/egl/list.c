@@ -32,10 +32,10 @@ static int egl_fail(struct spl_error *err, const char *what)
     return spl_fail(err, SPL_E_NO_DEVICE, "egl: %s: 0x%x", what, code);
 }
 
-void gl_use(const struct gl_gpu *gpu)
+bool gl_use(const struct gl_gpu *gpu)
 {
-    if (eglGetCurrentContext() != gpu->context)
-        eglMakeCurrent(gpu->display, EGL_NO_SURFACE, EGL_NO_SURFACE, gpu->context);
+    return eglGetCurrentContext() == gpu->context ||
+           eglMakeCurrent(gpu->display, EGL_NO_SURFACE, EGL_NO_SURFACE, gpu->context);
 }
 
 bool gl_has_extension(const struct gl_functions *gl, const char *name)

@@ -20,13 +20,6 @@ static void vk_close(struct spl_gpu *base)
         vkDestroyDescriptorSetLayout(gpu->device, gpu->set_layout, NULL);
         vkDestroyDevice(gpu->device, NULL);
     }
-    if (gpu->messenger) {
-        PFN_vkDestroyDebugUtilsMessengerEXT destroy = (PFN_vkDestroyDebugUtilsMessengerEXT)vkGetInstanceProcAddr(
-            gpu->instance, "vkDestroyDebugUtilsMessengerEXT");
-        destroy(gpu->instance, gpu->messenger, NULL);
-    }
-    if (gpu->instance)
-        vkDestroyInstance(gpu->instance, NULL);
     free(gpu);
 }
 
@@ -137,15 +130,16 @@ static int create_layout(struct vk_gpu *gpu, struct spl_error *err)
 static int vk_open(uint32_t index, const struct spl_gpu_options *options, struct spl_gpu **out, struct spl_error *err)
 {
     VkPhysicalDeviceProperties properties;
+    VkInstance instance;
     bool atomics_64;
     struct vk_gpu *gpu = spl_alloc(1, sizeof *gpu, err);
     if (!gpu)
         return SPL_E_NOMEM;
     gpu->base.backend = &spl_gpu_vulkan;
-    int code = vk_instance_create(options->debug, &gpu->instance, &gpu->messenger, err);
+    int code = vk_instance_get(options->debug, &instance, err);
     if (code < 0)
         goto failed;
-    if (!vk_device_get(gpu->instance, index, &gpu->physical, &gpu->base.info, &gpu->family)) {
+    if (!vk_device_get(instance, index, &gpu->physical, &gpu->base.info, &gpu->family)) {
         code = spl_fail(err, SPL_E_NO_DEVICE, "vulkan: device %u has gone", index);
         goto failed;
     }

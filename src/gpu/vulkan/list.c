@@ -1,12 +1,11 @@
-/* The instance, and which of its devices can be used: Vulkan 1.3, a compute queue, push descriptors and timeline
- * semaphores (core). Listing creates an instance and destroys it again; nothing is kept. Any thread. */
+/* Which devices can be used: Vulkan 1.3 (with it timeline semaphores), a compute queue, push descriptors. Nothing is
+ * kept. Any thread. */
 #include "gpu/vulkan/vk.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 
 enum { DEVICES_MAX = 64 };
@@ -45,73 +44,6 @@ int vk_fail(struct spl_error *err, int code, VkResult result, const char *what)
     if (name)
         return spl_fail(err, code, "vulkan: %s: %s", what, name);
     return spl_fail(err, code, "vulkan: %s: VkResult %d", what, (int)result);
-}
-
-static VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
-                                                 VkDebugUtilsMessageTypeFlagsEXT types,
-                                                 const VkDebugUtilsMessengerCallbackDataEXT *data, void *context)
-{
-    (void)types;
-    (void)context;
-    /* The loader's own remarks about other drivers are not about what we do. */
-    if (data->pMessageIdName && !strncmp(data->pMessageIdName, "Loader", 6))
-        return VK_FALSE;
-    spl_gpu_complain("vulkan", severity & VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT, data->pMessage);
-    return VK_FALSE;
-}
-
-static bool has_layer(const char *name)
-{
-    VkLayerProperties layers[64];
-    uint32_t count = 64;
-    if (vkEnumerateInstanceLayerProperties(&count, layers) < 0)
-        return false;
-    for (uint32_t i = 0; i < count; i++)
-        if (!strcmp(layers[i].layerName, name))
-            return true;
-    return false;
-}
-
-int vk_instance_create(bool debug, VkInstance *out, VkDebugUtilsMessengerEXT *messenger, struct spl_error *err)
-{
-    static const char *const layer = "VK_LAYER_KHRONOS_validation", *const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
-    uint32_t version = 0;
-    if (vkEnumerateInstanceVersion(&version) < 0 || version < VK_API_VERSION_1_3)
-        return spl_fail(err, SPL_E_NO_DEVICE, "vulkan: the loader has version %u.%u; 1.3 is needed",
-                        VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version));
-    if (debug && !has_layer(layer)) {
-        spl_log_warn("%s is not installed (Debian: vulkan-validationlayers); rendering goes on unchecked", layer);
-        debug = false;
-    }
-    VkDebugUtilsMessengerCreateInfoEXT reports = {
-        .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
-        .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
-                           VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-        .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT |
-                       VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
-        .pfnUserCallback = on_message,
-    };
-    VkResult result = vkCreateInstance(
-        &(VkInstanceCreateInfo){
-            .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
-            .pNext = debug ? &reports : NULL,
-            .pApplicationInfo = &(VkApplicationInfo){.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
-                                                     .pApplicationName = "splatd",
-                                                     .apiVersion = VK_API_VERSION_1_3},
-            .enabledLayerCount = debug,
-            .ppEnabledLayerNames = &layer,
-            .enabledExtensionCount = debug,
-            .ppEnabledExtensionNames = &extension,
-        },
-        NULL, out);
-    if (result < 0)
-        return vk_fail(err, SPL_E_NO_DEVICE, result, "no instance");
-    if (debug) {
-        PFN_vkCreateDebugUtilsMessengerEXT create =
-            (PFN_vkCreateDebugUtilsMessengerEXT)vkGetInstanceProcAddr(*out, "vkCreateDebugUtilsMessengerEXT");
-        create(*out, &reports, NULL, messenger);
-    }
-    return 0;
 }
 
 static bool has_push_descriptors(VkPhysicalDevice device)
@@ -175,9 +107,9 @@ size_t vk_list(struct spl_device_info *devices, size_t capacity)
 {
     struct spl_error err = {0};
     struct spl_device_info info = {.backend = "vulkan", .name = "none"};
-    VkInstance instance = VK_NULL_HANDLE;
+    VkInstance instance;
     size_t count = 0;
-    if (vk_instance_create(false, &instance, NULL, &err) < 0) {
+    if (vk_instance_get(false, &instance, &err) < 0) {
         snprintf(info.unusable, sizeof info.unusable, "%.*s", (int)sizeof info.unusable - 1, err.message);
         if (capacity)
             devices[0] = info;
@@ -187,6 +119,5 @@ size_t vk_list(struct spl_device_info *devices, size_t capacity)
     for (; vk_device_get(instance, (uint32_t)count, &device, &info, NULL); count++)
         if (count < capacity)
             devices[count] = info;
-    vkDestroyInstance(instance, NULL);
     return count;
 }

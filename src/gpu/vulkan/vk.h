@@ -16,8 +16,6 @@ struct vk_slot {                   /* one list: recorded while the other may run
 
 struct vk_gpu {
     struct spl_gpu base;           /* first */
-    VkInstance instance;
-    VkDebugUtilsMessengerEXT messenger;
     VkPhysicalDevice physical;
     VkPhysicalDeviceMemoryProperties memory;
     VkDevice device;
@@ -48,11 +46,12 @@ struct vk_kernel {
     VkPipeline pipeline;
 };
 
+/* instance.c. Borrowed for the life of the process; with `debug` it carries the validation layer where that is installed. */
+int vk_instance_get(bool debug, VkInstance *out, struct spl_error *err);
+
 /* list.c. Fills `err` with `what` and the name of `result`; the code is SPL_E_DEVICE_LOST for a lost device, else
  * `code`. */
 int vk_fail(struct spl_error *err, int code, VkResult result, const char *what);
-/* With `debug`, and where the layer is installed, also a messenger (else it stays as it is). */
-int vk_instance_create(bool debug, VkInstance *out, VkDebugUtilsMessengerEXT *messenger, struct spl_error *err);
 /* The index-th device, judged; `family` may be NULL. False past the end. */
 bool vk_device_get(VkInstance instance, uint32_t index, VkPhysicalDevice *out, struct spl_device_info *info,
                    uint32_t *family);
