@@ -51,6 +51,10 @@
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
 
+/* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane as long as that lies
+ * within this many sample sizes of the centre's depth (a slant of 76 degrees), else the centre's. */
+#define SPL_LOW_PASS_REACH 2.828427f
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */

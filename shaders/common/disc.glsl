@@ -2,7 +2,7 @@
  *
  * The sample's ray meets the disc's plane at z = n.p / n.d (d.z = 1), exact under perspective. A splat that is smaller
  * than a sample still covers the sample that its centre falls on: within `low_pass` samples of the centre it counts as
- * covered, at the centre's depth where the ray misses the disc itself. */
+ * covered, with its plane's depth there as long as that is near the centre's (SPL_LOW_PASS_REACH). */
 #ifndef SPL_DISC_GLSL
 #define SPL_DISC_GLSL
 
@@ -87,7 +87,8 @@ float disc_sample(disc d, ivec2 at, out float z)
     precise vec2 q = d.ray * w + vec2(uv.x * frame.inverse_fx, uv.y * frame.inverse_fy) * k;
     precise float distance = (q.x * q.x + q.y * q.y + w * w) * d.inverse_radius_squared;
     bool on_disc = distance < 1.0 && k > 0.0;
-    precise float along = d.depth * (on_disc ? k : 1.0);
+    bool on_plane = on_disc || abs(w) <= SPL_LOW_PASS_REACH * frame.inverse_fx;
+    precise float along = d.depth * (on_plane ? k : 1.0);
     z = along;
     return on_disc ? min(distance, near_center) : near_center;
 }

@@ -1,5 +1,5 @@
 /* Depth against the truth: a tilted plane and a sphere, sampled densely with exact normals, quantised by the codec and
- * blended by the kernels. At every pixel that sees the surface at no more than 60 degrees, well inside its rim, the
+ * blended by the kernels. At every pixel that sees the surface at no more than 70 degrees, well inside its rim, the
  * point that comes back lies within 3 % of a splat radius of the surface; its depth, which slant enlarges by 1 / cos,
  * is that near the truth in 99 % of these pixels, and in all that see the surface within 35 degrees. One body for every
  * backend. */
@@ -81,7 +81,7 @@ static void measure_pixel(struct tally *tally, const struct spl_camera *c, const
     spl_primitive_normal(p, hit, normal);
     double facing = fabs(dot3(normal, ray)) / sqrt(dot3(ray, ray)), rim = 4 * radius;
     sub3(hit, p->center, hit);
-    if (facing < cos(60 * M_PI / 180) ||
+    if (facing < cos(70 * M_PI / 180) ||
         (p->kind == SPL_PRIMITIVE_RECTANGLE &&
          (fabs(dot3(hit, p->u)) > p->half[0] - rim || fabs(dot3(hit, p->v)) > p->half[1] - rim)))
         return;
@@ -102,13 +102,13 @@ static void measure_pixel(struct tally *tally, const struct spl_camera *c, const
 }
 
 static void check_view(const struct spl_dataset *dataset, const struct spl_primitive *p, const double eye[3],
-                       double lod, double radius, const char *what)
+                       double radius, const char *what)
 {
     const double up[3] = {0, 0.1, 1};
     struct spl_view view;
     spl_view_init(&view);
     view.layers = 1 << SPL_LAYER_DEPTH;
-    view.lod = lod;
+    view.lod = 0; /* the splats as they are: how levels look is not in question */
     view.camera.near = 0.05;
     view.camera.far = 100;
     assert_int_equal(spl_camera_look_at(&view.camera, eye, p->center, up, NULL), SPL_OK);
@@ -124,13 +124,13 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_primi
         measure_pixel(&t, &view.camera, p, radius, (uint32_t)(i % view.camera.width), (uint32_t)(i / view.camera.width),
                       (double)depth[i]);
     spl_frame_finish(&frame);
-    assert_true(t.count > 5000);
+    assert_true(t.count > 2000);
     qsort(t.depth, t.count, sizeof *t.depth, by_size);
     double most = t.depth[t.count * 99 / 100];
-    print_message("%s, lod %g, %% of a radius: depth mean %+.2f, rms %.2f, 99 %% of %zu pixels %.2f, worst %.2f, "
+    print_message("%s, %% of a radius: depth mean %+.2f, rms %.2f, 99 %% of %zu pixels %.2f, worst %.2f, "
                   "worst of %zu that face the eye %.2f; worst distance from the surface %.2f\n",
-                  what, lod, 100 * t.sum / (double)t.count, 100 * sqrt(t.squares / (double)t.count), t.count,
-                  100 * most, 100 * t.depth[t.count - 1], t.facing, 100 * t.facing_worst, 100 * t.surface_worst);
+                  what, 100 * t.sum / (double)t.count, 100 * sqrt(t.squares / (double)t.count), t.count, 100 * most,
+                  100 * t.depth[t.count - 1], t.facing, 100 * t.facing_worst, 100 * t.surface_worst);
     free(t.depth);
     assert_int_equal(t.holes, 0);
     assert_true(t.surface_worst <= tolerance);
@@ -165,14 +165,14 @@ static void plane_depth_is_true(void **state)
         struct spl_dataset *dataset = make_dataset(splats, side * side);
         free(splats);
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-        for (int tilt = 0; tilt <= 50; tilt += 25) {
-            double eye[3], what = tilt * M_PI / 180;
+        for (int view = 0; view < 6; view++) { /* a splat is two pixels wide and more, then less than one */
+            double eye[3], distance = view < 3 ? 1.6 : 6, tilt = view % 3 * M_PI / 6;
             char name[64];
-            mad3(centers[place], 1.6 * cos(what), normal, eye);
-            mad3(eye, 1.6 * sin(what), u, eye);
-            snprintf(name, sizeof name, "plane %s, %d degrees", place ? "at UTM" : "at the origin", tilt);
-            check_view(dataset, &scene.primitives[0], eye, 0, radius_of_spacing * spacing, name);
-            check_view(dataset, &scene.primitives[0], eye, 1, radius_of_spacing * spacing, name);
+            mad3(centers[place], distance * cos(tilt), normal, eye);
+            mad3(eye, distance * sin(tilt), u, eye);
+            snprintf(name, sizeof name, "plane %s, %d degrees, %g m", place ? "at UTM" : "at the origin", view % 3 * 30,
+                     distance);
+            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, name);
         }
         spl_renderer_remove(renderer, dataset);
         spl_dataset_close(dataset);
@@ -205,8 +205,7 @@ static void sphere_depth_is_true(void **state)
             char name[64];
             mad3(centers[place], 1.7, directions[i], eye);
             snprintf(name, sizeof name, "sphere %s, view %d", place ? "at UTM" : "at the origin", i);
-            check_view(dataset, &scene.primitives[0], eye, 0, radius_of_spacing * spacing, name);
-            check_view(dataset, &scene.primitives[0], eye, 1, radius_of_spacing * spacing, name);
+            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, name);
         }
         spl_renderer_remove(renderer, dataset);
         spl_dataset_close(dataset);

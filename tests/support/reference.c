@@ -100,7 +100,8 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float qx = rx * w + ox * (1 / (float)s->camera.fx) * k, qy = ry * w + oy * (1 / (float)s->camera.fy) * k;
     float scale = p[2] / d->radius, distance = (qx * qx + qy * qy + w * w) * (scale * scale);
     bool on_disc = distance < 1 && k > 0;
-    *z = on_disc ? p[2] * k : p[2];
+    bool on_plane = on_disc || fabsf(w) <= SPL_LOW_PASS_REACH * (1 / (float)s->camera.fx);
+    *z = on_plane ? p[2] * k : p[2];
     return on_disc && distance < near_center ? distance : near_center;
 }
 
