@@ -104,10 +104,11 @@ int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
     json_error_t where;
     dataset->meta = json_loadb((const char *)dataset->map + section->offset, section->bytes, JSON_REJECT_DUPLICATES,
                                &where);
-    if (!json_is_object(dataset->meta))
+    if (!dataset->meta)
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object: %s at byte %d; pack the dataset again",
-                        dataset->path, dataset->meta ? "another value" : where.text,
-                        dataset->meta ? 0 : where.position);
+                        dataset->path, where.text, where.position);
+    if (!json_is_object(dataset->meta))
+        return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again", dataset->path);
     const json_t *bounds = json_object_get(dataset->meta, "bounds");
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     uint64_t levels = 0;

@@ -1,0 +1,156 @@
+/* splatd info as scripts meet it: output, exit codes, messages. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <jansson.h>
+
+#include "support/make_dataset.h"
+
+static char folder[256];
+
+/* Runs `splatd info ARGUMENTS` in the folder, stdout and stderr into `output`; returns the exit code. */
+static int run(const char *arguments, char *output, size_t size)
+{
+    char command[1024];
+    snprintf(command, sizeof command, "cd '%s' && '%s' info %s", folder, getenv("SPLATD_BINARY"), arguments);
+    FILE *pipe = popen(command, "r");
+    size_t used = fread(output, 1, size - 1, pipe);
+    output[used] = 0;
+    return WEXITSTATUS(pclose(pipe));
+}
+
+static void flip_page_byte(const char *name)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r+b");
+    fseek(file, 65536, SEEK_SET);
+    int byte = fgetc(file);
+    fseek(file, 65536, SEEK_SET);
+    fputc(byte ^ 1, file);
+    fclose(file);
+}
+
+static void make(const char *name, size_t count, int levels)
+{
+    char path[300];
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++)
+        splats[i] = (struct make_splat){.position = {0.5 * (double)(i % 100), 0.5 * (double)(i / 100), 0}, .normal = {0, 0, 1},
+                                        .radius = 0.5f, .color = {(uint8_t)i, 10, 10}};
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    make_dataset_file(path, splats, count, levels);
+    free(splats);
+}
+
+static double number(const json_t *json, const char *key)
+{
+    assert_true(json_is_number(json_object_get(json, key)));
+    return json_number_value(json_object_get(json, key));
+}
+
+static void test_json(void **state)
+{
+    (void)state;
+    static const char *const attributes[] = {"position", "radius", "normal", "color", "class", "uncertainty", "chunk"};
+    char output[8192];
+    assert_int_equal(run("--json two.spld", output, sizeof output), 0);
+    json_t *json = json_loads(output, 0, NULL);
+    assert_string_equal(json_string_value(json_object_get(json, "id")), "two");
+    assert_true(number(json, "points") == 4000 && number(json, "splats") == 4500 && number(json, "levels") == 2);
+    const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");
+    assert_true(json_number_value(json_array_get(max, 0)) == 49.5 && json_number_value(json_array_get(max, 2)) == 0);
+    const json_t *bytes = json_object_get(json, "bytes_per_splat"), *levels = json_object_get(json, "by_level"), *level;
+    double sum = 0, splats = 0;
+    for (size_t i = 0; i < sizeof attributes / sizeof *attributes; i++)
+        sum += number(bytes, attributes[i]);
+    assert_true(sum > 1 && sum < number(bytes, "total") + 1e-9 && sum > number(bytes, "total") - 1e-9);
+    size_t i;
+    json_array_foreach(levels, i, level)
+        splats += number(level, "splats");
+    assert_true(splats == 4500);
+    assert_true(number(json, "file_bytes") > number(json, "page_bytes"));
+    assert_int_equal(strlen(json_string_value(json_object_get(json, "version"))), 16);
+    const char *name;
+    json_t *histogram;
+    json_object_foreach(json_object_get(json, "widths"), name, histogram)
+    {
+        double share = 0;
+        const char *width;
+        json_t *value;
+        json_object_foreach(histogram, width, value)
+            share += json_number_value(value);
+        assert_true(share > 0.999999 && share < 1.000001);
+    }
+    json_decref(json);
+}
+
+static void test_table(void **state)
+{
+    (void)state;
+    char output[8192];
+    assert_int_equal(run("two.spld one.spld", output, sizeof output), 0);
+    assert_non_null(strstr(output, "splats        4,500: 4,000 points and 500 for coarser levels (12.5 %)"));
+    assert_non_null(strstr(output, "one  version "));
+}
+
+static void test_exit_codes(void **state)
+{
+    (void)state;
+    char output[8192];
+    assert_int_equal(run("2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "at least one NAME.spld"));
+    assert_int_equal(run("--jsno one.spld 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "'splatd info --help' shows how"));
+    assert_int_equal(run("--help", output, sizeof output), 0);
+    assert_non_null(strstr(output, "splatd info courtyard.spld"));
+    assert_int_equal(run("missing.spld one.spld 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "missing.spld: there is no such file"));
+    assert_non_null(strstr(output, "one  version ")); /* the others are still told of */
+    assert_int_equal(run("one.spld >/dev/full 2>/dev/null", output, sizeof output), 1);
+
+    make("hurt.spld", 100, 1);
+    flip_page_byte("hurt.spld");
+    assert_int_equal(run("--json hurt.spld 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "section PAGE 0 fails its checksum"));
+    assert_null(strchr(output, '{'));
+    assert_int_equal(run("--no-verify hurt.spld", output, sizeof output), 0);
+}
+
+static int prepare(void **state)
+{
+    (void)state;
+    make_folder(folder);
+    make("one.spld", 1, 1);
+    make("two.spld", 4000, 2);
+    return 0;
+}
+
+static int clean(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"one.spld", "two.spld", "hurt.spld"};
+    for (size_t i = 0; i < 3; i++) {
+        char path[300];
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        unlink(path);
+    }
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_json),
+        cmocka_unit_test(test_table),
+        cmocka_unit_test(test_exit_codes),
+    };
+    return cmocka_run_group_tests(tests, prepare, clean);
+}

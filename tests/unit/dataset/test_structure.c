@@ -1,0 +1,353 @@
+/* Files whose checksums hold but whose content does not: each forged field is refused, naming section and item. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <xxhash.h>
+
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
+#include "dataset/writer.h"
+#include "support/make_dataset.h"
+
+static char folder[256], path[300];
+
+/* A dataset of two levels, taken apart; the forgers below change it before it is written anew. */
+struct parts {
+    struct spl_node *nodes;
+    struct spl_chunk *chunks;
+    uint32_t node_count, chunk_count;
+    json_t *meta;
+    uint32_t *words;
+    size_t word_count;
+};
+
+static void *copy(const void *from, size_t bytes)
+{
+    return memcpy(malloc(bytes + 128), from, bytes);
+}
+
+static struct parts take_apart(void)
+{
+    enum { count = 400 };
+    struct make_splat splats[count];
+    for (int i = 0; i < count; i++)
+        splats[i] = (struct make_splat){.position = {i % 20, i / 20, i % 3}, .normal = {0, 0, 1}, .radius = 1 + i % 2,
+                                        .color = {(uint8_t)i}, .classification = (uint8_t)(i % 4)};
+    struct spl_dataset *dataset = make_dataset_levels(splats, count, 2);
+    struct parts p = {0};
+    size_t bytes;
+    p.nodes = (struct spl_node *)spl_dataset_get_nodes(dataset, &p.node_count);
+    p.nodes = copy(p.nodes, p.node_count * sizeof *p.nodes);
+    p.chunks = (struct spl_chunk *)spl_dataset_get_chunks(dataset, &p.chunk_count);
+    p.chunks = copy(p.chunks, p.chunk_count * sizeof *p.chunks);
+    const uint32_t *page = spl_dataset_get_page(dataset, 0, &bytes);
+    p.word_count = bytes / 4 - SPL_PAGE_TAIL_WORDS;
+    p.words = copy(page, bytes);
+    p.meta = json_deep_copy(spl_dataset_get_meta(dataset));
+    spl_dataset_close(dataset);
+    assert_true(p.node_count == 5 && p.chunk_count >= 5);
+    return p;
+}
+
+static void write_parts(const struct parts *p)
+{
+    struct spl_dataset_writer *writer;
+    uint32_t page;
+    assert_int_equal(spl_dataset_writer_create(path, &writer, NULL), SPL_OK);
+    assert_int_equal(spl_dataset_writer_add_node(writer, p->words, p->word_count, NULL, 0, &page, NULL), SPL_OK);
+    assert_int_equal(
+        spl_dataset_writer_finish(writer, p->nodes, p->node_count, p->chunks, p->chunk_count, p->meta, NULL), SPL_OK);
+    spl_dataset_writer_destroy(writer);
+}
+
+static void release(struct parts *p)
+{
+    free(p->nodes);
+    free(p->chunks);
+    free(p->words);
+    json_decref(p->meta);
+}
+
+static void expect(const char *what, int code, const char *part)
+{
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0};
+    int rc = spl_dataset_open(path, true, &dataset, &err);
+    spl_dataset_close(dataset);
+    if (rc != code || (rc && (!strstr(err.message, part) || !strstr(err.message, path))))
+        fail_msg("%s: expected %d '%s', got %d '%s'", what, code, part, rc, err.message);
+}
+
+#define FORGE(name, statement)                                                                                          \
+    static void name(struct parts *p)                                                                                  \
+    {                                                                                                                  \
+        statement;                                                                                                     \
+    }
+FORGE(nothing, (void)p)
+FORGE(root_depth, p->nodes[0].depth = 1)
+FORGE(child_depth, p->nodes[3].depth = 2)
+FORGE(cycle, p->nodes[0].first_child = 0)
+FORGE(child_beyond, p->nodes[0].first_child = 2)
+FORGE(children_missing, p->nodes[0].child_count = 3)
+FORGE(children_many, p->nodes[0].child_count = 9)
+FORGE(children_beyond, p->node_count = 4)
+FORGE(grandchild, (p->nodes[4].child_count = 1, p->nodes[4].first_child = 5))
+FORGE(stray_first_child, p->nodes[2].first_child = 3)
+FORGE(page_number, p->nodes[2].page = 1)
+FORGE(shared_chunk, p->nodes[2].first_chunk = p->nodes[1].first_chunk)
+FORGE(chunk_beyond, p->nodes[4].first_chunk = UINT32_MAX)
+FORGE(chunks_beyond, p->nodes[4].chunk_count = 4096)
+FORGE(no_chunks, p->nodes[1].chunk_count = 0)
+FORGE(orphan_chunk, (p->chunks[p->chunk_count] = p->chunks[p->chunk_count - 1],
+                     p->chunks[p->chunk_count].first_id += p->chunks[p->chunk_count].count, p->chunk_count++))
+FORGE(origin_nan, p->nodes[1].origin[1] = NAN)
+FORGE(size_zero, p->nodes[0].size = 0)
+FORGE(size_huge, p->nodes[2].size *= 2)
+FORGE(child_moved, p->nodes[2].origin[0] += 1e4)
+FORGE(child_nan_size, p->nodes[2].size = NAN)
+FORGE(spacing_negative, p->nodes[0].spacing = -1)
+FORGE(box_turned, p->nodes[0].box_min[2] = p->nodes[0].box_max[2] + 1)
+FORGE(box_infinite, p->nodes[0].box_max[0] = INFINITY)
+FORGE(count_zero, p->chunks[1].count = 0)
+FORGE(count_large, p->chunks[1].count = 129)
+FORGE(id_gap, p->chunks[2].first_id += 1)
+FORGE(step_zero, p->chunks[0].step = 0)
+FORGE(step_nan, p->chunks[0].step = NAN)
+FORGE(step_overflows, (p->chunks[0].step = 1e35f, p->chunks[0].geometry_bits |= 24))
+FORGE(wide_position, p->chunks[0].geometry_bits |= 25)
+FORGE(wide_normal, p->chunks[0].geometry_bits |= 13u << SPL_GEOMETRY_U)
+FORGE(radius_negative, p->chunks[0].radius_min = -1)
+FORGE(mean_radius_zero, p->chunks[0].radius_mean = 0)
+FORGE(normal_off, p->chunks[0].normal_u = 5)
+FORGE(normal_step, p->chunks[0].normal_step = -1)
+FORGE(axis_three, p->chunks[0].geometry_bits |= 3u << SPL_GEOMETRY_AXIS)
+FORGE(unknown_bit, p->chunks[0].geometry_bits |= 1u << 31)
+FORGE(wide_color, p->chunks[0].color_bits |= 15)
+FORGE(color_base, p->chunks[0].color_base = 0x7fff)
+FORGE(wide_class, p->chunks[0].extra_bits |= 15)
+FORGE(uncertainty_nan, p->chunks[0].uncertainty_max = NAN)
+FORGE(past_page, p->chunks[p->chunk_count - 1].geometry_word += 1 + 16)
+FORGE(word_wraps, p->chunks[0].geometry_word = UINT32_MAX)
+FORGE(levels, json_object_set_new(p->meta, "levels", json_integer(3)))
+FORGE(leaf_splats, json_object_set_new(p->meta, "leaf_splats", json_integer(399)))
+FORGE(points_few, json_object_set_new(p->meta, "points", json_integer(399)))
+FORGE(points_text, json_object_set_new(p->meta, "points", json_string("400")))
+FORGE(points_gone, json_object_del(p->meta, "points"))
+FORGE(radius_gone, json_object_del(p->meta, "splat_radius"))
+FORGE(bounds_turned, json_array_set_new(json_object_get(json_object_get(p->meta, "bounds"), "min"), 0, json_real(1e9)))
+FORGE(bounds_short, json_array_remove(json_object_get(json_object_get(p->meta, "bounds"), "max"), 2))
+FORGE(fov, json_object_set_new(json_object_get(p->meta, "default_view"), "fov", json_real(180)))
+FORGE(eye, json_object_set(json_object_get(p->meta, "default_view"), "eye",
+                           json_object_get(json_object_get(p->meta, "default_view"), "target")))
+FORGE(flags, json_object_del(json_object_get(p->meta, "attributes"), "class"))
+FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
+FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
+FORGE(not_an_object, (json_decref(p->meta), p->meta = json_array()))
+
+static const struct {
+    void (*forge)(struct parts *p);
+    const char *part; /* of the message; NULL: opens */
+} rows[] = {
+    {nothing, NULL},
+    {root_depth, "section NODE: node 0 is the root"},
+    {child_depth, "section NODE: node 3 is not one deeper"},
+    {cycle, "section NODE: node 0 has children that do not follow"},
+    {child_beyond, "section NODE: node 0 has children that do not follow"},
+    {children_missing, "section NODE: node 4 is no node's child"},
+    {children_many, "section NODE: node 0 has more than 8"},
+    {children_beyond, "section NODE: node 0 has children that do not follow"},
+    {grandchild, "section NODE: node 4 has children"},
+    {stray_first_child, "section NODE: node 2 has a first child"},
+    {page_number, "section NODE: node 2 names a page"},
+    {shared_chunk, "section NODE: node 2 shares a chunk"},
+    {chunk_beyond, "section NODE: node 4 names chunks"},
+    {chunks_beyond, "section NODE: node 4 names chunks"},
+    {no_chunks, "section NODE: node 1 has no chunks"},
+    {orphan_chunk, "section CHNK: number of chunks"},
+    {origin_nan, "section NODE: node 1 has no finite origin"},
+    {size_zero, "section NODE: node 0 has a size"},
+    {size_huge, "section NODE: node 2 is larger than half"},
+    {child_moved, "section NODE: node 2 lies outside"},
+    {child_nan_size, "section NODE: node 2 has a size"},
+    {spacing_negative, "section NODE: node 0 has a size or spacing"},
+    {box_turned, "section NODE: node 0 has a box"},
+    {box_infinite, "section NODE: node 0 has no finite box"},
+    {count_zero, "section CHNK: chunk 1 has no splats"},
+    {count_large, "section CHNK: chunk 1 has no splats, or more"},
+    {id_gap, "section CHNK: chunk 2 does not continue"},
+    {step_zero, "section CHNK: chunk 0 has a step"},
+    {step_nan, "section CHNK: chunk 0 has a step"},
+    {step_overflows, "section CHNK: chunk 0 has positions"},
+    {wide_position, "section CHNK: chunk 0 has positions"},
+    {wide_normal, "section CHNK: chunk 0 has normals"},
+    {radius_negative, "section CHNK: chunk 0 has a step or radius"},
+    {mean_radius_zero, "section CHNK: chunk 0 has a step or radius"},
+    {normal_off, "section CHNK: chunk 0 has normals off"},
+    {normal_step, "section CHNK: chunk 0 has a step"},
+    {axis_three, "section CHNK: chunk 0 has geometry bits"},
+    {unknown_bit, "section CHNK: chunk 0 has geometry bits"},
+    {wide_color, "section CHNK: chunk 0 has colours"},
+    {color_base, "section CHNK: chunk 0 has colours"},
+    {wide_class, "section CHNK: chunk 0 has classes"},
+    {uncertainty_nan, "section CHNK: chunk 0 has classes or uncertainties"},
+    {past_page, "reaches beyond the end of its page"},
+    {word_wraps, "section CHNK: chunk 0 reaches beyond"},
+    {levels, "section META: \"levels\" 3 is not"},
+    {leaf_splats, "section META: \"leaf_splats\" 399 is not"},
+    {points_few, "section META: \"leaf_splats\" is larger"},
+    {points_text, "section META: \"points\" must be"},
+    {points_gone, "section META: \"points\" must be"},
+    {radius_gone, "section META: \"splat_radius\" must be"},
+    {bounds_turned, "section META: \"bounds\" has a minimum"},
+    {bounds_short, "section META: \"bounds\" must hold"},
+    {fov, "section META: \"default_view\" has no \"fov\""},
+    {eye, "section META: \"default_view\" is no view"},
+    {flags, "section META: \"attributes\" must say"},
+    {sources, "section META: \"sources\" must be"},
+    {stations, "section META: \"stations\" must hold"},
+    {not_an_object, "section META is no JSON object"},
+};
+
+static void test_forged_content(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct parts p = take_apart();
+        char what[32];
+        snprintf(what, sizeof what, "row %zu", i);
+        rows[i].forge(&p);
+        write_parts(&p);
+        expect(what, rows[i].part ? SPL_E_CORRUPT : SPL_OK, rows[i].part);
+        unlink(path);
+        release(&p);
+    }
+}
+
+/* Header and table, with room for more sections. */
+struct raw {
+    uint8_t *data;
+    size_t size;
+    struct spl_file_header *header;
+    struct spl_section *table;
+};
+
+/* Loads the written file, its table moved to the end of a larger block. */
+static struct raw load_raw(void)
+{
+    FILE *file = fopen(path, "rb");
+    struct raw raw = {.data = calloc(1, 1 << 20)};
+    raw.size = fread(raw.data, 1, 1 << 20, file);
+    fclose(file);
+    raw.header = (struct spl_file_header *)raw.data;
+    raw.table = (struct spl_section *)(raw.data + raw.header->table_offset);
+    return raw;
+}
+
+static void save_raw(struct raw *raw)
+{
+    size_t table_bytes = raw->header->section_count * sizeof *raw->table;
+    if (table_bytes < 4096) {
+        raw->header->table_hash = XXH3_64bits(raw->table, table_bytes);
+    }
+    raw->header->header_hash = XXH3_64bits(raw->header, offsetof(struct spl_file_header, header_hash));
+    FILE *file = fopen(path, "wb");
+    assert_int_equal(fwrite(raw->data, 1, raw->size, file), raw->size);
+    fclose(file);
+}
+
+#define FORGE_RAW(name, statement)                                                                                      \
+    static void name(struct raw *r)                                                                                    \
+    {                                                                                                                  \
+        statement;                                                                                                     \
+    }
+FORGE_RAW(raw_nothing, (void)r)
+FORGE_RAW(raw_four_billion, r->header->section_count = UINT32_MAX)
+FORGE_RAW(raw_no_sections, r->header->section_count = 0)
+FORGE_RAW(raw_table_offset, r->header->table_offset = UINT64_MAX - 7)
+FORGE_RAW(raw_table_at_header, r->header->table_offset = 0)
+FORGE_RAW(raw_header_size, r->header->header_bytes = 64)
+FORGE_RAW(raw_version, r->header->version = 2)
+FORGE_RAW(raw_long, r->header->file_bytes += 1000)
+FORGE_RAW(raw_page_beyond, r->table[0].bytes = UINT64_MAX)
+FORGE_RAW(raw_offset_wraps, (r->table[0].offset = UINT64_MAX - 65535, r->table[0].bytes = 65536))
+FORGE_RAW(raw_misaligned, (r->table[0].offset += 64, r->table[0].bytes -= 64))
+FORGE_RAW(raw_overlap, r->table[1].offset = r->table[0].offset)
+FORGE_RAW(raw_over_table, r->table[3].bytes += 72)
+FORGE_RAW(raw_tiny_page, r->table[0].bytes = 4)
+FORGE_RAW(raw_page_index, r->table[0].index = 1)
+FORGE_RAW(raw_two_metas, r->table[2].type = SPL_SECTION_META)
+FORGE_RAW(raw_no_meta, r->table[1].type = SPL_FOURCC('X', 'X', 'X', 'X'))
+FORGE_RAW(raw_half_node, r->table[2].bytes -= 1)
+FORGE_RAW(raw_half_chunk, r->table[3].bytes -= 1)
+FORGE_RAW(raw_no_page, r->table[0].type = SPL_FOURCC('X', 'X', 'X', 'X'))
+FORGE_RAW(raw_unknown, (memmove(r->table + 1, r->table, 4 * sizeof *r->table),
+                        r->table[0] = (struct spl_section){.type = SPL_FOURCC('N', 'E', 'W', 'S'), .offset = 64, .bytes = 3,
+                                                           .hash = XXH3_64bits("\0\0\0", 3)},
+                        r->header->section_count++, r->header->file_bytes += 32, r->size += 32))
+FORGE_RAW(raw_unknown_damaged, (raw_unknown(r), r->table[0].hash ^= 1))
+
+static const struct {
+    void (*forge)(struct raw *r);
+    int code;
+    const char *part;
+} raw_rows[] = {
+    {raw_nothing, SPL_OK, NULL},
+    {raw_four_billion, SPL_E_CORRUPT, "section table lies outside the file"},
+    {raw_no_sections, SPL_E_CORRUPT, "section table lists no section META"},
+    {raw_table_offset, SPL_E_CORRUPT, "section table lies outside the file"},
+    {raw_table_at_header, SPL_E_CORRUPT, "section table lies outside the file"},
+    {raw_header_size, SPL_E_CORRUPT, "header has a size"},
+    {raw_version, SPL_E_UNSUPPORTED, "format version 2, this splatd reads version 1"},
+    {raw_long, SPL_E_CORRUPT, "truncated: 1000 of"},
+    {raw_page_beyond, SPL_E_CORRUPT, "section PAGE 0 overlaps"},
+    {raw_offset_wraps, SPL_E_CORRUPT, "section PAGE 0 overlaps"},
+    {raw_misaligned, SPL_E_CORRUPT, "section PAGE 0 is misaligned"},
+    {raw_overlap, SPL_E_CORRUPT, "section META overlaps"},
+    {raw_over_table, SPL_E_CORRUPT, "section CHNK overlaps"},
+    {raw_tiny_page, SPL_E_CORRUPT, "section PAGE 0 has a size"},
+    {raw_page_index, SPL_E_CORRUPT, "section PAGE 1 is out of order"},
+    {raw_two_metas, SPL_E_CORRUPT, "section META occurs twice"},
+    {raw_no_meta, SPL_E_CORRUPT, "section table lists no section META"},
+    {raw_half_node, SPL_E_CORRUPT, "section NODE is not a whole number"},
+    {raw_half_chunk, SPL_E_CORRUPT, "section CHNK is not a whole number"},
+    {raw_no_page, SPL_E_CORRUPT, "section table lists no section PAGE"},
+    {raw_unknown, SPL_OK, NULL},
+    {raw_unknown_damaged, SPL_E_CORRUPT, "section NEWS fails its checksum"},
+};
+
+static void test_forged_layout(void **state)
+{
+    (void)state;
+    struct parts p = take_apart();
+    for (size_t i = 0; i < sizeof raw_rows / sizeof *raw_rows; i++) {
+        char what[32];
+        snprintf(what, sizeof what, "layout row %zu", i);
+        write_parts(&p);
+        struct raw raw = load_raw();
+        raw_rows[i].forge(&raw);
+        save_raw(&raw);
+        expect(what, raw_rows[i].code, raw_rows[i].part);
+        free(raw.data);
+        unlink(path);
+    }
+    release(&p);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_forged_content),
+        cmocka_unit_test(test_forged_layout),
+    };
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/forged.spld", folder);
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    return rmdir(folder) ? 1 : failed;
+}
