@@ -127,7 +127,7 @@ static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit
     size_t clusters = 1, mask = w->table_size - 1;
     double inverse = 1 / cell;
     memset(w->table, 0, w->table_size * sizeof *w->table);
-    for (size_t i = 0; i < count && clusters <= limit; i++) {
+    for (size_t i = 0; i < count && clusters <= limit + 1; i++) {
         const struct spl_inner_splat *s = &w->input[i];
         uint64_t key = cell_of(s, inverse);
         size_t slot = (size_t)(key * 0x9e3779b97f4a7c15ull >> 20) & mask;
