@@ -1,0 +1,349 @@
+/* Golden images: fixed views of the synthetic courtyard against stored PNGs, on each backend and between them.
+ *
+ *   golden vulkan|egl    that backend against images/; then one request a hundred times, for the same bytes
+ *   golden backends      Vulkan against EGL, every view and layer
+ *   golden --self-test   the comparison finds what was planted
+ *   golden --update      writes images/ anew (Vulkan); look at them before they are committed
+ *
+ * Verdicts: bytes equal (the file), pixels equal (what it decodes to), perceptually equal (within the view's tolerance).
+ * Anything else fails and leaves NAME-BACKEND.png and NAME-BACKEND-difference.png in the working folder. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <splatd/pack.h>
+#include <splatd/render.h>
+#include <splatd/synth.h>
+
+#include "picture.h"
+#include "views.h"
+
+enum { SKIPPED = 77, REPEATS = 100, POINTS = 60000, SEED = 1 };
+
+static struct spl_dataset *make_courtyard(void)
+{
+    char folder[] = "/tmp/splatd-golden-XXXXXX", scan[64], packed[64];
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0};
+    if (!mkdtemp(folder)) {
+        perror(folder);
+        return NULL;
+    }
+    snprintf(scan, sizeof scan, "%s/courtyard.ptx", folder);
+    snprintf(packed, sizeof packed, "%s/courtyard.spld", folder);
+    struct spl_synth_options synth = {.scene = "courtyard", .directory = folder, .points = POINTS, .seed = SEED,
+                                      .noise = -1, .formats = "ptx"};
+    struct spl_pack_options pack = {.inputs = (const char *const[]){scan}, .input_count = 1, .output = packed};
+    if (spl_synth(&synth, NULL, &err) || spl_pack(&pack, NULL, &err) ||
+        spl_dataset_open(packed, true, &dataset, &err))
+        fprintf(stderr, "the courtyard could not be made: %s\n", err.message);
+    unlink(scan);
+    unlink(packed); /* stays mapped until it is closed */
+    rmdir(folder);
+    return dataset;
+}
+
+/* NULL with a message where this machine or build lacks the backend. */
+static struct spl_renderer *open_backend(const char *backend, const struct spl_dataset *dataset)
+{
+    struct spl_renderer *renderer = NULL;
+    struct spl_error err = {0};
+    if (spl_renderer_create(&(struct spl_renderer_options){.device = backend}, &renderer, &err) ||
+        spl_renderer_add(renderer, dataset, &err)) {
+        printf("%s: %s\n", backend, err.message);
+        spl_renderer_destroy(renderer);
+        return NULL;
+    }
+    printf("%s: %s\n", backend, spl_renderer_get_device(renderer)->name);
+    return renderer;
+}
+
+static struct spl_view make_view(const struct golden *golden)
+{
+    struct spl_view view;
+    spl_view_init(&view);
+    struct spl_camera *camera = &view.camera;
+    if (spl_camera_set_fov(camera, golden->fov, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL) ||
+        spl_camera_look_at(camera, golden->eye, golden->target, (double[3]){0, 0, 1}, NULL))
+        abort();
+    camera->cx += golden->shift;
+    camera->cy -= golden->shift;
+    camera->near = 0.05;
+    camera->far = INFINITY;
+    view.method = golden->method;
+    view.layers = 1u << golden->layer;
+    view.lod = golden->lod;
+    view.supersample = golden->supersample;
+    memcpy(view.background, golden->background, sizeof view.background);
+    return view;
+}
+
+/* The PNG of one layer of a frame; false after a message. */
+static bool render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                   enum spl_layer layer, struct spl_encoded *png)
+{
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    if (spl_renderer_render(renderer, dataset, view, &frame, &err)) {
+        fprintf(stderr, "rendering failed: %s\n", err.message);
+        return false;
+    }
+    bool good = !spl_image_encode(&frame.images[layer], &(struct spl_encode_options){SPL_FORMAT_PNG}, png, &err);
+    if (!good)
+        fprintf(stderr, "encoding failed: %s\n", err.message);
+    spl_frame_finish(&frame);
+    return good;
+}
+
+static void golden_path(const struct golden *golden, char path[512])
+{
+    const char *root = getenv("SPLATD_SOURCE_ROOT");
+    snprintf(path, 512, "%s/tests/golden/images/%s.png", root ? root : ".", golden->name);
+}
+
+static bool read_file(const char *path, struct spl_encoded *out)
+{
+    *out = (struct spl_encoded){.bytes = malloc(1 << 20)};
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        perror(path);
+        return false;
+    }
+    out->length = fread(out->bytes, 1, 1 << 20, file);
+    fclose(file);
+    return true;
+}
+
+static bool write_file(const char *path, const struct spl_encoded *png)
+{
+    FILE *file = fopen(path, "wb");
+    bool good = file && fwrite(png->bytes, 1, png->length, file) == png->length;
+    if (!file || fclose(file) || !good) {
+        perror(path);
+        return false;
+    }
+    return true;
+}
+
+static bool keep_evidence(const char *name, const char *backend, const struct spl_encoded *png,
+                          const struct picture *made, const struct picture *wanted)
+{
+    char path[512];
+    struct spl_encoded difference;
+    snprintf(path, sizeof path, "%s-%s.png", name, backend);
+    bool good = write_file(path, png);
+    if (good && picture_difference_image(made, wanted, &difference)) {
+        snprintf(path, sizeof path, "%s-%s-difference.png", name, backend);
+        good = write_file(path, &difference);
+        spl_encoded_finish(&difference);
+    }
+    printf("    see %s in the working folder\n", path);
+    return good;
+}
+
+/* One verdict, one line. */
+static bool judge(const char *name, const char *backend, const struct spl_encoded *made, const struct spl_encoded *wanted,
+                  struct tolerance tolerance)
+{
+    if (made->length == wanted->length && !memcmp(made->bytes, wanted->bytes, made->length)) {
+        printf("  %-18s bytes equal\n", name);
+        return true;
+    }
+    struct picture a, b;
+    bool good = picture_decode(made->bytes, made->length, &a);
+    good = picture_decode(wanted->bytes, wanted->length, &b) && good;
+    struct difference d = picture_compare(&a, &b, tolerance);
+    good = good && picture_within(&d, tolerance);
+    const char *verdict = !good ? "DIFFERENT" : d.differing ? "perceptually equal" : "pixels equal";
+    if (!d.same_shape)
+        printf("  %-18s %s: %u x %u, not %u x %u\n", name, verdict, a.width, a.height, b.width, b.height);
+    else
+        printf("  %-18s %s: largest error %u levels at %u,%u; %.4f %% of pixels differ, %.4f %% by more than %u "
+               "(at most %.4f %%)\n",
+               name, verdict, d.largest, d.worst_x, d.worst_y, 100.0 * (double)d.differing / (double)d.pixels,
+               100.0 * (double)d.beyond / (double)d.pixels, tolerance.levels, 100 * tolerance.share);
+    if (!good)
+        keep_evidence(name, backend, made, &a, &b);
+    picture_finish(&a);
+    picture_finish(&b);
+    return good;
+}
+
+static bool against_goldens(struct spl_renderer *renderer, const struct spl_dataset *dataset, const char *backend)
+{
+    bool good = true;
+    for (int i = 0; i < GOLDEN_COUNT; i++) {
+        struct spl_view view = make_view(&goldens[i]);
+        struct spl_encoded made, wanted = {0};
+        char path[512];
+        golden_path(&goldens[i], path);
+        if (!render(renderer, dataset, &view, goldens[i].layer, &made))
+            return false;
+        good = read_file(path, &wanted) && judge(goldens[i].name, backend, &made, &wanted, goldens[i].tolerance) && good;
+        spl_encoded_finish(&made);
+        spl_encoded_finish(&wanted);
+    }
+    if (!good)
+        printf("  Where the change is meant: 'golden --update', look at tests/golden/images, commit them with the change.\n");
+    return good;
+}
+
+/* Every layer of the two overviews, one a method, a hundred times. */
+static bool repeats_itself(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+{
+    bool good = true;
+    for (int i = 0; i < 2; i++) {
+        struct spl_view view = make_view(&goldens[i]);
+        struct spl_frame first, again;
+        int differing[SPL_LAYER_COUNT] = {0};
+        view.layers = (1u << SPL_LAYER_COUNT) - 1;
+        if (spl_renderer_render(renderer, dataset, &view, &first, NULL))
+            return false;
+        for (int n = 1; n < REPEATS; n++) {
+            if (spl_renderer_render(renderer, dataset, &view, &again, NULL))
+                return false;
+            for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+                differing[layer] += memcmp(again.images[layer].pixels, first.images[layer].pixels,
+                                           (size_t)GOLDEN_WIDTH * GOLDEN_HEIGHT *
+                                               spl_pixel_bytes(first.images[layer].type)) != 0;
+            spl_frame_finish(&again);
+        }
+        spl_frame_finish(&first);
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+            if (differing[layer])
+                printf("  %-18s DIFFERENT %s in %d of %d repeats\n", goldens[i].name,
+                       spl_layer_name((enum spl_layer)layer), differing[layer], REPEATS - 1);
+            good = good && !differing[layer];
+        }
+    }
+    if (good)
+        printf("  both overviews, all layers, %d times: the same bytes\n", REPEATS);
+    return good;
+}
+
+/* The façade's flat red panel fills the view: unlit, not tone-mapped, so every pixel is the scene's own colour. */
+static bool red_is_red(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+{
+    const struct golden golden = {.name = "red-panel", .eye = {-8.5, 3.5, 1.7}, .target = {-9.94, 3.5, 1.7}, .fov = 20,
+                                  .lod = 1, .supersample = 1, .background = {0, 0, 255, 255}};
+    struct spl_view view = make_view(&golden);
+    struct spl_encoded png;
+    struct picture picture;
+    if (!render(renderer, dataset, &view, SPL_LAYER_COLOR, &png) || !picture_decode(png.bytes, png.length, &picture))
+        return false;
+    size_t pixels = (size_t)picture.width * picture.height, other = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        const uint16_t *p = picture.levels + 4 * i;
+        other += p[0] != 255 || p[1] || p[2] || p[3] != 255;
+    }
+    if (other)
+        printf("  %-18s DIFFERENT: %zu of %zu pixels are not #ff0000\n", golden.name, other, pixels);
+    picture_finish(&picture);
+    spl_encoded_finish(&png);
+    return !other;
+}
+
+/* Every view in every layer but the id, whose ties two drivers may break differently. */
+static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const struct spl_dataset *dataset)
+{
+    static const struct tolerance one_level = {1, 0.0001};
+    bool good = true;
+    for (int i = 0; i < GOLDEN_COUNT; i++)
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+            if (layer == SPL_LAYER_ID)
+                continue;
+            struct spl_view view = make_view(&goldens[i]);
+            struct spl_encoded left, right;
+            char name[64];
+            view.layers = 1u << layer;
+            snprintf(name, sizeof name, "%s-%s", goldens[i].name, spl_layer_name((enum spl_layer)layer));
+            if (!render(a, dataset, &view, (enum spl_layer)layer, &left) ||
+                !render(b, dataset, &view, (enum spl_layer)layer, &right))
+                return false;
+            good = judge(name, "backends", &right, &left, one_level) && good;
+            spl_encoded_finish(&left);
+            spl_encoded_finish(&right);
+        }
+    return good;
+}
+
+static bool update(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+{
+    for (int i = 0; i < GOLDEN_COUNT; i++) {
+        struct spl_view view = make_view(&goldens[i]);
+        struct spl_encoded png;
+        char path[512];
+        golden_path(&goldens[i], path);
+        if (!render(renderer, dataset, &view, goldens[i].layer, &png) || !write_file(path, &png))
+            return false;
+        printf("  %s: %zu bytes\n", path, png.length);
+        spl_encoded_finish(&png);
+    }
+    return true;
+}
+
+/* One pixel one level off is found where equality is asked for, let pass where a level is allowed; a picture shifted by a
+ * column never passes; another size never passes. */
+static bool self_test(void)
+{
+    uint8_t pixels[20 * 10 * 4];
+    for (size_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = (uint8_t)(i * 37);
+    struct spl_image image = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 20, 10, pixels};
+    const struct spl_encode_options options = {SPL_FORMAT_PNG};
+    struct spl_encoded original, nudged, shifted, small;
+    bool made = !spl_image_encode(&image, &options, &original, NULL);
+    image.height = 9;
+    made = made && !spl_image_encode(&image, &options, &small, NULL);
+    image.height = 10;
+    pixels[4 * 45 + 2] ^= 1;
+    made = made && !spl_image_encode(&image, &options, &nudged, NULL);
+    pixels[4 * 45 + 2] ^= 1;
+    memmove(pixels, pixels + 4, sizeof pixels - 4);
+    made = made && !spl_image_encode(&image, &options, &shifted, NULL);
+    if (!made)
+        return false;
+    const struct tolerance none = {0, 0}, level = {1, 0}, two_pixels = {0, 0.01};
+    bool good = judge("self-equal", "test", &original, &original, none) &
+                !judge("self-nudged", "test", &nudged, &original, none) &
+                judge("self-level", "test", &nudged, &original, level) &
+                judge("self-share", "test", &nudged, &original, two_pixels) &
+                !judge("self-shifted", "test", &shifted, &original, (struct tolerance){16, 0.004}) &
+                !judge("self-size", "test", &small, &original, level);
+    spl_encoded_finish(&original);
+    spl_encoded_finish(&nudged);
+    spl_encoded_finish(&shifted);
+    spl_encoded_finish(&small);
+    return good;
+}
+
+int main(int argc, char **argv)
+{
+    const char *mode = argc == 2 ? argv[1] : "";
+    if (!strcmp(mode, "--self-test"))
+        return !self_test();
+    bool both = !strcmp(mode, "backends"), updating = !strcmp(mode, "--update");
+    if (!both && !updating && strcmp(mode, "vulkan") && strcmp(mode, "egl")) {
+        fprintf(stderr, "usage: golden vulkan|egl|backends|--self-test|--update\n");
+        return 2;
+    }
+    struct spl_dataset *dataset = make_courtyard();
+    if (!dataset)
+        return 1;
+    int rc = SKIPPED;
+    struct spl_renderer *first = open_backend(both || updating ? "vulkan" : mode, dataset), *second = NULL;
+    if (first && both)
+        second = open_backend("egl", dataset);
+    if (updating && first)
+        rc = !update(first, dataset);
+    else if (both && second)
+        rc = !backends_agree(first, second, dataset);
+    else if (!both && first)
+        rc = !(against_goldens(first, dataset, mode) & red_is_red(first, dataset) & repeats_itself(first, dataset));
+    spl_renderer_destroy(second);
+    spl_renderer_destroy(first);
+    spl_dataset_close(dataset);
+    return rc;
+}
