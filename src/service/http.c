@@ -5,6 +5,7 @@
  * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
  * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes does
  * not extend. Invariant: a suspended request is in `waiting` and has a job. Owned by the loop's thread. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -18,6 +19,7 @@ enum {
     connections_max = 1024,
     connections_per_address_max = 512,
     connection_memory = 128 * 1024,
+    parameters_max = 256,
     drain_max = 8 * body_max,
     idle_s = 30,
     slow_sweep_ms = 500,
@@ -61,6 +63,28 @@ static void on_connection(void *context, struct MHD_Connection *handle, void **s
     *socket_context = connection;
 }
 
+/* libmicrohttpd 0.9.75 falls silent when the parameters of a query do not fit its pool, so a request with more than any
+ * view has is answered past it, right on the socket, and the connection ended. */
+static bool refuse_many_parameters(struct request *request, const char *uri)
+{
+    static const char body[] = "{\"type\": \"urn:splatd:error:limit\", \"title\": \"URI Too Long\", \"status\": 414, \"detail\": "
+                               "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%llu\", \"field\": \"url\"}";
+    unsigned count = 0;
+    for (; *uri && count <= parameters_max; uri++)
+        count += *uri == '&';
+    if (count <= parameters_max)
+        return false;
+    char text[sizeof body + 20], reply[sizeof text + 160];
+    int length = snprintf(text, sizeof text, body, (unsigned long long)request->id);
+    length = snprintf(reply, sizeof reply,
+                      "HTTP/1.1 414 URI Too Long\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
+                      "Content-Length: %d\r\n\r\n%s", length, text);
+    if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
+        spl_count(&request->service->counters, replies_4xx);
+    shutdown(request->connection->fd, SHUT_RDWR);
+    return true;
+}
+
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
 {
@@ -89,6 +113,7 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     request->id = spl_count(&service->counters, requests) + 1;
     enter(request->connection, PHASE_READING);
     service->requests_open++;
+    request->abandoned = refuse_many_parameters(request, uri);
     return request;
 }
 

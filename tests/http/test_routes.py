@@ -127,7 +127,7 @@ def test_view_headers():
     with Daemon(REAL) as d:
         headers = d.view(eye="3,0.5,1", target="0,0,1", fx=100, fy=101, cx=30, cy=20, width=64, height=48, near=0.5, far=9).headers
         stages = dict(re.findall(r"(\w+);dur=([\d.]+)", headers["Server-Timing"]))
-        assert list(stages) == ["queue", "select", "depth", "shade", "resolve", "readback", "encode", "total"]
+        assert list(stages) == ["queue", "frame", "select", "depth", "shade", "resolve", "readback", "encode", "total"], headers["Server-Timing"]
         assert float(stages["total"]) >= float(stages["encode"]) > 0
         camera = json.loads(headers["Splatd-Camera"])
         assert camera["eye"] == [3, 0.5, 1] and len(camera["rotation"]) == 9

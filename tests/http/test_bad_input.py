@@ -1,0 +1,180 @@
+"""Bad input over HTTP: each is refused with 4xx, a problem document, and the parameter's name; the daemon goes on as if
+nothing had happened."""
+import json
+import os
+import re
+import socket
+import subprocess
+import tempfile
+
+from harness import FAKE, VIEW, WALL, Daemon, run
+
+# query, field; the parser's unit test has many more
+QUERIES = [
+    ("eye=1,2", "eye"), ("eye=a,b,c", "eye"), ("eye=nan,0,0", "eye"), ("eye=inf,0,0", "eye"), ("eye=1e999,0,0", "eye"),
+    ("eye=1,2,3&target=1,2,3", "target"), ("eye=0,0,9&target=0,0,0&up=0,0,1", "up"), ("up=0,0,0", "up"),
+    ("target=nan,0,0", "target"), ("fov=0", "fov"), ("fov=180", "fov"), ("fov=60&fx=100", "fov"), ("fx=-1", "fx"),
+    ("fy=100", "fx"), ("fx=100&fy=nan", "fy"), ("cx=left", "cx"), ("cy=1,2", "cy"), ("width=0&height=0", "width"),
+    ("width=1000000&height=1000000", "width"), ("width=-4", "width"), ("width=4.5", "width"), ("height=0", "height"),
+    ("height=9e99", "height"), ("near=0", "near"), ("near=-1", "near"), ("near=2&far=1", "far"), ("far=nan", "far"),
+    ("method=raytrace", "method"), ("lod=-1", "lod"), ("lod=much", "lod"), ("layer=smell", "layer"),
+    ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
+    ("background=red", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"), ("margin=1e9", "margin"),
+    ("depth_scale=0", "depth_scale"), ("colour=red", "colour"), ("eye=1,2,3&eye=1,2,3", "eye"), ("POC=1,2,3&eye=1,2,3", "eye"),
+    ("width", "width"), ("width=", "width"), ("width=%zz", "width"), ("width=%4", "width"), ("width=%00", "width"),
+    ("width=1%0d%0aX:1", "width"), ("%ff%fe=1", None), ("matrix=1", "matrix"),
+]
+BODIES = [
+    ('{"camera":', "body"), ("[1,2]", "body"), ("no", "body"), ("\xff\xfe", "body"), ('{"lod": NaN}', "body"),
+    ('{"lod":1,"lod":2}', "body"), ('{"colour":1}', "colour"), ('{"camera":5}', "camera"), ('{"width":"640"}', "width"),
+    ('{"width":0}', "width"), ('{"eye":[1,2,3]}', "eye"), ('{"camera":{"eye":[1,2]}}', "eye"),
+    ('{"camera":{"eye":[0,0,0],"target":[0,0,0]}}', "target"), ('{"camera":{"matrix":[1],"convention":"opengl"}}', "matrix"),
+    ('{"camera":{"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}', "convention"),
+    ('{"camera":{"q":[0,0,0,0],"t":[0,0,0]}}', "q"), ('{"camera":{"q":[1,0,0,0]}}', "t"),
+    ('{"camera":{"model":"OPENCV","params":[1,1,1,1,0.1,0,0,0]}}', "params"), ("[" * 100000, "body"),
+]
+
+
+def test_every_bad_query_is_refused_by_name():
+    with Daemon(FAKE) as d:
+        for query, field in QUERIES:
+            reply = d.ask(f"{VIEW}?{query}")
+            assert reply.status == 400, (query, reply.status)
+            assert field is None or reply.json()["field"] == field, (query, reply.body)
+        status = d.status()
+        assert status["counters"]["frames"] == 0 and status["counters"]["replies_4xx"] == len(QUERIES)
+        assert d.view(width=8, height=8).status == 200
+
+
+def test_every_bad_body_is_refused_by_name():
+    with Daemon(FAKE) as d:
+        for body, field in BODIES:
+            reply = d.post(body.encode("latin-1"))
+            assert reply.status == 400 and reply.json()["field"] == field, (body[:80], reply.body)
+        reply = d.post('{\n "width": 64,\n "height" 48\n}')
+        assert re.search(r"line 3, column \d+", reply.json()["detail"]), reply.body
+        assert d.ask(VIEW + "?width=8", "POST", "{}").json()["field"] == "width"
+
+
+def test_unknown_things_are_not_found():
+    with Daemon(FAKE) as d:
+        for path in ["/v1/datasets/none", "/v1/datasets/none/view", "/v1/datasets/wall.spld", "/v1/datasets/..%2fwall",
+                     "/v1/datasets/%2e%2e/view", "/v1/datasets/Wall"]:
+            reply = d.ask(path)
+            assert reply.status == 404 and reply.json()["field"] == "id", (path, reply.body)
+        for path in ["/v1", "/v2/datasets", "/v1/datasets/", "/v1/datasets/wall/", "/v1/datasets/wall/view/", "/v1/datasets//view",
+                     "/v1/datasets/wall/../wall", "/etc/passwd", "//"]:
+            assert d.ask(path).status == 404, path
+        for path in ["/v1/datasets/%zz", "/v1/datasets/a%00b/view", "/v1/datasets/" + "a" * 300]:
+            reply = d.ask(path)
+            assert reply.status == 400 and reply.json()["field"] == "id", (path, reply.body)
+        for path in ["/v1/status?x=1", "/v1/datasets?limit=3", "/?x", "/v1/datasets/wall?x=1"]:
+            reply = d.ask(path)
+            assert reply.status == 400 and reply.json()["field"] in ("x", "limit"), (path, reply.body)
+
+
+def test_wrong_methods_say_what_is_allowed():
+    with Daemon(FAKE) as d:
+        for path, methods, allow in [("/", ["POST", "DELETE", "OPTIONS"], "GET, HEAD"),
+                                     ("/v1/status", ["POST", "PUT"], "GET, HEAD"),
+                                     ("/v1/datasets/wall", ["PATCH", "DELETE"], "GET, HEAD"),
+                                     (VIEW, ["PUT", "DELETE", "OPTIONS", "BREW"], "GET, HEAD, POST")]:
+            for method in methods:
+                reply = d.ask(path, method)
+                assert reply.status == 405 and reply.headers["Allow"] == allow, (path, method, reply.status)
+
+
+def test_sizes_are_capped():
+    with Daemon(FAKE, "--max-pixels", "10000") as d:
+        assert d.view(width=100, height=100).status == 200
+        assert d.view(width=101, height=100).json()["field"] == "width"
+        assert d.view(height=8192).json()["field"] == "height"
+        for length in (9000, 20000, 60000):
+            reply = d.ask(VIEW + "?" + "a" * length)
+            assert reply.status == 414 and reply.json()["field"] == "url", length
+        for pairs in (300, 4000, 20000):
+            reply = d.ask(VIEW + "?" + "a&" * pairs)
+            assert reply.status == 414 and reply.json()["field"] == "url", pairs
+        reply = d.ask(VIEW + "?background=" + "a" * 4000)
+        assert reply.status == 400 and reply.json()["field"] == "background"
+
+
+def raw(d, data, timeout=10):
+    with socket.create_connection(("127.0.0.1", d.port), timeout) as s:
+        s.sendall(data)
+        answer = b""
+        try:
+            while chunk := s.recv(65536):
+                answer += chunk
+        except ConnectionResetError:
+            pass
+        return answer
+
+
+def test_large_bodies_are_refused():
+    with Daemon(FAKE) as d:
+        assert d.post(b'{"lod":1' + b" " * (1024 * 1024 - 9) + b"}").status == 200
+        reply = d.post(b'{"lod":1' + b" " * (1024 * 1024 - 8) + b"}")
+        assert reply.status == 413 and reply.json()["field"] == "body"
+        head = f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n".encode()
+        assert b" 413 " in raw(d, head + b"Content-Length: 2000000\r\nExpect: 100-continue\r\n\r\n")
+        assert b" 413 " in raw(d, head + b"Content-Length: 99999999999\r\n\r\n")
+        chunked = head + b"Transfer-Encoding: chunked\r\n\r\n" + (b"10000\r\n" + b"x" * 65536 + b"\r\n") * 20 + b"0\r\n\r\n"
+        assert b" 413 " in raw(d, chunked)
+        assert d.status()["counters"]["frames"] == 1
+
+
+def test_broken_http_is_survived():
+    with Daemon(FAKE) as d:
+        for data in [b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\n\n",
+                     b"GET / HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
+                     b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 50000 + b"\r\n",
+                     b"GET " + b"a" * 300000 + b" HTTP/1.1\r\n\r\n", b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
+                     b"GET /\x01 HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"]:
+            try:
+                with socket.create_connection(("127.0.0.1", d.port), 10) as s:
+                    s.sendall(data)
+                    s.shutdown(socket.SHUT_WR)
+                    answer = s.recv(65536)  # a reply or a close, never silence
+                    assert not answer or answer[:10] in (b"HTTP/1.1 4", b"HTTP/1.1 5"), (data[:40], answer[:100])
+            except (ConnectionResetError, BrokenPipeError):
+                pass
+        assert d.view(width=8, height=8).status == 200
+
+
+def refused(*arguments):
+    done = subprocess.run([FAKE, *arguments], capture_output=True, text=True, timeout=30)
+    assert done.stdout == "", done.stdout
+    return done.returncode, done.stderr
+
+
+def test_the_command_line_is_checked():
+    with tempfile.TemporaryDirectory() as folder:
+        second = os.path.join(folder, "wall.spld")
+        broken = os.path.join(folder, "broken.spld")
+        flipped = bytearray(open(WALL, "rb").read())
+        flipped[-5000] ^= 1  # in the last page
+        open(broken, "wb").write(flipped)
+        os.symlink(WALL, second)
+        empty = os.path.join(folder, "empty")
+        os.mkdir(empty)
+        for arguments, said in [
+            ([], "at least one"), (["/nowhere/x.spld"], "/nowhere/x.spld"), ([empty], "no .spld"),
+            ([WALL, second], "two datasets are called 'wall'"), ([broken], "broken.spld"), ([folder], "broken.spld"),
+            (["--listen", "nonsense", WALL], "--listen"), (["--listen", "127.0.0.1:99999", WALL], "--listen"),
+            (["--listen", "::1:8080", WALL], "--listen"), (["--queue", "0", WALL], "--queue"),
+            (["--deadline", "soon", WALL], "--deadline"), (["--encoders", "99", WALL], "--encoders"),
+            (["--max-pixels", "-1", WALL], "--max-pixels"), (["--frobnicate", WALL], "--help"),
+        ]:
+            code, text = refused(*arguments)
+            assert code == 2 and said in text, (arguments, code, text)
+        code, text = refused("--require-gpu", "--listen", "127.0.0.1:0", WALL)
+        assert code == 1 and "no usable device" in text, (code, text)
+        with Daemon(FAKE) as d:
+            code, text = refused("--listen", f"127.0.0.1:{d.port}", WALL)
+            assert code == 1 and str(d.port) in text, (code, text)
+        with Daemon(FAKE, "--no-verify", datasets=[broken]) as d:
+            assert d.ask("/v1/datasets/broken").status == 200
+
+
+run(globals())

@@ -1,0 +1,262 @@
+"""More than the device can do, clients that leave or dawdle, a device that is lost, a daemon that is told to stop: every
+reply is 200 or says when to come back, and none is dropped."""
+import re
+import signal
+import socket
+import threading
+import time
+
+from harness import FAKE, REAL, VIEW, Daemon, eventually, run, together
+
+SMALL = VIEW + "?width=16&height=16"
+
+
+def statuses(replies):
+    for reply in replies:
+        if isinstance(reply, Exception):
+            raise reply
+    return [reply.status for reply in replies]
+
+
+def test_a_full_queue_is_said_at_once():
+    with Daemon(FAKE, "--queue", "2", FAKE_FRAME_MS=200) as d:
+        assert d.ask(SMALL).status == 200  # so that the service knows how long a frame takes
+        times = {}
+
+        def ask(i):
+            began = time.monotonic()
+            reply = d.ask(SMALL)
+            times.setdefault(reply.status, []).append(time.monotonic() - began)
+            return reply
+        got = statuses(together(12, ask))
+        assert set(got) == {200, 503} and 3 <= got.count(200) <= 5, got
+        assert max(times[503]) < 0.19, times
+        counters = d.status()["counters"]
+        assert counters["refused_full"] == got.count(503) and counters["frames"] == got.count(200) + 1
+
+
+def test_the_deadline_ends_a_wait():
+    with Daemon(FAKE, "--deadline", "300", FAKE_FRAME_MS=200) as d:
+        began = time.monotonic()
+        got = statuses(together(6, lambda i: d.ask(SMALL)))
+        assert time.monotonic() - began < 1.5
+        assert got.count(200) == 1 and got.count(503) == 5, got
+        eventually(lambda: d.status()["queues"]["render"]["length"] == 0)
+        status = d.status()
+        assert status["counters"]["deadline_missed"] == 5 and status["counters"]["frames"] == 1, status
+        assert d.ask(SMALL).status == 200
+
+
+def test_a_frame_slower_than_the_deadline_ends_too():
+    with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=5000) as d:
+        reply = d.ask(SMALL)
+        assert reply.status == 503 and "100 ms" in reply.json()["detail"] or "deadline" in reply.json()["detail"]
+
+
+def test_work_of_clients_that_left_is_dropped():
+    with Daemon(FAKE, FAKE_FRAME_MS=300) as d:
+        first = threading.Thread(target=lambda: d.ask(SMALL))
+        first.start()
+        eventually(lambda: d.status()["counters"]["requests"] >= 2)
+        gone = []
+        for _ in range(8):
+            s = socket.create_connection(("127.0.0.1", d.port))
+            s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            gone.append(s)
+        eventually(lambda: d.status()["queues"]["render"]["length"] >= 7)
+        for s in gone:
+            s.close()
+        began = time.monotonic()
+        assert d.ask(SMALL).status == 200
+        assert time.monotonic() - began < 8 * 0.3, "frames were rendered for nobody"
+        first.join()
+        counters = d.status()["counters"]
+        assert counters["clients_left"] == 8 and counters["frames"] == 2, counters
+
+
+def lose_under_load(d, losses):
+    def work(i):
+        connection, got = d.connect(), []
+        for _ in range(25):
+            reply = d.ask(SMALL, connection=connection)
+            got.append((reply.status, reply.body if reply.status == 200 else reply.json()["type"]))
+        return got
+    results = together(6, work)
+    for result in results:
+        if isinstance(result, Exception):
+            raise result
+    replies = [reply for result in results for reply in result]
+    assert {status for status, _ in replies} == {200, 503}
+    assert {kind for status, kind in replies if status == 503} == {"urn:splatd:error:device-lost"}
+    assert len({body for status, body in replies if status == 200}) == 1, "frames differ after the loss"
+    assert d.ask(SMALL).status == 200
+    status = d.status()
+    assert status["state"] == "ready" and status["counters"]["device_losses"] == losses, status
+
+
+def test_a_lost_device_comes_back_under_load():
+    with Daemon(FAKE, FAKE_FRAME_MS=2, SPLATD_INJECT_LOSS_AFTER="40x3") as d:
+        lose_under_load(d, 3)
+
+
+def test_a_real_device_comes_back_under_load():
+    with Daemon(REAL, SPLATD_INJECT_LOSS_AFTER="40x2") as d:
+        lose_under_load(d, 2)
+
+
+def test_too_many_losses_end_the_daemon():
+    d = Daemon(FAKE, FAKE_FRAME_MS=1, SPLATD_INJECT_LOSS_AFTER="2x50")
+    got = []
+    try:
+        for _ in range(50):
+            got.append(d.ask(SMALL).status)
+    except OSError:
+        pass  # it has ended
+    assert d.wait_exit() == 1
+    assert got.count(503) >= 4 and got.count(200) == 8, got
+    assert any("more than 3 times" in line for line in d.lines), d.lines
+
+
+def test_a_device_that_stays_away_ends_the_daemon():
+    d = Daemon(FAKE, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
+    assert [d.ask(SMALL).status for _ in range(2)] == [200, 503]
+    assert d.wait_exit() == 1
+
+
+def test_sigterm_under_load_drops_no_reply():
+    for number in (signal.SIGTERM, signal.SIGINT):
+        d = Daemon(FAKE, FAKE_FRAME_MS=20)
+        stopping = threading.Event()
+
+        def work(i):
+            connection, good = d.connect(), 0
+            while True:
+                asked = stopping.is_set()
+                try:
+                    reply = d.ask(SMALL, connection=connection)
+                except OSError:
+                    assert asked, "a request sent before the signal was dropped"
+                    return good
+                assert reply.status == 200, reply.status
+                good += 1
+                if reply.headers["Connection"] == "close":
+                    return good
+        timer = threading.Timer(0.5, lambda: (stopping.set(), d.process.send_signal(number)))
+        timer.start()
+        for result in together(8, work):
+            if isinstance(result, Exception):
+                raise result
+            assert result >= 1
+        timer.join()
+        assert d.wait_exit() == 0
+        assert not any("bug" in line for line in d.lines)
+
+
+def test_sigterm_finishes_a_long_frame():
+    d = Daemon(FAKE, FAKE_FRAME_MS=1500)
+    replies = []
+    asking = threading.Thread(target=lambda: replies.append(d.ask(SMALL)))
+    asking.start()
+    eventually(lambda: d.status()["counters"]["requests"] >= 2)
+    d.process.send_signal(signal.SIGTERM)
+    time.sleep(0.3)
+    try:
+        socket.create_connection(("127.0.0.1", d.port), 1).close()
+        raise AssertionError("still accepts")
+    except ConnectionRefusedError:
+        pass
+    assert d.wait_exit() == 0
+    asking.join()
+    assert replies[0].status == 200 and replies[0].headers["Connection"] == "close"
+
+
+def test_a_second_signal_ends_at_once():
+    d = Daemon(FAKE, FAKE_FRAME_MS=5000)
+    s = socket.create_connection(("127.0.0.1", d.port))
+    s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    eventually(lambda: d.status()["counters"]["requests"] >= 2)
+    began = time.monotonic()
+    d.process.send_signal(signal.SIGTERM)
+    time.sleep(0.2)
+    d.process.send_signal(signal.SIGTERM)
+    assert d.wait_exit() == 1 and time.monotonic() - began < 2
+
+
+def test_slow_requests_are_cut_and_cost_nothing():
+    with Daemon(FAKE) as d:
+        slow = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(50)]
+        began = time.monotonic()
+        cut = 0
+        while cut < len(slow) and time.monotonic() - began < 25:
+            cut = 0
+            for s in slow:
+                try:
+                    s.send(b"G" if time.monotonic() - began < 1 else b"E")
+                    s.setblocking(False)
+                    cut += s.recv(1000) == b""
+                except BlockingIOError:
+                    pass
+                except OSError:
+                    cut += 1
+            reply_began = time.monotonic()
+            assert d.ask(SMALL).status == 200 and time.monotonic() - reply_began < 1
+            time.sleep(0.5)
+        assert cut == len(slow), cut
+        assert 8 < time.monotonic() - began < 25
+        assert d.status()["counters"]["slow_closed"] >= len(slow)
+
+
+def test_idle_connections_do_not_stop_the_daemon():
+    with Daemon(FAKE) as d:
+        idle = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(20)]
+        keep = d.connect()
+        assert d.ask(SMALL, connection=keep).status == 200
+        began = time.monotonic()
+        assert d.stop() == 0 and time.monotonic() - began < 3
+        for s in idle:
+            s.close()
+
+
+def test_equal_requests_get_equal_bytes_under_load():
+    with Daemon(REAL, "--queue", "64") as d:
+        got = together(20, lambda i: [d.ask(VIEW + "?width=160&height=90").body for _ in range(5)])
+        assert len({body for bodies in got for body in bodies}) == 1
+
+
+def test_memory_is_flat():
+    def resident():
+        return d.status()["memory"]["resident_bytes"]
+    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+        for _ in range(100):
+            d.ask(VIEW)
+        before = resident()
+        for i in range(400):
+            d.ask(VIEW if i % 4 else VIEW + "?width=0")
+        assert resident() - before < 4 << 20, (before, resident())
+
+
+def test_ipv6_and_quiet():
+    import http.client
+    import subprocess
+    from harness import WALL
+    with socket.socket(socket.AF_INET6) as probe:
+        try:
+            probe.bind(("::1", 0))
+        except OSError:
+            return  # a machine without IPv6
+        port = probe.getsockname()[1]
+    process = subprocess.Popen([FAKE, "--quiet", "--listen", f"[::1]:{port}", WALL], stderr=subprocess.PIPE, text=True)
+
+    def up():
+        try:
+            connection = http.client.HTTPConnection("::1", port, timeout=5)
+            connection.request("GET", "/v1/status")
+            return connection.getresponse().status == 200
+        except OSError:
+            return False
+    eventually(up)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0 and process.stderr.read() == ""
+
+
+run(globals())
