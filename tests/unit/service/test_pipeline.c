@@ -117,6 +117,10 @@ static void a_lost_device_is_reopened(void **state)
         lost += job->err.code == SPL_E_DEVICE_LOST;
         drawn += job->err.code == 0;
         spl_job_destroy(job);
+        /* A job that comes while the device is reopened is refused as well. */
+        for (int ms = 0; ms < 10000 && (counters.device_losses < (uint64_t)lost ||
+                                        spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY); ms++)
+            usleep(1000);
     }
     assert_int_equal(lost, 1);
     assert_int_equal(drawn, 5);
