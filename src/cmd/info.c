@@ -1,5 +1,5 @@
-/* splatd info: what a dataset holds, what each attribute costs, and how many bits the scene needed. Everything is gathered
- * into a struct first, which both outputs print. */
+/* splatd info: what a dataset holds, what each attribute costs, and how many bits the scene needed. Everything is
+ * gathered into a struct first, which both outputs print. */
 #include "cmd/cmd.h"
 
 #include <getopt.h>
@@ -17,12 +17,13 @@ enum { width_max = 24, levels_max = 64 };
 
 /* Fixed-width codes whose widths each chunk chose. */
 static const struct {
-    const char *name;     /* as in JSON */
+    const char *name; /* as in JSON */
     const char *label;
     enum spl_attribute attribute;
     unsigned shifts[3], shift_count, bits;
 } codes[] = {
-    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION, {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
+    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION,
+     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
     {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
     {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
     {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
@@ -36,8 +37,8 @@ struct report {
     const struct spl_dataset_info *info;
     struct level {
         uint64_t nodes, chunks, splats;
-        double spacing;       /* mean over the splats */
-    } levels[levels_max];     /* deeper ones are counted with the last */
+        double spacing;   /* mean over the splats */
+    } levels[levels_max]; /* deeper ones are counted with the last */
     uint32_t level_count;
     double widths[code_count][width_max + 1]; /* shares of the codes */
 };
@@ -97,7 +98,8 @@ static void gather(struct report *report, const struct spl_dataset *dataset)
             for (unsigned s = 0; s < codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
                 width &= (1u << codes[k].bits) - 1;
-                report->widths[k][width] += (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
+                report->widths[k][width] +=
+                    (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
             }
 }
 
@@ -161,7 +163,8 @@ static void print_table(const struct report *report)
     printf("\n  bytes a splat\n");
     for (int attribute = 0; attribute < SPL_ATTRIBUTE_COUNT; attribute++)
         printf("  %-14s%6.2f\n", spl_attribute_name(attribute), bytes_per_splat(info, attribute));
-    printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total", total_bytes_per_splat(info));
+    printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
+           total_bytes_per_splat(info));
     for (int k = 0; k < code_count; k++) {
         printf("  %-22s", codes[k].label);
         for (int width = 0; width <= width_max; width++)
@@ -186,9 +189,9 @@ static json_t *to_json(const struct report *report)
     json_t *levels = json_array();
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct level *l = &report->levels[i];
-        json_array_append_new(levels, json_pack("{s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                                (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing",
-                                                l->spacing));
+        json_array_append_new(levels,
+                              json_pack("{s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
+                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing", l->spacing));
     }
     json_t *widths = json_object();
     for (int k = 0; k < code_count; k++) {
@@ -202,8 +205,8 @@ static json_t *to_json(const struct report *report)
         json_object_set_new(widths, codes[k].name, histogram);
     }
     return json_pack(
-        "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, s:b},"
-        " s:I, s:o, s:o, s:o, s:O}",
+        "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
+        "s:b}, s:I, s:o, s:o, s:o, s:O}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",

@@ -1,9 +1,9 @@
-/* Quantisation: as few bits as the chunk's own spread needs under the stated errors, chosen by calculation, measured on the
- * codes as they will decode, and refined where the measurement misses the bound.
+/* Quantisation: as few bits as the chunk's own spread needs under the stated errors, chosen by calculation, measured on
+ * the codes as they will decode, and refined where the measurement misses the bound.
  *
- * A range of extent E gets b bits so that 2^b cells of the wanted step cover it, centred: every value then lies within half
- * a step of its code. The step common to several axes is shrunk afterwards as far as the chosen bits allow, which is
- * accuracy at no cost. Pure functions; any thread. */
+ * A range of extent E gets b bits so that 2^b cells of the wanted step cover it, centred: every value then lies within
+ * half a step of its code. The step common to several axes is shrunk afterwards as far as the chosen bits allow, which
+ * is accuracy at no cost. Pure functions; any thread. */
 #include "dataset/chunk.h"
 
 #include <float.h>
@@ -43,7 +43,7 @@ static unsigned bits_for_count(uint32_t largest)
     return largest ? 32 - (unsigned)__builtin_clz(largest) : 0;
 }
 
-/* The smallest step with which `bits` still cover every extent, rounded up to a float; `wanted` where no axis has bits. */
+/* The smallest step with which `bits` still cover every extent, rounded up to a float; `wanted` where none has bits. */
 static float fit_step(const double *extent, const unsigned *bits, int axes, double wanted)
 {
     double fitted = 0;
@@ -120,8 +120,7 @@ static double encode_positions(double value[3][SPL_CHUNK_SPLATS], const double *
                 square[i] += d * d;
             }
         }
-        chunk->geometry_bits =
-            bits[0] << SPL_GEOMETRY_X | bits[1] << SPL_GEOMETRY_Y | bits[2] << SPL_GEOMETRY_Z;
+        chunk->geometry_bits = bits[0] << SPL_GEOMETRY_X | bits[1] << SPL_GEOMETRY_Y | bits[2] << SPL_GEOMETRY_Z;
         sum = 0;
         for (uint32_t i = 0; i < count; i++)
             sum += sqrt(square[i]) * inverse_radius[i];
@@ -203,8 +202,8 @@ static double encode_normals(const struct spl_splat *splats, uint32_t count, dou
         float chord[SPL_CHUNK_SPLATS];
         for (uint32_t i = 0; i < count; i++) {
             float n[3];
-            spl_octahedral_decode(chunk->normal_u + step * (float)codes->u[i], chunk->normal_v + step * (float)codes->v[i],
-                                  n);
+            spl_octahedral_decode(chunk->normal_u + step * (float)codes->u[i],
+                                  chunk->normal_v + step * (float)codes->v[i], n);
             float x = n[0] - local[0][i], y = n[1] - local[1][i], z = n[2] - local[2][i];
             chord[i] = sqrtf(x * x + y * y + z * z);
         }
@@ -317,16 +316,15 @@ static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes
 {
     uint32_t g = chunk->geometry_bits, c = chunk->color_bits, e = chunk->extra_bits;
     struct bit_writer writer = {.words = words};
-    put_stream(&writer,
-               (int32_t *[]){codes->position[0], codes->position[1], codes->position[2], codes->u, codes->v,
-                             codes->radius},
-               (unsigned[]){g >> SPL_GEOMETRY_X & 31, g >> SPL_GEOMETRY_Y & 31, g >> SPL_GEOMETRY_Z & 31,
-                            g >> SPL_GEOMETRY_U & 15, g >> SPL_GEOMETRY_V & 15, g >> SPL_GEOMETRY_RADIUS & 15},
-               6, chunk->count);
+    put_stream(
+        &writer,
+        (int32_t *[]){codes->position[0], codes->position[1], codes->position[2], codes->u, codes->v, codes->radius},
+        (unsigned[]){g >> SPL_GEOMETRY_X & 31, g >> SPL_GEOMETRY_Y & 31, g >> SPL_GEOMETRY_Z & 31,
+                     g >> SPL_GEOMETRY_U & 15, g >> SPL_GEOMETRY_V & 15, g >> SPL_GEOMETRY_RADIUS & 15},
+        6, chunk->count);
     put_stream(&writer, (int32_t *[]){codes->cy, codes->cu, codes->cv},
                (unsigned[]){c >> SPL_COLOR_Y & 15, c >> SPL_COLOR_U & 15, c >> SPL_COLOR_V & 15}, 3, chunk->count);
-    put_stream(&writer, (int32_t *[]){codes->classification}, (unsigned[]){e >> SPL_EXTRA_CLASS & 15}, 1,
-               chunk->count);
+    put_stream(&writer, (int32_t *[]){codes->classification}, (unsigned[]){e >> SPL_EXTRA_CLASS & 15}, 1, chunk->count);
     put_stream(&writer, (int32_t *[]){codes->uncertainty}, (unsigned[]){e >> SPL_EXTRA_UNCERTAINTY & 15}, 1,
                chunk->count);
     return writer.used;

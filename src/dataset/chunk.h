@@ -40,16 +40,16 @@ uint32_t spl_chunk_color_word(const struct spl_chunk *chunk);     /* offset in t
 uint32_t spl_chunk_class_word(const struct spl_chunk *chunk);
 uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk);
 
-/* Adds the chunk's bits to each attribute's; header and padding go to SPL_ATTRIBUTE_CHUNK (a dataset adds its nodes). */
+/* Adds the chunk's bits to each attribute's; header and padding go to SPL_ATTRIBUTE_CHUNK (a dataset adds nodes). */
 void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
 
 /* Largest number of words a chunk can need. */
 enum { SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + 4 };
 
 /* Chooses widths and codes for `count` splats (1..128) whose order is kept, writes `words` (room for
- * SPL_CHUNK_WORDS_MAX) and everything in *chunk but geometry_word and first_id, which it zeroes. Positions are doubles in
- * `position` (count × 3, relative to the node's origin); splats[].position is not read. `error` may be NULL. Returns the
- * number of words. Every splat must be finite with radius > 0 (an assertion: the packer has cleaned them).
+ * SPL_CHUNK_WORDS_MAX) and everything in *chunk but geometry_word and first_id, which it zeroes. Positions are doubles
+ * in `position` (count × 3, relative to the node's origin); splats[].position is not read. `error` may be NULL. Returns
+ * the number of words. Every splat must be finite with radius > 0 (an assertion: the packer has cleaned them).
  * The bounds hold for the chunk's means (radius: for each splat) except where 24 bits an axis, 12 bits a normal's
  * coordinate or radius, or the floats that decoding adds up cannot hold them; *error tells. */
 uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,

@@ -1,6 +1,7 @@
-/* Where a chunk's streams lie, and the decoding of one splat. shaders/common/splat.glsl is this file line by line: 32-bit
- * integers and floats only, no fused operations, at most two words read a field. Nothing here checks the chunk: open has
- * (src/dataset/check.c). Every splat decodes on its own, without a look at its neighbours. Pure functions; any thread. */
+/* Where a chunk's streams lie, and the decoding of one splat. shaders/common/splat.glsl is this file line by line:
+ * 32-bit integers and floats only, no fused operations, at most two words read a field. Nothing here checks the chunk:
+ * open has (src/dataset/check.c). Every splat decodes on its own, without a look at its neighbours. Pure functions; any
+ * thread. */
 #include "dataset/chunk.h"
 
 #include <math.h>
@@ -132,6 +133,6 @@ void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
     uint32_t width = uncertainty_width(chunk);
     bit = i * width;
     uint32_t code = take(page + spl_chunk_uncertainty_word(chunk), &bit, width);
-    splat->uncertainty = width && code == (1u << width) - 1 ? 0.0f
-                                                            : chunk->uncertainty_max * exp2f(-0.5f * (float)code);
+    splat->uncertainty =
+        width && code == (1u << width) - 1 ? 0.0f : chunk->uncertainty_max * exp2f(-0.5f * (float)code);
 }

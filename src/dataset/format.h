@@ -59,7 +59,7 @@ struct spl_node {
 #define SPL_EXTRA_CLASS_BASE 8
 #define SPL_UNCERTAINTY_BITS_MAX 5
 
-/* Zero words that end each page, so that a shader may read two words for a field without looking where a stream ends. */
+/* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
 #define SPL_PAGE_TAIL_WORDS 2
 
 /* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream

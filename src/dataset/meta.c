@@ -1,5 +1,6 @@
-/* Opening, second stage: META, the JSON section with what pack knew about the dataset as a whole. Every key that readers
- * rely on is checked here once, so that nobody after this handles a missing or absurd one. The opener's thread. */
+/* Opening, second stage: META, the JSON section with what pack knew about the dataset as a whole. Every key that
+ * readers rely on is checked here once, so that nobody after this handles a missing or absurd one. The opener's thread.
+ */
 #include <math.h>
 #include <string.h>
 
@@ -102,13 +103,14 @@ int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
     struct spl_dataset_info *info = &dataset->info;
     const struct spl_section *section = dataset->meta_section;
     json_error_t where;
-    dataset->meta = json_loadb((const char *)dataset->map + section->offset, section->bytes, JSON_REJECT_DUPLICATES,
-                               &where);
+    dataset->meta =
+        json_loadb((const char *)dataset->map + section->offset, section->bytes, JSON_REJECT_DUPLICATES, &where);
     if (!dataset->meta)
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object: %s at byte %d; pack the dataset again",
                         dataset->path, where.text, where.position);
     if (!json_is_object(dataset->meta))
-        return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again", dataset->path);
+        return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again",
+                        dataset->path);
     const json_t *bounds = json_object_get(dataset->meta, "bounds");
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     uint64_t levels = 0;

@@ -1,6 +1,7 @@
-/* Opening, first stage: header, section table, where sections lie, and their checksums. Every size and offset is compared
- * with the file's real length before it is used; sums cannot wrap because each term is bounded by it. The small sections'
- * checksums are always checked, the pages' when asked for, on all cores. Pure reading of the map; the opener's thread. */
+/* Opening, first stage: header, section table, where sections lie, and their checksums. Every size and offset is
+ * compared with the file's real length before it is used; sums cannot wrap because each term is bounded by it. The
+ * small sections' checksums are always checked, the pages' when asked for, on all cores. Pure reading of the map; the
+ * opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
@@ -48,8 +49,8 @@ static int not_a_dataset(const struct spl_dataset *dataset, struct spl_error *er
     size_t letters = dataset->map_bytes < 4 ? dataset->map_bytes : 4;
     if (dataset->map_bytes >= 8 && !memcmp(dataset->map, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
-    return spl_fail(err, SPL_E_INPUT, "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan",
-                    dataset->path);
+    return spl_fail(err, SPL_E_INPUT,
+                    "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->path);
 }
 
 static int read_header(struct spl_dataset *dataset, struct spl_file_header *header, struct spl_error *err)
@@ -96,7 +97,8 @@ static int read_table(struct spl_dataset *dataset, const struct spl_file_header 
 /* Sections are listed by offset, so that no two overlap when each begins behind the one before. */
 static int check_extents(struct spl_dataset *dataset, const struct spl_file_header *header, struct spl_error *err)
 {
-    uint64_t end = sizeof *header, table_end = header->table_offset + header->section_count * sizeof(struct spl_section);
+    uint64_t end = sizeof *header,
+             table_end = header->table_offset + header->section_count * sizeof(struct spl_section);
     char name[40];
     for (uint32_t i = 0; i < dataset->section_count; i++) {
         const struct spl_section *s = &dataset->sections[i];

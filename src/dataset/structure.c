@@ -1,6 +1,6 @@
-/* Opening, third stage: nodes and chunks. Afterwards any walk of the tree ends, every index is in range, every stream lies
- * in its page and every code decodes to finite numbers, so the renderer and the shaders check nothing. Linear in nodes
- * and chunks, and never more memory than a byte a chunk. The opener's thread. */
+/* Opening, third stage: nodes and chunks. Afterwards any walk of the tree ends, every index is in range, every stream
+ * lies in its page and every code decodes to finite numbers, so the renderer and the shaders check nothing. Linear in
+ * nodes and chunks, and never more memory than a byte a chunk. The opener's thread. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -11,8 +11,8 @@
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *item,
                  size_t index, const char *what)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s: %s %zu %s; pack the dataset again", dataset->path, section, item,
-                    index, what);
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s: %s %zu %s; pack the dataset again", dataset->path, section,
+                    item, index, what);
 }
 
 static bool finite3(const float v[3])

@@ -20,8 +20,8 @@ struct spl_dataset_writer {
     char *path, *part_path;
     int fd;
     bool finished;
-    uint64_t offset;              /* where the file ends so far */
-    uint32_t *page;               /* the page being filled */
+    uint64_t offset;                 /* where the file ends so far */
+    uint32_t *page;                  /* the page being filled */
     size_t page_capacity, page_used; /* words, the tail not counted */
     struct spl_section *sections;
     size_t section_count, section_capacity;

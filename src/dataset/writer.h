@@ -14,14 +14,14 @@ struct spl_dataset_writer;
 /* Creates PATH.part-PID beside `path`. */
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err);
 
-/* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new page
- * when the node does not fit the current one; sets *page, and adds the node's place in the page to each
+/* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new
+ * page when the node does not fit the current one; sets *page, and adds the node's place in the page to each
  * chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
 int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
                                 struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err);
 
-/* Writes nodes, chunks and `meta` (borrowed), the table and the header, syncs file and directory, renames over the target.
- * The writer stays to be destroyed. */
+/* Writes nodes, chunks and `meta` (borrowed), the table and the header, syncs file and directory, renames over the
+ * target. The writer stays to be destroyed. */
 int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                               const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
                               struct spl_error *err);

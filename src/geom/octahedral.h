@@ -1,8 +1,9 @@
-/* Unit vectors on the octahedron: (u, v) in [-1, 1]², the upper half (z >= 0) inside |u| + |v| <= 1, the lower half folded
- * outwards into the corners. Angles are kept near the pole and stretched by at most sqrt(6) on the way to (u, v).
- * A chunk turns its normals first, so that their mean lies near +z and no fold runs through them: `axis` is the world axis
- * that becomes +z (0 x, 1 y, 2 z; the other two follow cyclically), `negative` then negates the whole vector.
- * Floats throughout, in the order of operations that shaders/common/splat.glsl repeats. Pure functions; any thread. */
+/* Unit vectors on the octahedron: (u, v) in [-1, 1]², the upper half (z >= 0) inside |u| + |v| <= 1, the lower half
+ * folded outwards into the corners. Angles are kept near the pole and stretched by at most sqrt(6) on the way to (u,
+ * v). A chunk turns its normals first, so that their mean lies near +z and no fold runs through them: `axis` is the
+ * world axis that becomes +z (0 x, 1 y, 2 z; the other two follow cyclically), `negative` then negates the whole
+ * vector. Floats throughout, in the order of operations that shaders/common/splat.glsl repeats. Pure functions; any
+ * thread. */
 #ifndef SPL_GEOM_OCTAHEDRAL_H
 #define SPL_GEOM_OCTAHEDRAL_H
 

@@ -1,6 +1,6 @@
-/* The container behind its checksums: the input says what the sections hold, this file lays them out as the writer does,
- * computes every hash, patches header and table, and opens the result. What opens is decoded to the last splat, from
- * pages copied to blocks of their exact size.
+/* The container behind its checksums: the input says what the sections hold, this file lays them out as the writer
+ * does, computes every hash, patches header and table, and opens the result. What opens is decoded to the last splat,
+ * from pages copied to blocks of their exact size.
  *
  * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify), one byte n, n patches of three bytes (offset
  * low, high; xor) into header and table, four little-endian 32 bit sizes, then META, NODE, CHNK and PAGE of those sizes
@@ -40,7 +40,8 @@ static void put(int fd, const void *bytes, size_t size, uint64_t offset)
 }
 
 /* The page first, as the writer has it; then META, NODE, CHNK, the table. */
-static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches, unsigned patch_count)
+static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches,
+                    unsigned patch_count)
 {
     static const uint32_t types[section_count] = {SPL_SECTION_PAGE, SPL_SECTION_META, SPL_SECTION_NODES,
                                                   SPL_SECTION_CHUNKS};
@@ -62,13 +63,15 @@ static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, co
     memcpy(page, part[3], wanted[3] < sizeof page ? wanted[3] : sizeof page);
     part[3] = page;
     wanted[3] = page_bytes < sizeof page ? page_bytes : sizeof page;
-    struct head head = {.header = {.magic = SPL_FILE_MAGIC, .version = SPL_FILE_VERSION,
-                                   .header_bytes = sizeof(struct spl_file_header), .section_count = section_count}};
+    struct head head = {.header = {.magic = SPL_FILE_MAGIC,
+                                   .version = SPL_FILE_VERSION,
+                                   .header_bytes = sizeof(struct spl_file_header),
+                                   .section_count = section_count}};
     uint64_t offset = SPL_FILE_ALIGNMENT;
     for (int i = 0; i < section_count; i++) {
         int from = (i + 3) % section_count; /* the input has the page last */
-        head.table[i] = (struct spl_section){.type = types[i], .offset = offset, .bytes = wanted[from],
-                                             .hash = XXH3_64bits(part[from], wanted[from])};
+        head.table[i] = (struct spl_section){
+            .type = types[i], .offset = offset, .bytes = wanted[from], .hash = XXH3_64bits(part[from], wanted[from])};
         put(fd, part[from], wanted[from], offset);
         offset = (offset + wanted[from] + 63) / 64 * 64;
     }

@@ -42,8 +42,11 @@ static void *must_have(void *p)
 /* Writes `count` splats as the node's chunks and sets what follows from them. */
 static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count)
 {
-    static const struct spl_chunk_options options = {.position_error = 0.016, .normal_error = M_PI / 180,
-                                                     .radius_error = 0.05, .has_class = true, .has_uncertainty = true};
+    static const struct spl_chunk_options options = {.position_error = 0.016,
+                                                     .normal_error = M_PI / 180,
+                                                     .radius_error = 0.05,
+                                                     .has_class = true,
+                                                     .has_uncertainty = true};
     size_t chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS, used = 0;
     spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity);
     uint32_t *words = must_have(malloc(chunk_count * SPL_CHUNK_WORDS_MAX * sizeof *words));
@@ -60,14 +63,15 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         size_t left = count - c * SPL_CHUNK_SPLATS;
         uint32_t n = left < SPL_CHUNK_SPLATS ? (uint32_t)left : SPL_CHUNK_SPLATS;
         for (uint32_t i = 0; i < n; i++) {
-            part[i] = (struct spl_splat){.radius = from[i].radius, .uncertainty = from[i].uncertainty,
-                                         .classification = from[i].classification};
+            part[i] = (struct spl_splat){
+                .radius = from[i].radius, .uncertainty = from[i].uncertainty, .classification = from[i].classification};
             memcpy(part[i].normal, from[i].normal, sizeof part[i].normal);
             memcpy(part[i].color, from[i].color, sizeof part[i].color);
             for (int a = 0; a < 3; a++)
                 position[i][a] = from[i].position[a] - node->origin[a];
         }
-        uint32_t length = spl_chunk_encode(part, (const double(*)[3])position, n, &options, &chunks[c], words + used, NULL);
+        uint32_t length =
+            spl_chunk_encode(part, (const double(*)[3])position, n, &options, &chunks[c], words + used, NULL);
         for (uint32_t i = 0; i < n; i++) {
             struct spl_splat out;
             spl_chunk_decode(&chunks[c], words + used, i, &out);
@@ -154,13 +158,14 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
         add_node(&b, &b.nodes[0], splats, count);
     else
         add_two_levels(&b, splats, count);
-    json_t *meta = json_pack(
-        "{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b, s:b, s:b}, s:[s], s:{}}",
-        "points", (json_int_t)count, "leaf_splats", (json_int_t)count, "levels", levels, "splat_radius",
-        (double)splats[count / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1], high[2],
-        "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target", middle[0], middle[1],
-        middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "class", 1, "uncertainty", 1, "sources",
-        "made by a test", "pack");
+    json_t *meta =
+        json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b, s:b, s:b}, "
+                  "s:[s], s:{}}",
+                  "points", (json_int_t)count, "leaf_splats", (json_int_t)count, "levels", levels, "splat_radius",
+                  (double)splats[count / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
+                  high[2], "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target",
+                  middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "class",
+                  1, "uncertainty", 1, "sources", "made by a test", "pack");
     must_have(meta);
     must(spl_dataset_writer_finish(b.writer, b.nodes, b.node_count, b.chunks, b.chunk_count, meta, &err), &err);
     json_decref(meta);

@@ -11,8 +11,11 @@
 #include "dataset/chunk.h"
 #include "geom/octahedral.h"
 
-static const struct spl_chunk_options defaults = {
-    .position_error = 0.016, .normal_error = M_PI / 180, .radius_error = 0.05, .has_class = true, .has_uncertainty = true};
+static const struct spl_chunk_options defaults = {.position_error = 0.016,
+                                                  .normal_error = M_PI / 180,
+                                                  .radius_error = 0.05,
+                                                  .has_class = true,
+                                                  .has_uncertainty = true};
 
 static uint32_t random_state;
 
@@ -118,7 +121,8 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
         all += bits[a];
     assert_int_equal(all, 32 * words + 8 * sizeof chunk);
     return (double)(bits[SPL_ATTRIBUTE_POSITION] + bits[SPL_ATTRIBUTE_NORMAL] + bits[SPL_ATTRIBUTE_RADIUS] +
-                    bits[SPL_ATTRIBUTE_COLOR]) / s->count;
+                    bits[SPL_ATTRIBUTE_COLOR]) /
+           s->count;
 }
 
 static void test_random(void **state)
@@ -133,8 +137,8 @@ static void test_random(void **state)
         make_sheet(&s, count, extent, extent * exp2(-16 * uniform()), radius, 2 * uniform(), up);
         check_sample(&s, &defaults);
         check_sample(&s, &(struct spl_chunk_options){.position_error = 0.1, .normal_error = 0.1, .radius_error = 0.2});
-        check_sample(&s, &(struct spl_chunk_options){.position_error = 0.001, .normal_error = 0.001,
-                                                     .radius_error = 0.001});
+        check_sample(
+            &s, &(struct spl_chunk_options){.position_error = 0.001, .normal_error = 0.001, .radius_error = 0.001});
     }
 }
 
@@ -236,9 +240,11 @@ static void test_normal_directions(void **state)
                 check_sample(&s, &defaults);
             }
     make_sheet(&s, SPL_CHUNK_SPLATS, 1, 0.1, 0.1, 1, (double[3]){0, 0, 0});
-    for (int i = 0; i < 6; i++)
-        set_normal(&s.splats[i], i == 0 ? 1 : i == 1 ? -1 : 0, i == 2 ? 1 : i == 3 ? -1 : 0,
-                   i == 4 ? 1 : i == 5 ? -1 : 0);
+    for (int i = 0; i < 6; i++) {
+        double axis[3] = {0};
+        axis[i / 2] = i % 2 ? -1 : 1;
+        set_normal(&s.splats[i], axis[0], axis[1], axis[2]);
+    }
     check_sample(&s, &defaults);
 }
 
@@ -292,7 +298,7 @@ static void test_color_is_lossless(void **state)
         uint32_t start = round / 2 * 79784;
         for (uint32_t i = 0; i < s.count; i++) {
             uint32_t rgb = round % 2 && i < 8 ? (i & 1 ? 0xff : 0) | (i & 2 ? 0xff00 : 0) | (i & 4 ? 0xff0000 : 0)
-                                             : (start + i * 623) & 0xffffff;
+                                              : (start + i * 623) & 0xffffff;
             for (int c = 0; c < 3; c++)
                 s.splats[i].color[c] = (uint8_t)(rgb >> 8 * c);
         }
@@ -335,11 +341,16 @@ static void test_uncertainty_levels(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random),           cmocka_unit_test(test_wall_is_cheap),
-        cmocka_unit_test(test_one_and_equal),    cmocka_unit_test(test_absurd_extent),
-        cmocka_unit_test(test_radius_spread),    cmocka_unit_test(test_normal_directions),
-        cmocka_unit_test(test_zero_normal),      cmocka_unit_test(test_octahedral),
-        cmocka_unit_test(test_color_is_lossless), cmocka_unit_test(test_uncertainty_levels),
+        cmocka_unit_test(test_random),
+        cmocka_unit_test(test_wall_is_cheap),
+        cmocka_unit_test(test_one_and_equal),
+        cmocka_unit_test(test_absurd_extent),
+        cmocka_unit_test(test_radius_spread),
+        cmocka_unit_test(test_normal_directions),
+        cmocka_unit_test(test_zero_normal),
+        cmocka_unit_test(test_octahedral),
+        cmocka_unit_test(test_color_is_lossless),
+        cmocka_unit_test(test_uncertainty_levels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -30,10 +30,13 @@ static struct make_splat *some_splats(size_t count)
 {
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (size_t i = 0; i < count; i++)
-        splats[i] = (struct make_splat){.position = {500000.25 + 0.01 * (double)(i % 40), 0.01 * (double)(i / 40), 7 + sin((double)i)},
-                                        .normal = {0.6f, 0, 0.8f}, .radius = 0.01f + 0.001f * (float)(i % 7),
-                                        .color = {(uint8_t)i, 100, (uint8_t)(i * i)}, .classification = (uint8_t)(i % 3),
-                                        .uncertainty = i % 5 ? 0.5f : 0};
+        splats[i] = (struct make_splat){
+            .position = {500000.25 + 0.01 * (double)(i % 40), 0.01 * (double)(i / 40), 7 + sin((double)i)},
+            .normal = {0.6f, 0, 0.8f},
+            .radius = 0.01f + 0.001f * (float)(i % 7),
+            .color = {(uint8_t)i, 100, (uint8_t)(i * i)},
+            .classification = (uint8_t)(i % 3),
+            .uncertainty = i % 5 ? 0.5f : 0};
     return splats;
 }
 
@@ -71,7 +74,8 @@ static void test_round_trip(void **state)
             assert_memory_equal(splat.color, splats[i].color, 3);
             assert_int_equal(splat.classification, splats[i].classification);
             for (int a = 0; a < 3; a++)
-                assert_true(fabs(node->origin[a] + splat.position[a] - splats[i].position[a]) < 0.05 * splats[i].radius);
+                assert_true(fabs(node->origin[a] + splat.position[a] - splats[i].position[a]) <
+                            0.05 * splats[i].radius);
         }
         struct spl_camera camera;
         assert_int_equal(spl_dataset_get_default_camera(dataset, 640, 480, &camera, NULL), SPL_OK);
@@ -81,7 +85,6 @@ static void test_round_trip(void **state)
     free(splats);
     spl_dataset_close(NULL);
 }
-
 
 /* A file's bytes in memory, to be damaged. */
 struct bytes {
@@ -187,9 +190,9 @@ static void test_every_flipped_bit(void **state)
             char message[512];
             assert_int_equal(pwrite(fd, &byte, 1, (off_t)offset), 1);
             int rc = try_open(path, true, message);
-            bool named = region && (offset < sizeof header_of(b)->magic ? strstr(message, "not a packed dataset") ||
-                                                                              strstr(message, "lost its magic")
-                                                                        : strstr(message, region) != NULL);
+            bool named = region && (offset < sizeof header_of(b)->magic
+                                        ? strstr(message, "not a packed dataset") || strstr(message, "lost its magic")
+                                        : strstr(message, region) != NULL);
             if (region ? rc >= 0 || !named : rc != SPL_OK)
                 fail_msg("bit %d of byte %zu: %d '%s', expected '%s'", bit, offset, rc, message, region);
             refused += rc != SPL_OK;
@@ -259,16 +262,24 @@ static void test_other_files(void **state)
     expect_refusal(folder, SPL_E_INPUT, "is not a regular file");
 }
 
+#define TEN "0123456789"
+#define LONG_NAME TEN TEN TEN TEN TEN TEN TEN TEN TEN TEN TEN TEN TEN
+
 static void test_ids(void **state)
 {
     (void)state;
     static const struct {
         const char *name, *id;
     } rows[] = {
-        {"a.spld", "a"},          {"Wall-2_x.v3.spld", "Wall-2_x.v3"}, {"plain", "plain"}, {"two words.spld", NULL},
-        {".hidden.spld", NULL},   {"caf\xc3\xa9.spld", NULL},          {"a?b.spld", NULL}, {"..x.spld", NULL},
-        {"x123456789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789012345678901234"
-         "5678901234567890.spld", NULL},
+        {"a.spld", "a"},
+        {"Wall-2_x.v3.spld", "Wall-2_x.v3"},
+        {"plain", "plain"},
+        {"two words.spld", NULL},
+        {".hidden.spld", NULL},
+        {"caf\xc3\xa9.spld", NULL},
+        {"a?b.spld", NULL},
+        {"..x.spld", NULL},
+        {LONG_NAME ".spld", NULL},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const char *path = path_of(rows[i].name);
@@ -288,7 +299,8 @@ static void test_ids(void **state)
 static void test_version_follows_content(void **state)
 {
     (void)state;
-    struct make_splat splats[2] = {{.normal = {0, 0, 1}, .radius = 1}, {.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1}};
+    struct make_splat splats[2] = {{.normal = {0, 0, 1}, .radius = 1},
+                                   {.position = {1, 2, 3}, .normal = {0, 0, 1}, .radius = 1}};
     uint64_t versions[3];
     for (int i = 0; i < 3; i++) {
         splats[0].color[1] = i == 2;
@@ -322,9 +334,12 @@ static void test_refused_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),       cmocka_unit_test(test_every_flipped_bit),
-        cmocka_unit_test(test_every_truncation), cmocka_unit_test(test_other_files),
-        cmocka_unit_test(test_ids),              cmocka_unit_test(test_version_follows_content),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_every_flipped_bit),
+        cmocka_unit_test(test_every_truncation),
+        cmocka_unit_test(test_other_files),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_version_follows_content),
         cmocka_unit_test(test_refused_memory),
     };
     make_folder(folder);

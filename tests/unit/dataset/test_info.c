@@ -43,8 +43,10 @@ static void make(const char *name, size_t count, int levels)
     char path[300];
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (size_t i = 0; i < count; i++)
-        splats[i] = (struct make_splat){.position = {0.5 * (double)(i % 100), 0.5 * (double)(i / 100), 0}, .normal = {0, 0, 1},
-                                        .radius = 0.5f, .color = {(uint8_t)i, 10, 10}};
+        splats[i] = (struct make_splat){.position = {0.5 * (double)(i % 100), 0.5 * (double)(i / 100), 0},
+                                        .normal = {0, 0, 1},
+                                        .radius = 0.5f,
+                                        .color = {(uint8_t)i, 10, 10}};
     snprintf(path, sizeof path, "%s/%s", folder, name);
     make_dataset_file(path, splats, count, levels);
     free(splats);

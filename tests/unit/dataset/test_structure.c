@@ -38,8 +38,11 @@ static struct parts take_apart(void)
     enum { count = 400 };
     struct make_splat splats[count];
     for (int i = 0; i < count; i++)
-        splats[i] = (struct make_splat){.position = {i % 20, i / 20, i % 3}, .normal = {0, 0, 1}, .radius = 1 + i % 2,
-                                        .color = {(uint8_t)i}, .classification = (uint8_t)(i % 4)};
+        splats[i] = (struct make_splat){.position = {i % 20, i / 20, i % 3},
+                                        .normal = {0, 0, 1},
+                                        .radius = 1 + i % 2,
+                                        .color = {(uint8_t)i},
+                                        .classification = (uint8_t)(i % 4)};
     struct spl_dataset *dataset = make_dataset_levels(splats, count, 2);
     struct parts p = {0};
     size_t bytes;
@@ -85,7 +88,7 @@ static void expect(const char *what, int code, const char *part)
         fail_msg("%s: expected %d '%s', got %d '%s'", what, code, part, rc, err.message);
 }
 
-#define FORGE(name, statement)                                                                                          \
+#define FORGE(name, statement)                                                                                         \
     static void name(struct parts *p)                                                                                  \
     {                                                                                                                  \
         statement;                                                                                                     \
@@ -262,7 +265,7 @@ static void save_raw(struct raw *raw)
     fclose(file);
 }
 
-#define FORGE_RAW(name, statement)                                                                                      \
+#define FORGE_RAW(name, statement)                                                                                     \
     static void name(struct raw *r)                                                                                    \
     {                                                                                                                  \
         statement;                                                                                                     \
@@ -288,7 +291,9 @@ FORGE_RAW(raw_half_node, r->table[2].bytes -= 1)
 FORGE_RAW(raw_half_chunk, r->table[3].bytes -= 1)
 FORGE_RAW(raw_no_page, r->table[0].type = SPL_FOURCC('X', 'X', 'X', 'X'))
 FORGE_RAW(raw_unknown, (memmove(r->table + 1, r->table, 4 * sizeof *r->table),
-                        r->table[0] = (struct spl_section){.type = SPL_FOURCC('N', 'E', 'W', 'S'), .offset = 64, .bytes = 3,
+                        r->table[0] = (struct spl_section){.type = SPL_FOURCC('N', 'E', 'W', 'S'),
+                                                           .offset = 64,
+                                                           .bytes = 3,
                                                            .hash = XXH3_64bits("\0\0\0", 3)},
                         r->header->section_count++, r->header->file_bytes += 32, r->size += 32))
 FORGE_RAW(raw_unknown_damaged, (raw_unknown(r), r->table[0].hash ^= 1))

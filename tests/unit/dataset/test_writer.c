@@ -54,7 +54,8 @@ static void test_pages(void **state)
     static const struct {
         size_t megabytes;
         uint32_t page, word; /* where the node's first chunk must land */
-    } rows[] = {{7, 0, 0}, {8, 0, 7 << 18}, {8, 1, 0}, {20, 2, 0}, {1, 3, 0}, {1, 3, 1 << 18}, {15, 4, 0}, {0, 4, 15 << 18}};
+    } rows[] = {{7, 0, 0}, {8, 0, 7 << 18}, {8, 1, 0},  {20, 2, 0},
+                {1, 3, 0}, {1, 3, 1 << 18}, {15, 4, 0}, {0, 4, 15 << 18}};
     struct spl_dataset_writer *writer;
     uint32_t *words = calloc(64 << 18, sizeof *words);
     assert_int_equal(spl_dataset_writer_create(path, &writer, NULL), SPL_OK);
