@@ -10,6 +10,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
     const struct spl_gpu_limits *limits = spl_gpu_get_limits(gpu);
     if (samples * 16 > limits->binding_bytes)
         samples = limits->binding_bytes / 16;
+    if (samples > (uint64_t)limits->workgroups * SPL_WORKGROUP) /* the resolve pass is one dispatch */
+        samples = (uint64_t)limits->workgroups * SPL_WORKGROUP;
     *scratch = (struct spl_scratch){.samples = samples};
     bool software = spl_gpu_get_device(gpu)->software;
     const struct {
