@@ -40,11 +40,13 @@ static int next_line(struct spl_source *source, const char **line, size_t *lengt
     return code;
 }
 
-static bool is_number(const char *line, size_t length, char separator)
+/* A line of numbers and not of names; "1,5;2,5" is one too, and refused as such when it is read. */
+static bool is_data(const char *line, size_t length)
 {
-    struct spl_fields fields = spl_fields_begin(line, length, separator);
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
     double ignored;
-    return spl_fields_number(&fields, &ignored) == SPL_FIELD_OK;
+    enum spl_field got = spl_fields_number(&fields, &ignored);
+    return got == SPL_FIELD_OK || (got == SPL_FIELD_BAD && strchr("+-.0123456789", *fields.start));
 }
 
 static bool is_count(const char *line, size_t length, uint64_t *count)
@@ -112,7 +114,7 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
                 return code;
             continue;
         }
-        if (is_number(*line, *length, spl_text_separator(*line, *length)))
+        if (is_data(*line, *length))
             return SPL_OK;
         if (header)
             return spl_source_fail_line(source, source->line, "", err, "is neither numbers nor a comment");

@@ -1,0 +1,344 @@
+/* PLY: every type, byte order, name and order of properties gives the same points; what is broken is named. */
+#include "cloud_test.h"
+
+#include <endian.h>
+#include <math.h>
+
+static const char *const orders[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+
+static void put_scalar(struct bytes *b, int order, const char *type, double v)
+{
+    if (order == 0) {
+        put_text(b, "%.17g ", v);
+        return;
+    }
+    const char *digits = type + strcspn(type, "0123456789");
+    unsigned size = !strncmp(type, "float", 5) ? (strcmp(digits, "64") ? 4 : 8) : !strcmp(type, "double") ? 8
+                    : strstr(type, "char") || !strcmp(digits, "8") ? 1
+                    : strstr(type, "short") || !strcmp(digits, "16") ? 2 : 4;
+    uint64_t bits;
+    if (!strncmp(type, "float", 5) && size == 4) {
+        float f = (float)v;
+        uint32_t u;
+        memcpy(&u, &f, 4);
+        bits = u;
+    } else if (size == 8) {
+        memcpy(&bits, &v, 8);
+    } else {
+        bits = (uint64_t)(int64_t)v;
+    }
+    for (unsigned i = 0; i < size; i++) {
+        uint8_t byte = (uint8_t)(bits >> 8 * (order == 1 ? i : size - 1 - i));
+        put(b, &byte, 1);
+    }
+}
+
+static void end_row(struct bytes *b, int order)
+{
+    if (order == 0)
+        put_text(b, "\n");
+}
+
+static void every_type_and_byte_order(void **state)
+{
+    static const char *const types[] = {"char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int",
+                                        "int32", "uint", "uint32", "float", "float32", "double", "float64"};
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (int order = 0; order < 3; order++)
+        for (size_t t = 0; t < sizeof types / sizeof *types; t++) {
+            bool negative = types[t][0] != 'u';
+            b.length = 0;
+            put_text(&b, "ply\nformat %s 1.0\nelement vertex 3\n", orders[order]);
+            put_text(&b, "property %s z\nproperty uchar junk\nproperty %s x\nproperty double w\nproperty %s y\nend_header\n",
+                     types[t], types[t], types[t]);
+            for (int i = 0; i < 3; i++) {
+                put_scalar(&b, order, types[t], 3 + i);
+                put_scalar(&b, order, "uchar", 200);
+                put_scalar(&b, order, types[t], negative ? -100 - i : 100 + i);
+                put_scalar(&b, order, "double", NAN); /* a property that nobody reads may hold anything */
+                put_scalar(&b, order, types[t], 7 * i);
+                end_row(&b, order);
+            }
+            load_bytes(&b, NULL, 2, &l);
+            if (l.code < 0)
+                fail_msg("%s %s: %s", orders[order], types[t], l.err.message);
+            assert_int_equal(l.points, 3);
+            assert_int_equal(l.expected, 3);
+            for (int i = 0; i < 3; i++)
+                assert_point(&l, (size_t)i, negative ? -100 - i : 100 + i, 7 * i, 3 + i);
+            assert_int_equal(l.attributes, 0);
+            loaded_finish(&l);
+        }
+}
+
+static void doubles_are_exact(void **state)
+{
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (int order = 0; order < 3; order++) {
+        b.length = 0;
+        put_text(&b, "ply\nformat %s 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n"
+                     "end_header\n", orders[order]);
+        put_scalar(&b, order, "double", 406047.00100000002);
+        put_scalar(&b, order, "double", 1e9 + 1.0 / 3);
+        put_scalar(&b, order, "double", -0.1);
+        load_bytes(&b, NULL, 1, &l);
+        assert_int_equal(l.code, 0);
+        assert_point(&l, 0, 406047.00100000002, 1e9 + 1.0 / 3, -0.1);
+        loaded_finish(&l);
+    }
+}
+
+/* Faces and lists before, inside and after the vertices; colours, normals and classes among other properties. */
+static void other_elements_and_lists_are_skipped(void **state)
+{
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (int order = 0; order < 3; order++) {
+        b.length = 0;
+        put_text(&b, "ply\nformat %s 1.0\ncomment element vertex 99\nobj_info property\n", orders[order]);
+        put_text(&b, "element camera 2\nproperty float fov\nproperty short id\n"
+                     "element face 2\nproperty list uchar int vertex_index\nproperty uchar flags\n"
+                     "element nothing 0\nproperty float q\nelement empty 7\n"
+                     "element vertex 2\nproperty list uint8 float32 weights\nproperty float nx\nproperty float ny\n"
+                     "property float nz\nproperty float x\nproperty float y\nproperty float z\n"
+                     "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n"
+                     "property uchar scalar_Classification\n"
+                     "element edge 5\nproperty int a\nend_header\n");
+        for (int i = 0; i < 2; i++) {
+            put_scalar(&b, order, "float", 1), put_scalar(&b, order, "short", -1);
+            end_row(&b, order);
+        }
+        for (int i = 0; i < 2; i++) {
+            put_scalar(&b, order, "uchar", 3 + i);
+            for (int k = 0; k < 3 + i; k++)
+                put_scalar(&b, order, "int", k);
+            put_scalar(&b, order, "uchar", 9);
+            end_row(&b, order);
+        }
+        for (int i = 0; i < 2; i++) {
+            put_scalar(&b, order, "uchar", 2 * i);
+            for (int k = 0; k < 2 * i; k++)
+                put_scalar(&b, order, "float", 0.5);
+            put_scalar(&b, order, "float", 0), put_scalar(&b, order, "float", 2 - 2 * i);
+            put_scalar(&b, order, "float", 0), put_scalar(&b, order, "float", 10 + i);
+            put_scalar(&b, order, "float", 20 + i), put_scalar(&b, order, "float", 30 + i);
+            put_scalar(&b, order, "uchar", 255), put_scalar(&b, order, "uchar", 0), put_scalar(&b, order, "uchar", 128);
+            put_scalar(&b, order, "uchar", 77), put_scalar(&b, order, "uchar", 6);
+            end_row(&b, order);
+        } /* the edges are missing: nobody needs them */
+        load_bytes(&b, NULL, 1, &l);
+        if (l.code < 0)
+            fail_msg("%s: %s", orders[order], l.err.message);
+        assert_int_equal(l.points, 2);
+        assert_int_equal(l.attributes, SPL_CLOUD_COLOR | SPL_CLOUD_NORMAL | SPL_CLOUD_CLASS);
+        assert_point(&l, 0, 10, 20, 30);
+        assert_point(&l, 1, 11, 21, 31);
+        assert_color(&l, 1, 255, 0, 128);
+        assert_int_equal(l.first.classification[1], 6);
+        assert_true(l.first.normal[0][0] == 0 && l.first.normal[0][1] == 1 && l.first.normal[0][2] == 0);
+        assert_true(l.first.normal[1][1] == 0); /* degenerate */
+        loaded_finish(&l);
+    }
+}
+
+static void header_lines_may_end_in_any_way(void **state)
+{
+    static const char *const endings[] = {"\n", "\r\n", "\r"};
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (int e = 0; e < 3; e++)
+        for (int order = 0; order < 2; order++) {
+            const char *n = endings[e];
+            b.length = 0;
+            put_text(&b, "ply%sformat %s 1.0%scomment c%s%selement vertex 1 %s", n, orders[order], n, n, n, n);
+            put_text(&b, "property uchar x%sproperty uchar y%sproperty uchar z%send_header%s", n, n, n, n);
+            if (order == 1)
+                put(&b, "\n\r\n", 3); /* the data itself looks like a line ending */
+            else
+                put_text(&b, "%s10 13 10%s", n, n);
+            load_bytes(&b, NULL, 5, &l);
+            if (l.code < 0)
+                fail_msg("%d %d: %s", e, order, l.err.message);
+            assert_int_equal(l.points, 1);
+            assert_point(&l, 0, 10, 13, 10);
+            loaded_finish(&l);
+        }
+}
+
+static void colour(const char *type, const char *row1, const char *row2, struct loaded *l)
+{
+    static struct bytes b;
+    b.length = 0;
+    put_text(&b, "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n");
+    put_text(&b, "property %s r\nproperty %s diffuse_green\nproperty %s Blue\nend_header\n0 0 0 %s\n0 0 0 %s\n", type,
+             type, type, row1, row2);
+    load_bytes(&b, NULL, 5, l);
+}
+
+static void colour_range_is_found(void **state)
+{
+    struct loaded l;
+    (void)state;
+    colour("ushort", "255 1 0", "3 4 5", &l); /* 8 bits in 16 */
+    assert_color(&l, 0, 255, 1, 0);
+    loaded_finish(&l);
+    colour("ushort", "255 1 0", "65535 128 129", &l); /* 16: v / 257, rounded */
+    assert_color(&l, 0, 1, 0, 0);
+    assert_color(&l, 1, 255, 0, 1);
+    loaded_finish(&l);
+    colour("float", "0 0.5 1", "-0.25 nan 0.999", &l);
+    assert_color(&l, 0, 0, 128, 255);
+    assert_color(&l, 1, 0, 0, 255);
+    loaded_finish(&l);
+    colour("double", "0 0.5 1", "254.4 2.5 0", &l);
+    assert_color(&l, 0, 0, 1, 1);
+    assert_color(&l, 1, 254, 3, 0);
+    loaded_finish(&l);
+    colour("int", "1 0 0", "0 1 0", &l); /* of an integer type: nearly black, not white */
+    assert_color(&l, 0, 1, 0, 0);
+    loaded_finish(&l);
+    colour("uchar", "0 0 0", "0 0 0", &l); /* black is a colour where the type says so */
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    loaded_finish(&l);
+    colour("ushort", "0 0 0", "0 0 0", &l); /* fields that nobody filled */
+    assert_int_equal(l.attributes, 0);
+    loaded_finish(&l);
+    colour("uint", "70000 0 0", "0 0 0", &l);
+    assert_int_equal(l.code, SPL_E_INPUT);
+    loaded_finish(&l);
+    colour("uchar", "1 2 3", "300 0 0", &l);
+    assert_int_equal(l.code, SPL_E_INPUT);
+    assert_string_equal(l.err.field, "red");
+    assert_non_null(strstr(l.err.message, "line 12"));
+    loaded_finish(&l);
+}
+
+static void sixteen_bits_are_found_at_the_very_end(void **state)
+{
+    static struct bytes b;
+    struct loaded l;
+    enum { n = 5000 };
+    (void)state;
+    b.length = 0;
+    put_text(&b, "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
+                 "property uchar z\nproperty ushort red\nproperty ushort green\nproperty ushort blue\nend_header\n", n);
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < 3; k++)
+            put_scalar(&b, 1, "uchar", k);
+        for (int k = 0; k < 3; k++)
+            put_scalar(&b, 1, "ushort", i == n - 1 ? 51400 : 200);
+    }
+    load_bytes(&b, NULL, 333, &l);
+    assert_int_equal(l.points, n);
+    assert_color(&l, 0, 1, 1, 1);
+    loaded_finish(&l);
+}
+
+static void intensity_is_grey_without_colour(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+              "property float scalar_Intensity\nend_header\n0 0 0 -1000\n0 0 1 0\n0 0 2 1000\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    assert_color(&l, 0, 0, 0, 0);
+    assert_color(&l, 1, 128, 128, 128);
+    assert_color(&l, 2, 255, 255, 255);
+    loaded_finish(&l);
+    load_text("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+              "property float intensity\nend_header\n0 0 0 7\n0 0 1 7\n", NULL, &l);
+    assert_int_equal(l.attributes, 0); /* one value everywhere is none */
+    loaded_finish(&l);
+}
+
+static void non_finite_points_are_skipped_and_counted(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+              "nan 0 0\n1 2 3\n0 -inf 0\n0 0 1e999\n", NULL, &l);
+    assert_int_equal(l.points, 1);
+    assert_int_equal(l.skipped, 3);
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+}
+
+#define XYZ "property float x\nproperty float y\nproperty float z\n"
+
+static void broken_headers_are_refused(void **state)
+{
+    (void)state;
+    refused_text("ply\n", SPL_E_INPUT, "end_header", "is missing");
+    refused_text("ply\nend_header\n", SPL_E_INPUT, "format", "missing");
+    refused_text("ply\nformat ascii 2.0\n", SPL_E_INPUT, "format", "line 2");
+    refused_text("ply\nformat middle_endian 1.0\n", SPL_E_INPUT, "format", "binary_big_endian");
+    refused_text("ply\nformat ascii 1.0\nelement face 0\nend_header\n", SPL_E_INPUT, "element vertex", "missing");
+    refused_text("ply\nformat ascii 1.0\nelement vertex\n", SPL_E_INPUT, "element", "line 3");
+    refused_text("ply\nformat ascii 1.0\nelement vertex -3\n", SPL_E_INPUT, "element", "\"-3\"");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", SPL_E_INPUT, "element", "not a count");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nelement vertex 1\n", SPL_E_INPUT, "element vertex", "twice");
+    refused_text("ply\nformat ascii 1.0\nproperty float x\n", SPL_E_INPUT, "property", "before any element");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n", SPL_E_INPUT, "property", "\"quad\"");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\n", SPL_E_INPUT, "property",
+                 "list's length");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
+                 SPL_E_INPUT, "z", "no such property");
+    refused_text("ply\nformat ascii 1.0\nwhat is this\n", SPL_E_INPUT, "", "\"what\"");
+}
+
+static void broken_data_is_refused(void **state)
+{
+    (void)state;
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1.5 2.5 3.5\n4.5 5.5\n", SPL_E_INPUT, "z", "line 9");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3 4\n4 5 6\n", SPL_E_INPUT, "", "line 8");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3\n4 5 6x\n", SPL_E_INPUT, "z", "\"6x\"");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1.0 2.0 3.0\n\n", SPL_E_INPUT,
+                 "element vertex", "1 of 2");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 4000000000\n" XYZ "end_header\n1 2 3\n", SPL_E_INPUT, "vertex",
+                 "4000000000 rows");
+    refused_text("ply\nformat binary_big_endian 1.0\nelement vertex 18446744073709551615\n" XYZ "end_header\n1234567890",
+                 SPL_E_INPUT, "vertex", "offset");
+    refused_text("ply\nformat binary_little_endian 1.0\nelement face 4000000000\nproperty list uchar int i\n"
+                 "element vertex 1\n" XYZ "end_header\n123456789012", SPL_E_INPUT, "face", "4000000000");
+    refused_text("ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int i\n"
+                 "element vertex 0\n" XYZ "end_header\n\xff\xff\xff\xff", SPL_E_INPUT, "i", "byte order");
+    refused_text("ply\nformat ascii 1.0\nelement face 3\nproperty list uchar int i\nelement vertex 0\n" XYZ
+                 "end_header\n1 2\n1 2\n\n", SPL_E_INPUT, "face", "2 of 3");
+}
+
+static void the_wrong_byte_order_is_told(void **state)
+{
+    static struct bytes b;
+    (void)state;
+    for (int order = 1; order < 3; order++) {
+        b.length = 0;
+        put_text(&b, "ply\nformat %s 1.0\nelement vertex 9\n" XYZ "end_header\n", orders[3 - order]);
+        for (int i = 0; i < 27; i++)
+            put_scalar(&b, order, "float", 0.37 * i);
+        refused(&b, NULL, SPL_E_INPUT, "format", order == 1 ? "little-endian order only" : "big-endian order only");
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_type_and_byte_order),
+        cmocka_unit_test(doubles_are_exact),
+        cmocka_unit_test(other_elements_and_lists_are_skipped),
+        cmocka_unit_test(header_lines_may_end_in_any_way),
+        cmocka_unit_test(colour_range_is_found),
+        cmocka_unit_test(sixteen_bits_are_found_at_the_very_end),
+        cmocka_unit_test(intensity_is_grey_without_colour),
+        cmocka_unit_test(non_finite_points_are_skipped_and_counted),
+        cmocka_unit_test(broken_headers_are_refused),
+        cmocka_unit_test(broken_data_is_refused),
+        cmocka_unit_test(the_wrong_byte_order_is_told),
+    };
+    return cmocka_run_group_tests(tests, NULL, remove_scratch);
+}

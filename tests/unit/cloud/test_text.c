@@ -1,0 +1,228 @@
+/* PTS, XYZ and CSV-like text: columns by name, by option and by their values; separators; counts; broken lines. */
+#include "cloud_test.h"
+
+#include <math.h>
+
+static void separators_headers_and_comments(void **state)
+{
+    static const char *const texts[] = {
+        "1 2 3\n4 5 6\n",
+        "  1\t2   3 \r\n4\t5\t6\r\n",
+        "1,2,3\n4,5,6",
+        "1; 2; 3\n4 ;5 ;6;\n",
+        "X Y Z\n1 2 3\n4 5 6\n",
+        "\"X\",\"Y\",\"Z\"\n1 2 3\n4 5 6\n",
+        "\xef\xbb\xbfx;y;z\n1;2;3\n\n4;5;6\n\n",
+        "# made by hand\n// X Y Z\n1 2 3\n# between\n4 5 6\n// the end\n",
+        "Z Y X\n3 2 1\n6 5 4\n",
+        "z,junk,y,x\n3,not a number,2,1\n6,,5,4\n",
+        "2\n1 2 3\n4 5 6\n",
+        "1\n1 2 3\n1\n4 5 6\n",
+        "1 2 3\r4 5 6\r",
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        struct loaded l;
+        load_text(texts[i], NULL, &l);
+        if (l.points != 2)
+            fail_msg("%zu: %llu points", i, (unsigned long long)l.points);
+        assert_point(&l, 0, 1, 2, 3);
+        assert_point(&l, 1, 4, 5, 6);
+        assert_int_equal(l.attributes, 0);
+        loaded_finish(&l);
+    }
+}
+
+static void named_columns(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("Red,Green,Blue,X,Y,Z,Classification,Nx,Ny,Nz,Intensity\n255,128,0,1,2,3,6,0,0,-2,99\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR | SPL_CLOUD_NORMAL | SPL_CLOUD_CLASS);
+    assert_color(&l, 0, 255, 128, 0);
+    assert_int_equal(l.first.classification[0], 6);
+    assert_true(l.first.normal[0][2] == -1);
+    loaded_finish(&l);
+    load_text("//X Y Z Rf Gf Bf scalar_label\n1 2 3 1 0.5 0 300\n", NULL, &l);
+    assert_color(&l, 0, 255, 128, 0);
+    assert_int_equal(l.first.classification[0], 0); /* 300 is no class of a byte */
+    loaded_finish(&l);
+    load_text("9 8 7 6 1 2 3\n9 8 7 7 4 5 6\n", "-,-,-,class,x,y,z", &l);
+    assert_point(&l, 1, 4, 5, 6);
+    assert_int_equal(l.first.classification[0], 6);
+    assert_int_equal(l.attributes, SPL_CLOUD_CLASS);
+    loaded_finish(&l);
+    load_text("easting northing height whatever\n1 2 3 4\n", "x,y,z", &l); /* columns past the option's are skipped */
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+}
+
+static void columns_are_recognised_by_their_values(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("1 2 3 -1613 52 70 64\n1 2 3 600 255 0 1\n", NULL, &l); /* PTS: intensity r g b */
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    assert_color(&l, 0, 52, 70, 64);
+    loaded_finish(&l);
+    load_text("1 2 3 52 70 64\n1 2 3 255 0 1\n", NULL, &l);
+    assert_color(&l, 0, 52, 70, 64);
+    loaded_finish(&l);
+    load_text("1 2 3 52 70 64 -0.5\n1 2 3 255 0 1 3.5\n", NULL, &l); /* r g b intensity */
+    assert_color(&l, 0, 52, 70, 64);
+    loaded_finish(&l);
+    load_text("1 2 3 65535 257 0\n1 2 3 514 128 129\n", NULL, &l);
+    assert_color(&l, 0, 255, 1, 0);
+    assert_color(&l, 1, 2, 0, 1);
+    loaded_finish(&l);
+    load_text("1 2 3 1 0.5 0.25\n1 2 3 0.9 0 0\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    assert_color(&l, 0, 255, 128, 64);
+    loaded_finish(&l);
+    load_text("1 2 3 0 -1 0\n1 2 3 0.6 0.8 0\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_NORMAL);
+    assert_true(l.first.normal[0][1] == -1 && l.first.normal[1][0] == 0.6f);
+    loaded_finish(&l);
+    load_text("1 2 3 10 20 30 0 0 1\n1 2 3 40 50 60 0 0.6 -0.8\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_NORMAL | SPL_CLOUD_COLOR);
+    assert_color(&l, 1, 40, 50, 60);
+    assert_true(l.first.normal[1][1] == 0.6f);
+    loaded_finish(&l);
+    load_text("1 2 3 -255\n1 2 3 -1000\n1 2 3 500\n", NULL, &l);
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    assert_color(&l, 1, 0, 0, 0);
+    assert_color(&l, 0, 127, 127, 127);
+    assert_color(&l, 2, 255, 255, 255);
+    loaded_finish(&l);
+}
+
+static void counted_files(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("3\n1 2 3 5\n4 5 6 6\nnan 1 2 9\n", NULL, &l);
+    assert_string_equal(l.format, "PTS");
+    assert_int_equal(l.expected, 3);
+    assert_int_equal(l.points, 2);
+    assert_int_equal(l.skipped, 1);
+    loaded_finish(&l);
+    refused_text("3\n1.5 2.5 3.5\n4.5 5.5 6.5\n", SPL_E_INPUT, "count", "1 points before");
+    refused_text("1\n1.5 2.5 3.5\n4.5 5.5 6.5\n", SPL_E_INPUT, "count", "line 3");
+    refused_text("4000000000\n1.5 2.5 3.5\n", SPL_E_INPUT, "count", "4000000000 points");
+    refused_text("1\n1.5 2.5 3.5\n9999999\n4.5 5.5 6.5\n", SPL_E_INPUT, "count", "line 3");
+    refused_text("7\n", SPL_E_INPUT, "count", "cannot fit");
+    refused_text("0\n", SPL_E_INPUT, "", "before any line of numbers");
+}
+
+/* Colours of a long file are known from samples; one that contradicts them is refused instead of shown wrong. */
+static void samples_are_checked_against_the_rest(void **state)
+{
+    struct loaded l;
+    FILE *f;
+    (void)state;
+    for (int odd = 0; odd < 2; odd++) {
+        f = fopen(scratch_path(), "w");
+        assert_non_null(f);
+        for (int i = 0; i < 400000; i++) /* 64 samples of 4096 lines leave two thirds unseen */
+            fprintf(f, "%d.5 2 3 %d 0 0\n", i % 1000, odd && i == 6000 ? 4000 : i % 200);
+        fclose(f);
+        load_path(scratch_path(), NULL, 10000, &l);
+        if (odd) {
+            assert_int_equal(l.code, SPL_E_INPUT);
+            assert_string_equal(l.err.field, "red");
+            assert_non_null(strstr(l.err.message, "line 6001"));
+        } else {
+            assert_int_equal(l.points, 400000);
+            assert_color(&l, 60, 60, 0, 0);
+        }
+        loaded_finish(&l);
+    }
+}
+
+static void broken_text_is_refused(void **state)
+{
+    static struct bytes b;
+    (void)state;
+    refused_text("X,Y,X\n1,2,3\n", SPL_E_INPUT, "z", "line 1");
+    refused_text("This is prose.\n", SPL_E_INPUT, "x", "columns");
+    refused_text("X Y Z\nstill no numbers\n", SPL_E_INPUT, "", "line 2");
+    refused_text("X Y Z\n", SPL_E_INPUT, "", "before any line of numbers");
+    refused_text("# nothing\n\n", SPL_E_INPUT, "", "before any line of numbers");
+    refused_text("1 2\n3 4\n", SPL_E_INPUT, "", "2 values");
+    refused_text("1 2 3\n4 5\n", SPL_E_INPUT, "z", "line 2");
+    refused_text("1 2 3\n4 5 6 7\n", SPL_E_INPUT, "", "line 2");
+    refused_text("1 2 3\n4 5 six\n", SPL_E_INPUT, "z", "\"six\"");
+    refused_text("1,5;2,5;3,5\n", SPL_E_INPUT, "x", "\"1,5\"");
+    refused_text("X,Y,Z\n1,2,3,4\n", SPL_E_INPUT, "", "line 2");
+    refused_text("1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
+    refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "intensity", "column 7");
+    b.length = 0;
+    put(&b, "1 2 3\n4 5 6\n7 8\0009\n", 18); /* a zero byte makes it no text */
+    refused(&b, NULL, SPL_E_INPUT, "", "no point cloud known");
+    b.length = 0;
+    put(&b, "\xff\xfe" "1\0 \0" "2\0 \0" "3\0\n\0", 14);
+    refused(&b, NULL, SPL_E_INPUT, "", "UTF-8");
+    b.length = 0;
+    for (int i = 0; i < 65; i++)
+        put_text(&b, "%d ", i);
+    refused(&b, NULL, SPL_E_INPUT, "", "65 values");
+}
+
+static void the_option_is_checked(void **state)
+{
+    static struct bytes b;
+    (void)state;
+    b.length = 0;
+    put_text(&b, "1 2 3 4\n");
+    refused(&b, "x,y", SPL_E_USAGE, "columns", "z is missing");
+    refused(&b, "", SPL_E_USAGE, "columns", "x is missing");
+    refused(&b, "x,y,z,colour", SPL_E_USAGE, "columns", "\"colour\"");
+    refused(&b, "x,y,z,x", SPL_E_USAGE, "columns", "twice");
+    refused(&b, "x,y,z,-,class", SPL_E_INPUT, "class", "column 5");
+}
+
+static void other_files_are_refused(void **state)
+{
+    struct loaded l;
+    (void)state;
+    refused_text("", SPL_E_INPUT, "", "empty");
+    load_path("/nowhere/at/all.ply", NULL, 1, &l);
+    assert_int_equal(l.code, SPL_E_NOT_FOUND);
+    loaded_finish(&l);
+    load_path("/tmp", NULL, 1, &l);
+    assert_int_equal(l.code, SPL_E_INPUT);
+    assert_non_null(strstr(l.err.message, "regular file"));
+    loaded_finish(&l);
+}
+
+static void lines_have_a_limit(void **state)
+{
+    FILE *f = fopen(scratch_path(), "w");
+    struct loaded l;
+    (void)state;
+    assert_non_null(f);
+    fputs("1 2 3\n", f);
+    for (int i = 0; i < (1 << 21); i++)
+        fputc('7', f);
+    fclose(f);
+    load_path(scratch_path(), NULL, 10, &l);
+    assert_int_equal(l.code, SPL_E_INPUT);
+    assert_non_null(strstr(l.err.message, "line 2: no line ending"));
+    loaded_finish(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(separators_headers_and_comments),
+        cmocka_unit_test(named_columns),
+        cmocka_unit_test(columns_are_recognised_by_their_values),
+        cmocka_unit_test(counted_files),
+        cmocka_unit_test(samples_are_checked_against_the_rest),
+        cmocka_unit_test(broken_text_is_refused),
+        cmocka_unit_test(the_option_is_checked),
+        cmocka_unit_test(other_files_are_refused),
+        cmocka_unit_test(lines_have_a_limit),
+    };
+    return cmocka_run_group_tests(tests, NULL, remove_scratch);
+}
