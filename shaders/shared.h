@@ -35,6 +35,9 @@
 #define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
 #define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
+/* The occlusion kernels use two of them otherwise. */
+#define SPL_BIND_BOUNDS SPL_BIND_DRAW  /* struct spl_chunk_bounds[], parallel to the chunks */
+#define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
 
 /* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */
 #define SPL_SUMS_COLOR 0
@@ -91,6 +94,15 @@ struct spl_draw_chunk {
 #define SPL_COLOR_V 8
 #define SPL_COLOR_BASE_Y 16
 
+/* Occlusion: the image in tiles of this many samples a side. */
+#define SPL_OCCLUSION_TILE 8
+
+/* Where a drawn chunk can reach, made by the CPU. */
+struct spl_chunk_bounds {
+    SPL_U32 first, last; /* occlusion tiles, x | y << 16, inclusive */
+    SPL_F32 near;        /* least view depth of its discs; 0 = never occluded (it reaches the eye's plane) */
+};
+
 /* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
 struct spl_frame_params {
     SPL_F32 rotation[12];                 /* world -> camera, three rows of (x, y, z, 0) */
@@ -100,7 +112,7 @@ struct spl_frame_params {
     SPL_F32 margin;                       /* blend margin as a multiple of the splat's radius */
     SPL_U32 width, height;                /* tile, samples */
     SPL_U32 supersample;                  /* samples per pixel side: 1, 2 or 4 */
-    SPL_U32 entries;                      /* draw-list entries of this dispatch */
+    SPL_U32 entries;                      /* draw-list entries of this dispatch; chunks where chunks are culled */
     SPL_U32 first_entry;
     SPL_U32 weight_max;                   /* largest fragment weight; chosen so that no sum can wrap */
     SPL_U32 background;                   /* RGBA8 */

@@ -46,4 +46,21 @@ static inline bool spl_view_box_visible(const struct spl_camera *camera, const s
     return true;
 }
 
+/* The samples [low, high] that the box can project to, 2 around it for the low pass and rounding. False when it reaches
+ * the near plane: then it has no bound. */
+static inline bool spl_view_box_project(const struct spl_camera *camera, const struct spl_view_box *box, double low[2],
+                                        double high[2])
+{
+    double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
+    if (near < camera->near)
+        return false;
+    const double focal[2] = {camera->fx, camera->fy}, center[2] = {camera->cx, camera->cy};
+    for (int i = 0; i < 2; i++) {
+        double a = box->center[i] - box->half[i], b = box->center[i] + box->half[i];
+        low[i] = focal[i] * (a / (a < 0 ? near : far)) + center[i] - 2;
+        high[i] = focal[i] * (b / (b > 0 ? near : far)) + center[i] + 2;
+    }
+    return true;
+}
+
 #endif

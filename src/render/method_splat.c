@@ -1,6 +1,20 @@
 /* Method splat: depth, attribute and resolve passes of the sparse-coded-splat-textures paper, section 3.6, as compute
- * kernels. The depth pass runs once a tile, the shade pass once a group of layers. */
+ * kernels. The depth pass runs once a tile, in two halves: what the nearer half hides is dropped from the other, and what
+ * both hide from the shade pass, which runs once a group of layers. */
 #include "render/renderer.h"
+
+static int record_depth(struct spl_tile *tile, struct spl_gpu_kernel *depth, struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    int rc = spl_tile_dispatch_splats(tile, depth, SPL_PHASE_FRONT, err);
+    spl_gpu_barrier(r->gpu);
+    if (!rc)
+        rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, err);
+    if (!rc)
+        rc = spl_tile_dispatch_splats(tile, depth, SPL_PHASE_BACK, err);
+    spl_gpu_barrier(r->gpu);
+    return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, err);
+}
 
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
@@ -13,19 +27,20 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         return rc;
     if (first)
         spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * 4, SPL_NOTHING);
-    if (group == SPL_SUMS_ID)
-        spl_gpu_fill(r->gpu, r->scratch.ids, 0, tile->samples * 4, SPL_NOTHING);
-    else
+    if (group != SPL_SUMS_ID)
         spl_gpu_fill(r->gpu, r->scratch.sums, 0, tile->samples * 16, 0);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     if (first) {
-        rc = spl_tile_dispatch_splats(tile, depth, err);
-        spl_gpu_barrier(r->gpu);
+        rc = record_depth(tile, depth, err);
         spl_tile_stamp(tile, SPL_STAGE_DEPTH);
     }
+    if (group == SPL_SUMS_ID) { /* only now: occlusion used the buffer */
+        spl_gpu_fill(r->gpu, r->scratch.ids, 0, tile->samples * 4, SPL_NOTHING);
+        spl_gpu_barrier(r->gpu);
+    }
     if (!rc)
-        rc = spl_tile_dispatch_splats(tile, shade, err);
+        rc = spl_tile_dispatch_splats(tile, shade, SPL_PHASE_BOTH, err);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;

@@ -29,20 +29,8 @@ static void span(double low, double high, uint32_t count, uint32_t *first, uint3
     *end = b > 0 ? (b < count ? (uint32_t)b : count) : 0;
 }
 
-void spl_occupancy_add(struct spl_occupancy *occupancy, const struct spl_camera *camera, const struct spl_view_box *box,
-                       uint32_t splats)
+void spl_occupancy_add(struct spl_occupancy *occupancy, const double low[2], const double high[2], uint32_t splats)
 {
-    double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
-    if (near < camera->near) {
-        occupancy->everywhere += splats;
-        return;
-    }
-    double low[2], high[2], focal[2] = {camera->fx, camera->fy}, center[2] = {camera->cx, camera->cy};
-    for (int i = 0; i < 2; i++) {
-        double a = box->center[i] - box->half[i], b = box->center[i] + box->half[i];
-        low[i] = focal[i] * (a / (a < 0 ? near : far)) + center[i] - 2; /* 2: the low pass and rounding */
-        high[i] = focal[i] * (b / (b > 0 ? near : far)) + center[i] + 2;
-    }
     uint32_t x0, x1, y0, y1, stride = occupancy->columns;
     span(low[0], high[0], occupancy->columns - 1, &x0, &x1);
     span(low[1], high[1], occupancy->rows - 1, &y0, &y1);
@@ -50,6 +38,11 @@ void spl_occupancy_add(struct spl_occupancy *occupancy, const struct spl_camera 
     occupancy->cells[y0 * stride + x1] -= splats;
     occupancy->cells[y1 * stride + x0] -= splats;
     occupancy->cells[y1 * stride + x1] += splats;
+}
+
+void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t splats)
+{
+    occupancy->everywhere += splats;
 }
 
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy)

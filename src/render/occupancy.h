@@ -5,10 +5,7 @@
 
 #include <stdint.h>
 
-#include <splatd/camera.h>
-
 #include "base/error.h"
-#include "render/frustum.h"
 
 struct spl_occupancy {
     uint32_t columns, rows;
@@ -19,9 +16,9 @@ struct spl_occupancy {
 int spl_occupancy_init(struct spl_occupancy *occupancy, uint32_t width, uint32_t height, struct spl_error *err);
 void spl_occupancy_finish(struct spl_occupancy *occupancy);
 
-/* Counts `splats` over the samples that `box` projects to. */
-void spl_occupancy_add(struct spl_occupancy *occupancy, const struct spl_camera *camera, const struct spl_view_box *box,
-                       uint32_t splats);
+/* Counts `splats` over the samples [low, high], or over the whole image. */
+void spl_occupancy_add(struct spl_occupancy *occupancy, const double low[2], const double high[2], uint32_t splats);
+void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t splats);
 
 /* The largest cell. Call once, after the last add. */
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy);

@@ -12,6 +12,8 @@
 /* Kernels are made when first used and kept: one slot per kernel and set of constants. */
 enum spl_kernel_slot {
     SPL_KERNEL_SPLAT_DEPTH,
+    SPL_KERNEL_OCCLUSION_TILES,
+    SPL_KERNEL_OCCLUSION_CHUNKS,
     SPL_KERNEL_SPLAT_SHADE,                                          /* + SPL_SUMS_* */
     SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_SHADE + SPL_SUMS_COUNT,     /* + 2 SPL_SUMS_* + pass */
     SPL_KERNEL_RESOLVE = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT,     /* + 2 layer + method */
@@ -29,6 +31,7 @@ struct spl_scratch {
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
     struct spl_gpu_buffer *params;   /* slots of SPL_PARAMS_STRIDE, one a dispatch */
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
+    struct spl_gpu_buffer *bounds;   /* struct spl_chunk_bounds[], grown on demand */
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
 };
 
@@ -68,8 +71,12 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_gpu *gpu, const s
 int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot slot, struct spl_gpu_kernel **out,
                             struct spl_error *err);
 
-/* Records `kernel` once per page of the draw list (and per the device's largest dispatch). */
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, struct spl_error *err);
+enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
+/* Records `kernel` once per page of the draw list (and per the device's largest dispatch), for the given phases. */
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases,
+                             struct spl_error *err);
+/* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides. Clobbers the id buffer. */
+int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */

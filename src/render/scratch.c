@@ -1,4 +1,4 @@
-/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's two buffers may grow. */
+/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's buffers may grow. */
 #include "render/renderer.h"
 
 #include <string.h>
@@ -26,6 +26,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
         {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
         {&scratch->chunks, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_draw_chunk)},
+        {&scratch->bounds, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_chunk_bounds)},
         {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
@@ -42,8 +43,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
 
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
-    struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->sums,   scratch->ids,    scratch->output,
-                                    scratch->readback, scratch->params, scratch->chunks, scratch->entries};
+    struct spl_gpu_buffer *all[] = {scratch->depth,  scratch->sums,   scratch->ids,    scratch->output, scratch->readback,
+                                    scratch->params, scratch->chunks, scratch->bounds, scratch->entries};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     *scratch = (struct spl_scratch){0};
@@ -73,5 +74,7 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_gpu *gpu, const s
                        struct spl_error *err)
 {
     int rc = upload(gpu, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
+    if (!rc)
+        rc = upload(gpu, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
     return rc ? rc : upload(gpu, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
 }

@@ -3,16 +3,13 @@
 #include "render/select.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "base/memory.h"
 #include "dataset/chunk.h"
 #include "render/frustum.h"
 #include "render/occupancy.h"
 
 enum { stack_max = 8 * 64 };
-#define ENTRIES_MAX (1u << 28)
 
 struct walk {
     const struct spl_select_params *params;
@@ -21,34 +18,7 @@ struct walk {
     const struct spl_chunk *chunks;
     double focal;                 /* larger of fx, fy */
     struct spl_occupancy occupancy;
-    uint32_t *batch_of_page;      /* UINT32_MAX = not met yet */
 };
-
-static int grow(void **array, size_t *capacity, size_t wanted, size_t size, struct spl_error *err)
-{
-    if (wanted <= *capacity)
-        return SPL_OK;
-    size_t larger = *capacity * 2 > wanted ? *capacity * 2 : wanted + 256;
-    void *p = spl_realloc(*array, larger, size, err);
-    if (!p)
-        return SPL_E_NOMEM;
-    *array = p;
-    *capacity = larger;
-    return SPL_OK;
-}
-
-static int batch_for_page(struct walk *w, uint32_t page, uint32_t *batch, struct spl_error *err)
-{
-    struct spl_draw_list *list = w->list;
-    if (w->batch_of_page[page] == UINT32_MAX) {
-        if (grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err))
-            return SPL_E_NOMEM;
-        w->batch_of_page[page] = (uint32_t)list->batch_count;
-        list->batches[list->batch_count++] = (struct spl_draw_batch){.page = page};
-    }
-    *batch = w->batch_of_page[page];
-    return SPL_OK;
-}
 
 /* The share of the chunk's splats that keeps them `lod` samples apart, as a count of whole groups. */
 static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_samples, double lod)
@@ -62,11 +32,24 @@ static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_sample
     return count < chunk->count ? count : chunk->count;
 }
 
-static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t batch,
+/* The occlusion tiles of samples [low, high], which may lie outside the image. The depth is lowered by what the kernels'
+ * floats may round. */
+static struct spl_chunk_bounds occlusion_bounds(const struct spl_camera *camera, const double low[2],
+                                                const double high[2], double near)
+{
+    uint32_t first[2], last[2], size[2] = {camera->width, camera->height};
+    for (int i = 0; i < 2; i++) {
+        first[i] = (uint32_t)fmin(fmax(low[i], 0), size[i] - 1) / SPL_OCCLUSION_TILE;
+        last[i] = (uint32_t)fmin(fmax(high[i], 0), size[i] - 1) / SPL_OCCLUSION_TILE;
+    }
+    return (struct spl_chunk_bounds){.first = first[0] | first[1] << 16, .last = last[0] | last[1] << 16,
+                                     .near = (float)(near * (1 - 1e-5))};
+}
+
+static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
                       struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    struct spl_draw_list *list = w->list;
     double origin[3], size[3];
     static const unsigned shifts[3] = {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z};
     for (int i = 0; i < 3; i++) {
@@ -84,19 +67,15 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
 
-    size_t index = list->chunk_count, groups = (count + SPL_GROUP_SPLATS - 1) / SPL_GROUP_SPLATS;
-    if (list->entry_count + groups > ENTRIES_MAX)
-        return spl_fail(err, SPL_E_LIMIT, "this view needs more than %u splats at lod %g; raise lod",
-                        ENTRIES_MAX, w->params->lod);
-    if (index == list->chunk_capacity) {
-        size_t capacity = list->chunk_capacity, same = capacity;
-        if (grow((void **)&list->chunks, &capacity, index + 1, sizeof *list->chunks, err) ||
-            grow((void **)&list->batch_of_chunk, &same, index + 1, sizeof *list->batch_of_chunk, err))
-            return SPL_E_NOMEM;
-        list->chunk_capacity = same;
+    double low[2], high[2];
+    struct spl_chunk_bounds bounds = {.near = 0};
+    if (spl_view_box_project(camera, &box, low, high)) {
+        bounds = occlusion_bounds(camera, low, high, box.center[2] - box.half[2]);
+        spl_occupancy_add(&w->occupancy, low, high, count);
+    } else {
+        spl_occupancy_add_everywhere(&w->occupancy, count);
     }
-    struct spl_draw_chunk *out = &list->chunks[index];
-    *out = (struct spl_draw_chunk){
+    struct spl_draw_chunk out = {
         .step = chunk->step,
         .radius_min = (float)(chunk->radius_min * scale),
         .radius_step = (float)(chunk->radius_step * scale),
@@ -111,28 +90,19 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
         .first_id = chunk->first_id,
         .count = count,
     };
-    float *view[3] = {&out->origin_x, &out->origin_y, &out->origin_z};
+    float *view[3] = {&out.origin_x, &out.origin_y, &out.origin_z};
     for (int i = 0; i < 3; i++) {
         const double *r = camera->rotation + 3 * i;
         *view[i] = (float)(r[0] * origin[0] + r[1] * origin[1] + r[2] * origin[2]);
     }
-    list->batch_of_chunk[index] = batch;
-    list->batches[batch].entries += (uint32_t)groups;
-    list->chunk_count++;
-    list->entry_count += groups;
-    list->splats += count;
-    spl_occupancy_add(&w->occupancy, camera, &box, count);
-    return SPL_OK;
+    return spl_draw_list_add(w->list, page, &out, &bounds, err);
 }
 
 static int draw_node(struct walk *w, const struct spl_node *node, const double node_to_eye[3], struct spl_error *err)
 {
-    uint32_t batch;
-    if (batch_for_page(w, node->page, &batch, err))
-        return SPL_E_NOMEM;
     w->list->nodes++;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
-        int rc = draw_chunk(w, node_to_eye, &w->chunks[node->first_chunk + i], batch, err);
+        int rc = draw_chunk(w, node_to_eye, &w->chunks[node->first_chunk + i], node->page, err);
         if (rc)
             return rc;
     }
@@ -213,31 +183,9 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     return SPL_OK;
 }
 
-/* Chunks lie front to back; entries are laid out batch after batch in that order. */
-static int list_entries(struct spl_draw_list *list, struct spl_error *err)
-{
-    if (grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err))
-        return SPL_E_NOMEM;
-    uint32_t first = 0;
-    for (size_t i = 0; i < list->batch_count; i++) {
-        list->batches[i].first_entry = first;
-        first += list->batches[i].entries;
-        list->batches[i].entries = 0;
-    }
-    for (size_t i = 0; i < list->chunk_count; i++) {
-        struct spl_draw_batch *batch = &list->batches[list->batch_of_chunk[i]];
-        uint32_t groups = (list->chunks[i].count + SPL_GROUP_SPLATS - 1) / SPL_GROUP_SPLATS;
-        for (uint32_t group = 0; group < groups; group++)
-            list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_GROUP_BITS | group;
-    }
-    return SPL_OK;
-}
-
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err)
 {
-    list->chunk_count = list->entry_count = list->batch_count = 0;
-    list->splats = list->nodes = 0;
-    list->complete = true;
+    spl_draw_list_clear(list);
     uint32_t node_count, chunk_count, pages = spl_dataset_get_info(params->dataset)->pages;
     struct walk w = {
         .params = params,
@@ -249,25 +197,10 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;
-    w.batch_of_page = spl_alloc_raw(pages, sizeof *w.batch_of_page, err);
-    rc = w.batch_of_page ? SPL_OK : SPL_E_NOMEM;
-    if (!rc) {
-        memset(w.batch_of_page, 0xff, pages * sizeof *w.batch_of_page);
-        rc = walk_tree(&w, err);
-    }
+    rc = walk_tree(&w, err);
     if (!rc)
-        rc = list_entries(list, err);
+        rc = spl_draw_list_lay_out(list, pages, err);
     list->sample_splats = spl_occupancy_bound(&w.occupancy);
-    free(w.batch_of_page);
     spl_occupancy_finish(&w.occupancy);
     return rc;
-}
-
-void spl_draw_list_finish(struct spl_draw_list *list)
-{
-    free(list->chunks);
-    free(list->entries);
-    free(list->batches);
-    free(list->batch_of_chunk);
-    *list = (struct spl_draw_list){0};
 }

@@ -16,25 +16,7 @@
 
 #include "base/error.h"
 #include "dataset/dataset.h"
-
-/* The draw-list entries of one page: what one dispatch works off. */
-struct spl_draw_batch {
-    uint32_t page;
-    uint32_t first_entry, entries;
-};
-
-struct spl_draw_list {
-    struct spl_draw_chunk *chunks;    /* visible chunks, front to back */
-    uint32_t *entries;                /* chunk index << SPL_GROUP_BITS | group, grouped by page */
-    struct spl_draw_batch *batches;   /* pages in the order in which they were first met */
-    size_t chunk_count, entry_count, batch_count;
-    size_t chunk_capacity, entry_capacity, batch_capacity;
-    uint32_t *batch_of_chunk;         /* chunk_count, scratch */
-    uint64_t splats;
-    uint32_t nodes;
-    uint64_t sample_splats;           /* upper bound of the splats that reach any one sample */
-    bool complete;                    /* false: a coarser node stood in for pages that are not resident */
-};
+#include "render/draw_list.h"
 
 struct spl_select_params {
     const struct spl_dataset *dataset;
@@ -47,7 +29,5 @@ struct spl_select_params {
 
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);
-
-void spl_draw_list_finish(struct spl_draw_list *list);
 
 #endif

@@ -9,6 +9,10 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
     *count = 0;
     if (slot == SPL_KERNEL_SPLAT_DEPTH)
         return "splat_depth";
+    if (slot == SPL_KERNEL_OCCLUSION_TILES)
+        return "occlusion_tiles";
+    if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
+        return "occlusion_chunks";
     if (slot < SPL_KERNEL_POINTS) {
         constants[(*count)++] = slot - SPL_KERNEL_SPLAT_SHADE;
         return wide ? "splat_shade64" : "splat_shade";
@@ -63,7 +67,8 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
     bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
 }
 
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, struct spl_error *err)
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases,
+                             struct spl_error *err)
 {
     enum { entries_per_workgroup = SPL_WORKGROUP / SPL_GROUP_SPLATS };
     const struct spl_draw_list *list = &tile->renderer->list;
@@ -72,6 +77,8 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
+        if (!(phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)))
+            continue;
         bindings[SPL_BIND_PAGE].buffer = tile->resident->pages[batch->page].buffer;
         for (uint32_t done = 0; done < batch->entries;) {
             uint32_t left = batch->entries - done;
@@ -87,6 +94,38 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
         }
     }
     return SPL_OK;
+}
+
+/* One dispatch over `count` items, of which the kernel sees the first at first_entry. */
+static int dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, size_t first, size_t count,
+                          struct spl_error *err)
+{
+    struct spl_gpu_kernel *kernel;
+    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
+    struct spl_frame_params params = tile->params;
+    params.first_entry = (uint32_t)first;
+    params.entries = (uint32_t)count;
+    bind_scratch(tile, bindings);
+    bindings[SPL_BIND_BOUNDS].buffer = tile->renderer->scratch.bounds;
+    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
+    if (!rc)
+        rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
+    if (!rc)
+        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (uint32_t)((count + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
+    spl_gpu_barrier(tile->renderer->gpu);
+    return rc;
+}
+
+int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err)
+{
+    enum { side = SPL_OCCLUSION_TILE };
+    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
+    size_t tiles = (size_t)((tile->camera.width + side - 1) / side) * ((tile->camera.height + side - 1) / side);
+    size_t end = tile->renderer->list.chunk_count;
+    int rc = dispatch_items(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
+    for (size_t first = first_chunk; first < end && !rc; first += most)
+        rc = dispatch_items(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
+    return rc;
 }
 
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)

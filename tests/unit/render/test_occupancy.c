@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <cmocka.h>
 
+#include "render/frustum.h"
 #include "render/occupancy.h"
 
 static double uniform(void)
@@ -29,10 +30,12 @@ static void bound_is_conservative(void **state)
         struct spl_occupancy occupancy;
         assert_int_equal(spl_occupancy_init(&occupancy, camera.width, camera.height, NULL), SPL_OK);
         for (int i = 0; i < boxes; i++) {
-            double z = 1 + 9 * uniform();
+            double z = 1.5 + 9 * uniform();
             box[i] = (struct spl_view_box){{(uniform() - 0.5) * 2 * z, (uniform() - 0.5) * 2 * z, z},
                                            {uniform() * 0.3, uniform() * 0.3, uniform() * 0.8}};
-            spl_occupancy_add(&occupancy, &camera, &box[i], 10);
+            double low[2], high[2];
+            assert_true(spl_view_box_project(&camera, &box[i], low, high));
+            spl_occupancy_add(&occupancy, low, high, 10);
         }
         uint64_t bound = spl_occupancy_bound(&occupancy), most = 0;
         for (uint32_t y = 0; y < camera.height; y++) {
@@ -63,9 +66,12 @@ static void what_straddles_the_eye_counts_everywhere(void **state)
     (void)state;
     struct spl_occupancy occupancy;
     assert_int_equal(spl_occupancy_init(&occupancy, 16, 16, NULL), SPL_OK);
-    struct spl_view_box behind = {{0, 0, 0}, {1, 1, 1}}, outside = {{500, 0, 5}, {1, 1, 1}};
-    spl_occupancy_add(&occupancy, &camera, &behind, 7);
-    spl_occupancy_add(&occupancy, &camera, &outside, 1000);
+    const struct spl_view_box behind = {{0, 0, 0}, {1, 1, 1}}, outside = {{500, 0, 5}, {1, 1, 1}};
+    double low[2], high[2];
+    assert_false(spl_view_box_project(&camera, &behind, low, high));
+    spl_occupancy_add_everywhere(&occupancy, 7);
+    assert_true(spl_view_box_project(&camera, &outside, low, high));
+    spl_occupancy_add(&occupancy, low, high, 1000);
     assert_int_equal(spl_occupancy_bound(&occupancy), 7);
     spl_occupancy_finish(&occupancy);
 }

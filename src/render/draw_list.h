@@ -1,0 +1,48 @@
+/* What one tile of a frame draws: chunks, and their splats in dense groups of SPL_GROUP_SPLATS as the kernels take them.
+ * Owned by the renderer; its arrays are reused from tile to tile. */
+#ifndef SPL_RENDER_DRAW_LIST_H
+#define SPL_RENDER_DRAW_LIST_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+#include "shared.h"
+
+/* The draw-list entries of one page and phase: what one dispatch works off. The front phase is the nearer half of the
+ * splats, whose depth occludes chunks of the back phase. */
+struct spl_draw_batch {
+    uint32_t page;
+    bool back;
+    uint32_t first_entry, entries;
+};
+
+struct spl_draw_list {
+    struct spl_draw_chunk *chunks;    /* visible chunks, roughly front to back */
+    struct spl_chunk_bounds *bounds;  /* parallel to chunks */
+    uint32_t *entries;                /* chunk index << SPL_GROUP_BITS | group, batch after batch */
+    struct spl_draw_batch *batches;   /* in the order in which their pages were first met */
+    size_t first_back_chunk;          /* chunks from here on are of the back phase */
+    size_t chunk_count, entry_count, batch_count;
+    size_t chunk_capacity, entry_capacity, batch_capacity;
+    uint32_t *page_of_chunk;          /* chunk_count, scratch */
+    uint64_t splats;
+    uint32_t nodes;                   /* that the chunks came from */
+    uint64_t sample_splats;           /* upper bound of the splats that reach any one sample */
+    bool complete;                    /* false: a coarser node stood in for pages that are not resident */
+};
+
+/* Empties the list and keeps its memory. */
+void spl_draw_list_clear(struct spl_draw_list *list);
+
+/* Appends a chunk of page `page`. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
+int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct spl_draw_chunk *chunk,
+                      const struct spl_chunk_bounds *bounds, struct spl_error *err);
+
+/* Lays out entries and batches of all chunks added; `pages` is the dataset's number of pages. */
+int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err);
+
+void spl_draw_list_finish(struct spl_draw_list *list);
+
+#endif
