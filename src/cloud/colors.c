@@ -1,8 +1,8 @@
 /* Finding out what a file's colour numbers mean: 8 or 16 bits, 0..1 or 0..255, or intensities whose range becomes grey.
  *
- * Binary colours of an ambiguous type are all looked at (until one exceeds 8 bits), since one dark half of a scan must not
- * decide for the other. Text is sampled at places all over the file; spl_rows_emit() then refuses a value that contradicts
- * what the samples said, so that no colour is ever wrong in silence. Runs once, inside spl_cloud_open(). */
+ * Binary colours of an ambiguous type are all looked at (until one exceeds 8 bits), since one dark half of a scan must
+ * not decide for the other. Text is sampled at places all over the file; spl_rows_emit() then refuses a value that
+ * contradicts what the samples said, so that no colour is ever wrong in silence. Runs once, inside spl_cloud_open(). */
 #include <math.h>
 #include <stdlib.h>
 
@@ -12,12 +12,12 @@
 enum { PARTS = 64, SAMPLES = 1 << 16 };
 
 struct ranges {
-    bool colors, intensities;      /* which are wanted */
-    bool done;                     /* the colours are settled: they have more than 8 bits */
+    bool colors, intensities; /* which are wanted */
+    bool done;                /* the colours are settled: they have more than 8 bits */
     double color_max;
-    double *sample;                /* intensities */
+    double *sample; /* intensities */
     size_t sample_count, sample_limit;
-    uint64_t stride, rows;         /* every stride-th row gives an intensity */
+    uint64_t stride, rows; /* every stride-th row gives an intensity */
 };
 
 static void look(struct ranges *ranges, const struct spl_rows *rows)

@@ -122,8 +122,7 @@ const char *spl_integer_parse(const char *p, const char *end, uint64_t *value)
     const char *start = p;
     uint64_t sum = 0;
     for (; p < end && is_digit(*p); p++)
-        if (__builtin_mul_overflow(sum, (uint64_t)10, &sum) ||
-            __builtin_add_overflow(sum, (uint64_t)(*p - '0'), &sum))
+        if (__builtin_mul_overflow(sum, (uint64_t)10, &sum) || __builtin_add_overflow(sum, (uint64_t)(*p - '0'), &sum))
             return NULL;
     *value = sum;
     return p > start ? p : NULL;

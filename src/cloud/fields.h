@@ -15,9 +15,9 @@ const char *spl_number_parse(const char *p, const char *end, double *value);
 const char *spl_integer_parse(const char *p, const char *end, uint64_t *value);
 
 struct spl_fields {
-    const char *p, *end;   /* what is left of the line */
-    const char *start;     /* of the field that was taken last */
-    char separator;        /* ' ' = runs of blanks and tabs, else ',' or ';' (with blanks around it) */
+    const char *p, *end; /* what is left of the line */
+    const char *start;   /* of the field that was taken last */
+    char separator;      /* ' ' = runs of blanks and tabs, else ',' or ';' (with blanks around it) */
 };
 
 enum spl_field { SPL_FIELD_END, SPL_FIELD_OK, SPL_FIELD_BAD };

@@ -1,6 +1,6 @@
-/* LAS 1.0 to 1.4, point formats 0 to 10. The points are found by the header's offset and record length alone, so variable
- * length records before them, extra bytes in them and extended records behind them cost nothing. Compressed files (LAZ,
- * COPC) wear the same signature and are told apart here.
+/* LAS 1.0 to 1.4, point formats 0 to 10. The points are found by the header's offset and record length alone, so
+ * variable length records before them, extra bytes in them and extended records behind them cost nothing. Compressed
+ * files (LAZ, COPC) wear the same signature and are told apart here.
  *
  * Invariant: the source's cursor is at the start of a record between calls. Owned by the cloud's thread. */
 #include <endian.h>
@@ -82,9 +82,11 @@ static int refuse_compressed(struct spl_cloud *cloud, uint64_t header_bytes, uin
         return code;
     if (!copc && !laszip && !(format & 0xc0))
         return SPL_OK;
-    return spl_source_fail(&cloud->source, SPL_E_UNSUPPORTED, "", err,
-                           "is %s, which is not supported yet: convert it first, with \"laszip -i IN.laz -o OUT.las\" or "
-                           "\"pdal translate IN.laz OUT.las\"", copc ? "COPC (cloud-optimised LAZ)" : "compressed (LAZ)");
+    return spl_source_fail(
+        &cloud->source, SPL_E_UNSUPPORTED, "", err,
+        "is %s, which is not supported yet: convert it first, with \"laszip -i IN.laz -o OUT.las\" or "
+        "\"pdal translate IN.laz OUT.las\"",
+        copc ? "COPC (cloud-optimised LAZ)" : "compressed (LAZ)");
 }
 
 static int check_transform(struct spl_cloud *cloud, const uint8_t *h, struct spl_error *err)
@@ -120,7 +122,10 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     memcpy(h, bytes, available < sizeof h ? available : sizeof h);
     if (available < 227)
         return spl_source_fail_at(source, available, "", err, "the file ends inside the LAS header of 227 bytes");
-    unsigned major = h[24], minor = h[25], header_bytes = get16(h + 94), least = minor >= 4 ? 375 : minor == 3 ? 235 : 227;
+    unsigned major = h[24], minor = h[25], header_bytes = get16(h + 94),
+             least = minor >= 4   ? 375
+                     : minor == 3 ? 235
+                                  : 227;
     uint64_t points_at = get32(h + 96), size = source->size;
     uint32_t vlrs = get32(h + 100);
 
@@ -140,17 +145,19 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     las->format = h[104];
     las->record_bytes = get16(h + 105);
     if (las->format >= sizeof formats / sizeof *formats)
-        return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10", las->format);
+        return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10",
+                                  las->format);
     if (las->record_bytes < formats[las->format].bytes)
         return spl_source_fail_at(source, 105, "point data record length", err, "%u bytes; format %u needs %u",
                                   las->record_bytes, las->format, formats[las->format].bytes);
     uint64_t legacy = get32(h + 107), large = minor >= 4 ? get64(h + 247) : 0;
     las->count = large ? large : legacy;
     if (las->count > (size - points_at) / las->record_bytes)
-        return spl_source_fail_at(source, large ? 247 : 107, "number of point records", err,
-                                  "%llu records of %u bytes from offset %llu do not fit the file's %llu bytes (truncated, "
-                                  "or a wrong count)", (unsigned long long)las->count, las->record_bytes,
-                                  (unsigned long long)points_at, (unsigned long long)size);
+        return spl_source_fail_at(
+            source, large ? 247 : 107, "number of point records", err,
+            "%llu records of %u bytes from offset %llu do not fit the file's %llu bytes (truncated, "
+            "or a wrong count)",
+            (unsigned long long)las->count, las->record_bytes, (unsigned long long)points_at, (unsigned long long)size);
     code = check_transform(cloud, h, err);
     if (code < 0)
         return code;

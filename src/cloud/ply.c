@@ -1,6 +1,6 @@
 /* PLY: ASCII and both binary byte orders. Vertices without lists are decoded column by column in blocks of rows; rows
- * with lists, which no scanner writes, one property at a time. Other elements before the vertices are walked over, those
- * after them are never read.
+ * with lists, which no scanner writes, one property at a time. Other elements before the vertices are walked over,
+ * those after them are never read.
  *
  * Invariant: the source's cursor is at the start of a vertex row between calls. Owned by the cloud's thread. */
 #include "cloud/ply.h"
@@ -14,8 +14,8 @@
 
 struct ply {
     struct spl_ply_header header;
-    uint64_t start, start_line;   /* of the first vertex row */
-    uint64_t next;                /* index of the next vertex */
+    uint64_t start, start_line; /* of the first vertex row */
+    uint64_t next;              /* index of the next vertex */
 };
 
 static const struct spl_ply_element *vertices(const struct ply *ply)
@@ -128,7 +128,8 @@ static int take_row(struct spl_cloud *cloud, const struct spl_ply_element *eleme
             if (value < 0 || bytes > (double)spl_source_left(source))
                 return spl_source_fail_at(source, at, p->name, err,
                                           "element %s: a list of %.0f items does not fit the file (truncated, or the "
-                                          "wrong byte order?)", element->name, value);
+                                          "wrong byte order?)",
+                                          element->name, value);
             spl_source_seek(source, at + spl_ply_type_bytes(p->count_type) + (uint64_t)bytes);
         } else if (rows && p->column >= 0) {
             rows->value[p->column][row] = value;
@@ -220,14 +221,16 @@ static int check_count(struct spl_cloud *cloud, const struct spl_ply_element *el
 {
     const struct ply *ply = cloud->state;
     uint64_t left = spl_source_left(&cloud->source), at = spl_source_tell(&cloud->source);
-    /* in ASCII a value and what separates it from the next take two bytes at least; only the last line may lack its end */
+    /* in ASCII a value and what separates it from the next take two bytes at least; only the last line may lack its end
+     */
     uint64_t row = ply->header.format == SPL_PLY_ASCII ? 2 * (uint64_t)element->properties : element->row_bytes;
     uint64_t room = ply->header.format == SPL_PLY_ASCII ? left + 1 : left;
     if (row > 0 && element->count > room / row)
         return spl_source_fail_at(&cloud->source, at, element->name, err,
                                   "the header declares %llu rows of at least %llu bytes, but only %llu bytes follow "
-                                  "(truncated, or a wrong count)", (unsigned long long)element->count,
-                                  (unsigned long long)row, (unsigned long long)left);
+                                  "(truncated, or a wrong count)",
+                                  (unsigned long long)element->count, (unsigned long long)row,
+                                  (unsigned long long)left);
     return SPL_OK;
 }
 
@@ -237,8 +240,8 @@ static bool plausible(double v)
     return v == 0 || (size > 1e-15 && size < 1e15);
 }
 
-/* Floats read in the wrong byte order scatter over all exponents: where the declared order gives mostly such numbers and
- * the other one none, the header lies. */
+/* Floats read in the wrong byte order scatter over all exponents: where the declared order gives mostly such numbers
+ * and the other one none, the header lies. */
 static int check_byte_order(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct ply *ply = cloud->state;
@@ -338,8 +341,7 @@ static int ply_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     rows->count = 0;
     if (ascii || element->lists) {
         for (; rows->count < count && code == SPL_OK; rows->count++)
-            code = ascii ? take_ascii_row(cloud, element, rows, err)
-                         : take_row(cloud, element, rows, rows->count, err);
+            code = ascii ? take_ascii_row(cloud, element, rows, err) : take_row(cloud, element, rows, rows->count, err);
     } else {
         code = spl_source_peek(&cloud->source, count * element->row_bytes, &bytes, &available, err);
         if (code == SPL_OK && available < count * element->row_bytes)

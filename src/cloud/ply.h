@@ -19,18 +19,18 @@ enum spl_ply_type {
 enum { SPL_PLY_ELEMENTS = 64, SPL_PLY_PROPERTIES = 1024 }; /* over all elements; more is refused */
 
 struct spl_ply_property {
-    char name[24];           /* shortened, for messages */
-    uint8_t type;            /* enum spl_ply_type; of the items when it is a list */
-    uint8_t count_type;      /* of a list's length, SPL_PLY_NONE when it is no list */
-    int8_t column;           /* enum spl_column; SKIP for all but the vertices' known ones */
-    uint16_t offset;         /* in the row, where no list precedes it */
+    char name[24];      /* shortened, for messages */
+    uint8_t type;       /* enum spl_ply_type; of the items when it is a list */
+    uint8_t count_type; /* of a list's length, SPL_PLY_NONE when it is no list */
+    int8_t column;      /* enum spl_column; SKIP for all but the vertices' known ones */
+    uint16_t offset;    /* in the row, where no list precedes it */
 };
 
 struct spl_ply_element {
     char name[24];
     uint64_t count;
     unsigned first, properties;
-    unsigned row_bytes;      /* binary: least bytes of a row, exact without lists */
+    unsigned row_bytes; /* binary: least bytes of a row, exact without lists */
     bool lists;
 };
 
@@ -39,8 +39,8 @@ struct spl_ply_header {
     struct spl_ply_element elements[SPL_PLY_ELEMENTS];
     struct spl_ply_property properties[SPL_PLY_PROPERTIES];
     unsigned element_count, property_count;
-    unsigned vertex;         /* index into elements */
-    uint64_t vertex_line;    /* of its declaration, for messages */
+    unsigned vertex;      /* index into elements */
+    uint64_t vertex_line; /* of its declaration, for messages */
 };
 
 unsigned spl_ply_type_bytes(enum spl_ply_type type);

@@ -11,11 +11,10 @@ static const struct {
     const char *name;
     enum spl_ply_type type;
 } types[] = {
-    {"char", SPL_PLY_INT8},      {"int8", SPL_PLY_INT8},      {"uchar", SPL_PLY_UINT8},   {"uint8", SPL_PLY_UINT8},
-    {"short", SPL_PLY_INT16},    {"int16", SPL_PLY_INT16},    {"ushort", SPL_PLY_UINT16}, {"uint16", SPL_PLY_UINT16},
-    {"int", SPL_PLY_INT32},      {"int32", SPL_PLY_INT32},    {"uint", SPL_PLY_UINT32},   {"uint32", SPL_PLY_UINT32},
-    {"float", SPL_PLY_FLOAT32},  {"float32", SPL_PLY_FLOAT32}, {"double", SPL_PLY_FLOAT64},
-    {"float64", SPL_PLY_FLOAT64},
+    {"char", SPL_PLY_INT8},     {"int8", SPL_PLY_INT8},       {"uchar", SPL_PLY_UINT8},    {"uint8", SPL_PLY_UINT8},
+    {"short", SPL_PLY_INT16},   {"int16", SPL_PLY_INT16},     {"ushort", SPL_PLY_UINT16},  {"uint16", SPL_PLY_UINT16},
+    {"int", SPL_PLY_INT32},     {"int32", SPL_PLY_INT32},     {"uint", SPL_PLY_UINT32},    {"uint32", SPL_PLY_UINT32},
+    {"float", SPL_PLY_FLOAT32}, {"float32", SPL_PLY_FLOAT32}, {"double", SPL_PLY_FLOAT64}, {"float64", SPL_PLY_FLOAT64},
 };
 
 struct words {

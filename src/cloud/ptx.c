@@ -1,6 +1,6 @@
-/* PTX: one or more stations, each a header (columns, rows, scanner position and axes, 4×4 matrix with the translation in
- * its last row) and columns × rows cells "x y z [intensity [r g b]]" in the station's frame. A cell at exactly 0 0 0 saw
- * nothing; it is counted and dropped.
+/* PTX: one or more stations, each a header (columns, rows, scanner position and axes, 4×4 matrix with the translation
+ * in its last row) and columns × rows cells "x y z [intensity [r g b]]" in the station's frame. A cell at exactly 0 0 0
+ * saw nothing; it is counted and dropped.
  *
  * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
 #include <math.h>
@@ -11,11 +11,11 @@
 #include "cloud/reader.h"
 
 struct ptx {
-    uint64_t cells, taken;      /* of the current station */
-    unsigned fields;            /* values of a cell of this station, 0 before its first */
-    unsigned first_fields;      /* of the file's first station */
+    uint64_t cells, taken; /* of the current station */
+    unsigned fields;       /* values of a cell of this station, 0 before its first */
+    unsigned first_fields; /* of the file's first station */
     size_t station_capacity;
-    double pose[16];            /* row-major, station to world */
+    double pose[16]; /* row-major, station to world */
 };
 
 /* One header line of `count` numbers. */
@@ -67,8 +67,8 @@ static int take_pose(struct spl_source *source, double pose[16], struct spl_erro
             return spl_source_fail_line(source, source->line, "matrix", err,
                                         "the last column must be 0 0 0 1, the translation belongs into the last row");
     }
-    double det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                 m[2] * (m[4] * m[9] - m[5] * m[8]);
+    double det =
+        m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
     if (det == 0 || !isfinite(det))
         return spl_source_fail_line(source, source->line, "matrix", err, "is singular (determinant %g)", det);
     for (unsigned row = 0; row < 4; row++)
@@ -147,7 +147,8 @@ static int set_fields(struct spl_cloud *cloud, unsigned fields, struct spl_error
     if (ptx->first_fields && (ptx->first_fields == 3) != (fields == 3))
         return spl_source_fail_line(source, source->line, "", err,
                                     "%u values a cell, but the first station has %u: stations with and without "
-                                    "intensity do not mix", fields, ptx->first_fields);
+                                    "intensity do not mix",
+                                    fields, ptx->first_fields);
     ptx->fields = fields;
     if (fields > 3)
         cloud->color = fields == 7 ? spl_color_rule_rgb(255) : spl_color_rule_grey(0, 1);
@@ -156,7 +157,7 @@ static int set_fields(struct spl_cloud *cloud, unsigned fields, struct spl_error
 
 static int take_cell(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_error *err)
 {
-    static const int8_t column[7] = {SPL_COLUMN_X, SPL_COLUMN_Y, SPL_COLUMN_Z, SPL_COLUMN_INTENSITY,
+    static const int8_t column[7] = {SPL_COLUMN_X,   SPL_COLUMN_Y,     SPL_COLUMN_Z,   SPL_COLUMN_INTENSITY,
                                      SPL_COLUMN_RED, SPL_COLUMN_GREEN, SPL_COLUMN_BLUE};
     struct ptx *ptx = cloud->state;
     struct spl_source *source = &cloud->source;
@@ -192,8 +193,8 @@ static int take_cell(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_
                                         spl_fields_show(&fields, text));
     }
     if (!spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
-        return spl_source_fail_line(source, source->line, "", err, "more values than the %u of the station's first cell",
-                                    ptx->fields);
+        return spl_source_fail_line(source, source->line, "", err,
+                                    "more values than the %u of the station's first cell", ptx->fields);
     ptx->taken++;
     if (v[0] == 0 && v[1] == 0 && v[2] == 0) {
         cloud->info.points_skipped++;

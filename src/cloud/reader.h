@@ -15,25 +15,26 @@ struct spl_reader {
     int (*seek)(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err);
 };
 
-/* Which ranges come from samples all over a large file, where a pass over all of it would cost as much as reading it. */
+/* Which ranges come from samples all over a large file, where a pass over all of it would cost as much as reading it.
+ */
 enum spl_sampling {
-    SPL_SAMPLE_NEVER,       /* rows can only be found by reading from the first */
-    SPL_SAMPLE_INTENSITY,   /* fixed-size rows: colours are cheap to look at, and exact matters */
-    SPL_SAMPLE_ALL          /* text */
+    SPL_SAMPLE_NEVER,     /* rows can only be found by reading from the first */
+    SPL_SAMPLE_INTENSITY, /* fixed-size rows: colours are cheap to look at, and exact matters */
+    SPL_SAMPLE_ALL        /* text */
 };
 
 struct spl_cloud {
     struct spl_source source;
     struct spl_cloud_info info;
     const struct spl_reader *reader;
-    const struct spl_cloud_options *options;  /* during open only; never NULL then */
-    void *state;                /* the reader's, one allocation */
-    uint32_t columns;           /* bit 1 << enum spl_column for each that the file has */
+    const struct spl_cloud_options *options; /* during open only; never NULL then */
+    void *state;                             /* the reader's, one allocation */
+    uint32_t columns;                        /* bit 1 << enum spl_column for each that the file has */
     enum spl_sampling sampling;
-    bool scan_colors;           /* the range of the colours is not fixed by their type */
-    bool integer_colors;        /* 1 is then the darkest grey, not white */
+    bool scan_colors;    /* the range of the colours is not fixed by their type */
+    bool integer_colors; /* 1 is then the darkest grey, not white */
     struct spl_color_rule color;
-    uint64_t row;               /* index of the next row */
+    uint64_t row; /* index of the next row */
     struct spl_rows rows;
 };
 

@@ -64,7 +64,8 @@ const char *spl_column_name(int column)
 struct spl_color_rule spl_color_rule_rgb(double white)
 {
     /* half a step above white still rounds to it */
-    return (struct spl_color_rule){.kind = SPL_COLOR_RGB, .scale = 255 / white, .limit = white == 1 ? 1.001 : white + 0.5};
+    return (struct spl_color_rule){
+        .kind = SPL_COLOR_RGB, .scale = 255 / white, .limit = white == 1 ? 1.001 : white + 0.5};
 }
 
 struct spl_color_rule spl_color_rule_grey(double black, double white)
@@ -137,7 +138,7 @@ int spl_rows_emit(const struct spl_rows *rows, uint64_t first, const struct spl_
         if (normals)
             set_normal(rows, r, batch->normal[n]);
         double class = classes ? rows->value[SPL_COLUMN_CLASS][r] : 0;
-        batch->classification[n] = class >= 0 && class < 255.5 ? (uint8_t)class : 0;
+        batch->classification[n] = class >= 0 && class < 255.5 ? (uint8_t) class : 0;
         batch->station[n] = rows->station;
         n++;
     }

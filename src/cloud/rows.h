@@ -26,8 +26,8 @@ enum { SPL_ROWS = 256 }; /* so that all columns stay in the first-level cache */
 
 struct spl_rows {
     size_t count;
-    uint64_t line[SPL_ROWS];    /* text formats: of each row; binary ones leave 0 */
-    uint16_t station;           /* of all rows */
+    uint64_t line[SPL_ROWS];                  /* text formats: of each row; binary ones leave 0 */
+    uint16_t station;                         /* of all rows */
     double value[SPL_COLUMN_COUNT][SPL_ROWS]; /* columns that the file lacks are never read */
 };
 
@@ -35,7 +35,7 @@ struct spl_rows {
 struct spl_color_rule {
     enum { SPL_COLOR_ABSENT, SPL_COLOR_RGB, SPL_COLOR_GREY } kind;
     double scale, offset;
-    double limit;               /* RGB: values above it contradict the rule */
+    double limit; /* RGB: values above it contradict the rule */
 };
 
 /* The column that a property or header name means ("Red", "diffuse_red", "scalar_Intensity", "nx", …), else SKIP. */
@@ -48,11 +48,12 @@ static inline bool spl_columns_have3(uint32_t mask, int first)
     return (mask >> first & 7u) == 7u;
 }
 
-struct spl_color_rule spl_color_rule_rgb(double white);               /* white = 1, 255 or 65535 */
+struct spl_color_rule spl_color_rule_rgb(double white); /* white = 1, 255 or 65535 */
 struct spl_color_rule spl_color_rule_grey(double black, double white);
 
-/* Appends the rows to `batch`, which has room for them; rows with a non-finite position are counted in info.points_skipped
- * instead. Fails on a colour that contradicts the rule; `first` is the index of the first row, for the message. */
+/* Appends the rows to `batch`, which has room for them; rows with a non-finite position are counted in
+ * info.points_skipped instead. Fails on a colour that contradicts the rule; `first` is the index of the first row, for
+ * the message. */
 int spl_rows_emit(const struct spl_rows *rows, uint64_t first, const struct spl_color_rule *rule,
                   const struct spl_source *source, struct spl_cloud_info *info, struct spl_point_batch *batch,
                   struct spl_error *err);

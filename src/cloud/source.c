@@ -109,8 +109,8 @@ int spl_source_line(struct spl_source *source, const char **line, size_t *length
 
     for (;;) {
         /* one byte more than is known; the window is refilled as a whole */
-        int code = spl_source_peek(source, searched < SPL_SOURCE_WINDOW ? searched + 1 : searched, &bytes, &available,
-                                   err);
+        int code =
+            spl_source_peek(source, searched < SPL_SOURCE_WINDOW ? searched + 1 : searched, &bytes, &available, err);
         if (code < 0)
             return code;
         stop = memchr(bytes + searched, source->newline, available - searched);

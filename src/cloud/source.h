@@ -1,6 +1,6 @@
-/* A scan file read through one window: bounds-checked bytes for the binary readers, lines with numbers for the text ones.
- * Owned by one thread. The window is read with pread, so a file that shrinks meanwhile ends early instead of raising
- * SIGBUS as a mapping would, and a file larger than memory costs one window. */
+/* A scan file read through one window: bounds-checked bytes for the binary readers, lines with numbers for the text
+ * ones. Owned by one thread. The window is read with pread, so a file that shrinks meanwhile ends early instead of
+ * raising SIGBUS as a mapping would, and a file larger than memory costs one window. */
 #ifndef SPL_CLOUD_SOURCE_H
 #define SPL_CLOUD_SOURCE_H
 
@@ -14,11 +14,11 @@ enum { SPL_SOURCE_WINDOW = 1 << 20 }; /* bytes: the most that one peek or one li
 struct spl_source {
     int fd;
     char *path;
-    uint64_t size;         /* of the file when it was opened */
-    uint64_t base;         /* file offset of buffer[0] */
-    size_t begin, end;     /* unread bytes of the buffer; buffer[end] is always 0 */
-    uint64_t line;         /* number of the line that spl_source_line() gave last, 0 before the first */
-    char newline;          /* '\n' (a '\r' before it is dropped) or '\r' */
+    uint64_t size;     /* of the file when it was opened */
+    uint64_t base;     /* file offset of buffer[0] */
+    size_t begin, end; /* unread bytes of the buffer; buffer[end] is always 0 */
+    uint64_t line;     /* number of the line that spl_source_line() gave last, 0 before the first */
+    char newline;      /* '\n' (a '\r' before it is dropped) or '\r' */
     uint8_t *buffer;
 };
 
@@ -52,8 +52,8 @@ static inline uint64_t spl_source_left(const struct spl_source *source)
 /* Moves the cursor; offsets past the end read as the end. The line number is the caller's to restore. */
 void spl_source_seek(struct spl_source *source, uint64_t offset);
 
-/* The next line without its ending: 1, or 0 at the end of the file, or negative. line[length] may be read and belongs to
- * no number. Valid until the next call. */
+/* The next line without its ending: 1, or 0 at the end of the file, or negative. line[length] may be read and belongs
+ * to no number. Valid until the next call. */
 int spl_source_line(struct spl_source *source, const char **line, size_t *length, struct spl_error *err);
 
 /* SPL_E_INPUT "PATH: offset N: …" and "PATH: line N: …", naming the field. */

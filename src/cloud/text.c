@@ -1,5 +1,5 @@
-/* PTS, XYZ and CSV-like text: lines of numbers, with or without a leading count (PTS, one for each block), header names,
- * comments. Columns come from names or are recognised (text_columns.c).
+/* PTS, XYZ and CSV-like text: lines of numbers, with or without a leading count (PTS, one for each block), header
+ * names, comments. Columns come from names or are recognised (text_columns.c).
  *
  * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
 #include "cloud/text.h"
@@ -13,10 +13,10 @@ enum { SAMPLE_LINES = 1000 };
 
 struct text {
     struct spl_layout layout;
-    uint64_t start, start_line;    /* of the first line of numbers */
-    bool counted;                  /* PTS */
-    uint64_t count;                /* the first block's */
-    uint64_t left;                 /* of the current block; UINT64_MAX where nothing is counted */
+    uint64_t start, start_line; /* of the first line of numbers */
+    bool counted;               /* PTS */
+    uint64_t count;             /* the first block's */
+    uint64_t left;              /* of the current block; UINT64_MAX where nothing is counted */
 };
 
 static size_t comment_mark(const char *line, size_t length)
@@ -78,8 +78,7 @@ static bool names_in_comment(struct spl_layout *layout, const char *line, size_t
 }
 
 /* Everything before the numbers: comments, names, a count. On success `line` is the first line of numbers. */
-static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line, size_t *length,
-                         struct spl_error *err)
+static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line, size_t *length, struct spl_error *err)
 {
     struct text *text = cloud->state;
     struct spl_source *source = &cloud->source;
@@ -202,8 +201,8 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
 
     for (unsigned i = 0; i < layout->fields; i++) {
         int column = layout->column[i];
-        enum spl_field got = column >= 0 ? spl_fields_number(&fields, &rows->value[column][row])
-                                         : spl_fields_text(&fields, &ignored);
+        enum spl_field got =
+            column >= 0 ? spl_fields_number(&fields, &rows->value[column][row]) : spl_fields_text(&fields, &ignored);
         if (got == SPL_FIELD_END)
             return spl_source_fail_line(source, source->line, spl_column_name(column), err,
                                         "column %u of %u is missing", i + 1, layout->fields);
@@ -239,8 +238,9 @@ static int text_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limi
             break;
         if (text->left == 0) { /* another block of a PTS file */
             if (!is_count(line, length, &text->left))
-                return spl_source_fail_line(source, source->line, "count", err,
-                                            "more points than the count before them says: correct the count or delete its line");
+                return spl_source_fail_line(
+                    source, source->line, "count", err,
+                    "more points than the count before them says: correct the count or delete its line");
             code = check_count(source, text->left, err);
         } else {
             code = take_line(cloud, rows, line, length, err);

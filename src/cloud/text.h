@@ -7,10 +7,10 @@
 enum { SPL_TEXT_FIELDS = 64 };
 
 struct spl_layout {
-    int8_t column[SPL_TEXT_FIELDS];   /* enum spl_column of each field */
+    int8_t column[SPL_TEXT_FIELDS]; /* enum spl_column of each field */
     unsigned fields;
-    bool exact;                       /* a line must have `fields` values, not more */
-    char separator;                   /* ' ', ',' or ';' */
+    bool exact;     /* a line must have `fields` values, not more */
+    char separator; /* ' ', ',' or ';' */
 };
 
 /* The separator that a line uses. */
@@ -25,10 +25,10 @@ int spl_layout_from_option(struct spl_layout *layout, const char *columns, struc
 /* What the first lines look like, from which nameless columns are recognised. Zero-initialised. */
 struct spl_text_sample {
     unsigned lines;
-    bool fraction[SPL_TEXT_FIELDS];   /* some value is no integer, or no number */
-    bool wide[SPL_TEXT_FIELDS];       /* some value lies outside 0 to 65535 */
-    bool bright[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 1 */
-    bool crooked[SPL_TEXT_FIELDS];    /* with the next two: some vector is neither unit nor zero */
+    bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer, or no number */
+    bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
+    bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
+    bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */
 };
 
 /* False when the line has other than layout->fields values. */

@@ -57,7 +57,8 @@ int spl_layout_from_option(struct spl_layout *layout, const char *columns, struc
         if (column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
             return spl_fail_field(err, SPL_E_USAGE, "columns",
                                   "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class, or - "
-                                  "to skip a column", length < 40 ? (int)length : 40, fields.start);
+                                  "to skip a column",
+                                  length < 40 ? (int)length : 40, fields.start);
         if (column != SPL_COLUMN_SKIP && has_column(layout, column))
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is named twice", spl_column_name(column));
         layout->column[layout->fields++] = (int8_t)column;
@@ -118,7 +119,8 @@ static void set3(struct spl_layout *layout, unsigned at, int column)
 
 static bool free3(const struct spl_layout *layout, unsigned at)
 {
-    return at + 2 < layout->fields && layout->column[at] < 0 && layout->column[at + 1] < 0 && layout->column[at + 2] < 0;
+    return at + 2 < layout->fields && layout->column[at] < 0 && layout->column[at + 1] < 0 &&
+           layout->column[at + 2] < 0;
 }
 
 void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sample *sample)

@@ -72,7 +72,7 @@ static inline void write_scratch(const void *data, size_t length)
 
 /* What a whole file gave. The first points are kept. */
 struct loaded {
-    int code;                    /* 0, or the first error */
+    int code; /* 0, or the first error */
     struct spl_error err;
     char format[8];
     uint32_t attributes, station_count;

@@ -6,8 +6,8 @@
 
 struct las {
     unsigned minor, format, extra_bytes, count;
-    unsigned color_scale;      /* 257: 16 bits, 1: 8 bits in 16, 0: black */
-    const char *vlr_user;      /* may be NULL */
+    unsigned color_scale; /* 257: 16 bits, 1: 8 bits in 16, 0: black */
+    const char *vlr_user; /* may be NULL */
 };
 
 static inline struct las las_default(unsigned minor, unsigned format, unsigned extra_bytes, unsigned count)

@@ -106,10 +106,10 @@ static void broken_headers_are_refused(void **state)
         {105, 2, 33, "point data record length"},
         {105, 2, 0, "point data record length"},
         {107, 4, 4000000000, "number of point records"},
-        {131, 8, 0, "x scale"},                              /* zero */
-        {139, 8, 0x7ff8000000000000, "y scale"},             /* NaN */
-        {147, 8, 0xbf50624dd2f1a9fc, "z scale"},             /* -0.001 */
-        {155, 8, 0x7ff0000000000000, "x offset"},            /* inf */
+        {131, 8, 0, "x scale"},                   /* zero */
+        {139, 8, 0x7ff8000000000000, "y scale"},  /* NaN */
+        {147, 8, 0xbf50624dd2f1a9fc, "z scale"},  /* -0.001 */
+        {155, 8, 0x7ff0000000000000, "x offset"}, /* inf */
         {171, 8, 0xfff8000000000000, "z offset"},
     };
     static struct bytes b;

@@ -13,9 +13,11 @@ static void put_scalar(struct bytes *b, int order, const char *type, double v)
         return;
     }
     const char *digits = type + strcspn(type, "0123456789");
-    unsigned size = !strncmp(type, "float", 5) ? (strcmp(digits, "64") ? 4 : 8) : !strcmp(type, "double") ? 8
-                    : strstr(type, "char") || !strcmp(digits, "8") ? 1
-                    : strstr(type, "short") || !strcmp(digits, "16") ? 2 : 4;
+    unsigned size = !strncmp(type, "float", 5)                       ? (strcmp(digits, "64") ? 4 : 8)
+                    : !strcmp(type, "double")                        ? 8
+                    : strstr(type, "char") || !strcmp(digits, "8")   ? 1
+                    : strstr(type, "short") || !strcmp(digits, "16") ? 2
+                                                                     : 4;
     uint64_t bits;
     if (!strncmp(type, "float", 5) && size == 4) {
         float f = (float)v;
@@ -41,8 +43,8 @@ static void end_row(struct bytes *b, int order)
 
 static void every_type_and_byte_order(void **state)
 {
-    static const char *const types[] = {"char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int",
-                                        "int32", "uint", "uint32", "float", "float32", "double", "float64"};
+    static const char *const types[] = {"char", "int8",  "uchar", "uint8",  "short", "int16",   "ushort", "uint16",
+                                        "int",  "int32", "uint",  "uint32", "float", "float32", "double", "float64"};
     static struct bytes b;
     struct loaded l;
     (void)state;
@@ -51,8 +53,9 @@ static void every_type_and_byte_order(void **state)
             bool negative = types[t][0] != 'u';
             b.length = 0;
             put_text(&b, "ply\nformat %s 1.0\nelement vertex 3\n", orders[order]);
-            put_text(&b, "property %s z\nproperty uchar junk\nproperty %s x\nproperty double w\nproperty %s y\nend_header\n",
-                     types[t], types[t], types[t]);
+            put_text(
+                &b, "property %s z\nproperty uchar junk\nproperty %s x\nproperty double w\nproperty %s y\nend_header\n",
+                types[t], types[t], types[t]);
             for (int i = 0; i < 3; i++) {
                 put_scalar(&b, order, types[t], 3 + i);
                 put_scalar(&b, order, "uchar", 200);
@@ -80,8 +83,10 @@ static void doubles_are_exact(void **state)
     (void)state;
     for (int order = 0; order < 3; order++) {
         b.length = 0;
-        put_text(&b, "ply\nformat %s 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n"
-                     "end_header\n", orders[order]);
+        put_text(&b,
+                 "ply\nformat %s 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n"
+                 "end_header\n",
+                 orders[order]);
         put_scalar(&b, order, "double", 406047.00100000002);
         put_scalar(&b, order, "double", 1e9 + 1.0 / 3);
         put_scalar(&b, order, "double", -0.1);
@@ -226,8 +231,10 @@ static void sixteen_bits_are_found_at_the_very_end(void **state)
     enum { n = 5000 };
     (void)state;
     b.length = 0;
-    put_text(&b, "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
-                 "property uchar z\nproperty ushort red\nproperty ushort green\nproperty ushort blue\nend_header\n", n);
+    put_text(&b,
+             "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
+             "property uchar z\nproperty ushort red\nproperty ushort green\nproperty ushort blue\nend_header\n",
+             n);
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++)
             put_scalar(&b, 1, "uchar", k);
@@ -245,14 +252,16 @@ static void intensity_is_grey_without_colour(void **state)
     struct loaded l;
     (void)state;
     load_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-              "property float scalar_Intensity\nend_header\n0 0 0 -1000\n0 0 1 0\n0 0 2 1000\n", NULL, &l);
+              "property float scalar_Intensity\nend_header\n0 0 0 -1000\n0 0 1 0\n0 0 2 1000\n",
+              NULL, &l);
     assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
     assert_color(&l, 0, 0, 0, 0);
     assert_color(&l, 1, 128, 128, 128);
     assert_color(&l, 2, 255, 255, 255);
     loaded_finish(&l);
     load_text("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
-              "property float intensity\nend_header\n0 0 0 7\n0 0 1 7\n", NULL, &l);
+              "property float intensity\nend_header\n0 0 0 7\n0 0 1 7\n",
+              NULL, &l);
     assert_int_equal(l.attributes, 0); /* one value everywhere is none */
     loaded_finish(&l);
 }
@@ -261,8 +270,10 @@ static void non_finite_points_are_skipped_and_counted(void **state)
 {
     struct loaded l;
     (void)state;
-    load_text("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
-              "nan 0 0\n1 2 3\n0 -inf 0\n0 0 1e999\n", NULL, &l);
+    load_text(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        "nan 0 0\n1 2 3\n0 -inf 0\n0 0 1e999\n",
+        NULL, &l);
     assert_int_equal(l.points, 1);
     assert_int_equal(l.skipped, 3);
     assert_point(&l, 0, 1, 2, 3);
@@ -295,21 +306,28 @@ static void broken_headers_are_refused(void **state)
 static void broken_data_is_refused(void **state)
 {
     (void)state;
-    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1.5 2.5 3.5\n4.5 5.5\n", SPL_E_INPUT, "z", "line 9");
-    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3 4\n4 5 6\n", SPL_E_INPUT, "", "line 8");
-    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3\n4 5 6x\n", SPL_E_INPUT, "z", "\"6x\"");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1.5 2.5 3.5\n4.5 5.5\n", SPL_E_INPUT, "z",
+                 "line 9");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3 4\n4 5 6\n", SPL_E_INPUT, "",
+                 "line 8");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3\n4 5 6x\n", SPL_E_INPUT, "z",
+                 "\"6x\"");
     refused_text("ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1.0 2.0 3.0\n\n", SPL_E_INPUT,
                  "element vertex", "1 of 2");
     refused_text("ply\nformat ascii 1.0\nelement vertex 4000000000\n" XYZ "end_header\n1 2 3\n", SPL_E_INPUT, "vertex",
                  "4000000000 rows");
-    refused_text("ply\nformat binary_big_endian 1.0\nelement vertex 18446744073709551615\n" XYZ "end_header\n1234567890",
+    refused_text("ply\nformat binary_big_endian 1.0\nelement vertex 18446744073709551615\n" XYZ
+                 "end_header\n1234567890",
                  SPL_E_INPUT, "vertex", "offset");
     refused_text("ply\nformat binary_little_endian 1.0\nelement face 4000000000\nproperty list uchar int i\n"
-                 "element vertex 1\n" XYZ "end_header\n123456789012", SPL_E_INPUT, "face", "4000000000");
+                 "element vertex 1\n" XYZ "end_header\n123456789012",
+                 SPL_E_INPUT, "face", "4000000000");
     refused_text("ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int i\n"
-                 "element vertex 0\n" XYZ "end_header\n\xff\xff\xff\xff", SPL_E_INPUT, "i", "byte order");
+                 "element vertex 0\n" XYZ "end_header\n\xff\xff\xff\xff",
+                 SPL_E_INPUT, "i", "byte order");
     refused_text("ply\nformat ascii 1.0\nelement face 3\nproperty list uchar int i\nelement vertex 0\n" XYZ
-                 "end_header\n1 2\n1 2\n\n", SPL_E_INPUT, "face", "2 of 3");
+                 "end_header\n1 2\n1 2\n\n",
+                 SPL_E_INPUT, "face", "2 of 3");
 }
 
 static void the_wrong_byte_order_is_told(void **state)

@@ -1,11 +1,13 @@
-/* PTX: stations with their poses, cells in world coordinates, cells that saw nothing, and every broken line by number. */
+/* PTX: stations with their poses, cells in world coordinates, cells that saw nothing, and every broken line by number.
+ */
 #include "cloud_test.h"
 
 #include <math.h>
 
 /* Station 1: turned by 90 degrees about z and moved; station 2: moved by UTM-sized amounts. */
 #define STATION1 "2\n3\n10 20 30\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n"
-#define STATION2 "1\n2\n406000.5 7405000.25 -3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n406000.5 7405000.25 -3 1\n"
+#define STATION2                                                                                                       \
+    "1\n2\n406000.5 7405000.25 -3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n406000.5 7405000.25 -3 1\n"
 #define HEADER "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 
 static void stations_keep_their_poses(void **state)
@@ -13,8 +15,8 @@ static void stations_keep_their_poses(void **state)
     struct loaded l;
     (void)state;
     load_text(STATION1 "1 0 0 0.5 255 0 1\n0 0 0 0.5 0 0 0\n0 2 0 0.5 1 2 3\r\n0 0 3 0.5 4 5 6\n0 0 0 0.5 0 0 0\n"
-                       "-1 -1 -1 1 7 8 9\n"
-              STATION2 "0.125 0.25 0.5 0 10 20 30\n1 1 1 0 0 0 0\n\n\n", NULL, &l);
+                       "-1 -1 -1 1 7 8 9\n" STATION2 "0.125 0.25 0.5 0 10 20 30\n1 1 1 0 0 0 0\n\n\n",
+              NULL, &l);
     assert_string_equal(l.format, "PTX");
     assert_int_equal(l.attributes, SPL_CLOUD_COLOR | SPL_CLOUD_STATION);
     assert_int_equal(l.points, 6);
@@ -101,8 +103,8 @@ static void broken_files_are_refused(void **state)
     refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0 0\n", SPL_E_INPUT, "matrix", "line 9");
     refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 inf 0\n", SPL_E_INPUT, "matrix", "line 9");
     refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 5\n", SPL_E_INPUT, "matrix", "last column");
-    refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0\n", SPL_E_INPUT, "matrix",
-                 "singular");
+    refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0\n", SPL_E_INPUT,
+                 "matrix", "singular");
     refused_text("4000000000\n4000000000\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0\n",
                  SPL_E_INPUT, "columns, rows", "4000000000 x 4000000000");
     refused_text("99999999999\n1\n", SPL_E_INPUT, "columns", "not a count");

@@ -160,7 +160,12 @@ static void broken_text_is_refused(void **state)
     put(&b, "1 2 3\n4 5 6\n7 8\0009\n", 18); /* a zero byte makes it no text */
     refused(&b, NULL, SPL_E_INPUT, "", "no point cloud known");
     b.length = 0;
-    put(&b, "\xff\xfe" "1\0 \0" "2\0 \0" "3\0\n\0", 14);
+    put(&b,
+        "\xff\xfe"
+        "1\0 \0"
+        "2\0 \0"
+        "3\0\n\0",
+        14);
     refused(&b, NULL, SPL_E_INPUT, "", "UTF-8");
     b.length = 0;
     for (int i = 0; i < 65; i++)

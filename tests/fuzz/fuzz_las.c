@@ -1,0 +1,10 @@
+/* LAS of any bytes. */
+#include "fuzz_cloud.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    fuzz_cloud(data, size, "LASF", NULL);
+    return 0;
+}

@@ -1,0 +1,10 @@
+/* PTX of any bytes. */
+#include "fuzz_cloud.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    fuzz_cloud(data, size, "2\n3\n", NULL);
+    return 0;
+}
