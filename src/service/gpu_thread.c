@@ -129,13 +129,13 @@ static void inject(struct gpu *gpu)
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
-    uint64_t began = spl_now_ns();
-    job->queue_ms = (double)(began - job->accepted_ns) / SPL_NS_PER_MS;
-    if (spl_job_is_over(job)) {
+    job->queue_ms = (double)(spl_now_ns() - job->accepted_ns) / SPL_NS_PER_MS;
+    if (spl_job_is_over(job) || spl_pipeline_reserve_frame(pipeline, job)) {
         spl_pipeline_finish_job(pipeline, job);
         return true;
     }
     inject(gpu);
+    uint64_t began = spl_now_ns();
     job->request.view.deadline_ns = job->deadline_ns;
     int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
     struct spl_error err = job->err;

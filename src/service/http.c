@@ -276,11 +276,14 @@ int spl_http_start(struct spl_service *service, struct spl_error *err)
         MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (!service->daemon)
         return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start");
-    service->listen_fd = -1;
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     int rc = info ? uv_poll_init(&service->loop, &service->http_poll, info->epoll_fd) : UV_EINVAL;
-    if (rc)
+    service->listen_fd = -1; // MHD closes it
+    if (rc) {
+        MHD_stop_daemon(service->daemon);
+        service->daemon = NULL;
         return spl_fail(err, SPL_E_IO, "the loop cannot poll libmicrohttpd: %s", uv_strerror(rc));
+    }
     service->http_poll.data = service;
     uv_poll_start(&service->http_poll, UV_READABLE, on_poll);
     uv_timer_start(&service->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);

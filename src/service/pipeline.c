@@ -30,9 +30,42 @@ bool spl_job_is_over(struct spl_job *job)
     return job->err.code != SPL_OK;
 }
 
-void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
+static size_t frame_bytes(const struct spl_view *view)
+{
+    size_t pixel = view->layers & 1u << SPL_LAYER_NORMAL ? 12 : 4;
+    return pixel * view->camera.width * view->camera.height;
+}
+
+int spl_pipeline_reserve_frame(struct spl_pipeline *pipeline, struct spl_job *job)
+{
+    size_t bytes = frame_bytes(&job->request.view);
+    int rc = 0;
+    pthread_mutex_lock(&pipeline->mutex);
+    while (!rc && pipeline->frame_bytes && pipeline->frame_bytes + bytes > pipeline->options.frame_bytes_max) {
+        struct timespec t = {.tv_sec = (time_t)(job->deadline_ns / SPL_NS_PER_S),
+                             .tv_nsec = (long)(job->deadline_ns % SPL_NS_PER_S)};
+        if (pthread_cond_timedwait(&pipeline->released, &pipeline->mutex, &t))
+            rc = spl_fail(&job->err, SPL_E_TIMEOUT, "the deadline passed while earlier images were being encoded");
+    }
+    if (!rc)
+        pipeline->frame_bytes += job->frame_bytes = bytes;
+    pthread_mutex_unlock(&pipeline->mutex);
+    return rc;
+}
+
+static void release_frame(struct spl_pipeline *pipeline, struct spl_job *job)
 {
     spl_frame_finish(&job->frame);
+    pthread_mutex_lock(&pipeline->mutex);
+    pipeline->frame_bytes -= job->frame_bytes;
+    job->frame_bytes = 0;
+    pthread_cond_signal(&pipeline->released); // only the gpu thread waits
+    pthread_mutex_unlock(&pipeline->mutex);
+}
+
+void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
+{
+    release_frame(pipeline, job);
     bool room = spl_queue_try_push(pipeline->done, job);
     spl_assert(room);
     pipeline->options.wake(pipeline->options.wake_context);
@@ -45,7 +78,14 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     if (!pipeline)
         return SPL_E_NOMEM;
     pipeline->options = *options;
+    if (!options->frame_bytes_max)
+        pipeline->options.frame_bytes_max = (size_t)1 << 30;
     pthread_mutex_init(&pipeline->mutex, NULL);
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&pipeline->released, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     int rc;
     if ((rc = spl_queue_create(options->queue, &pipeline->render, err)) ||
         (rc = spl_queue_create(options->encoders, &pipeline->encode, err)) ||
@@ -88,6 +128,7 @@ void spl_pipeline_destroy(struct spl_pipeline *pipeline)
     spl_queue_destroy(pipeline->done);
     spl_queue_destroy(pipeline->encode);
     spl_queue_destroy(pipeline->render);
+    pthread_cond_destroy(&pipeline->released);
     pthread_mutex_destroy(&pipeline->mutex);
     free(pipeline);
 }

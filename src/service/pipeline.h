@@ -25,6 +25,7 @@ struct spl_job {
     struct spl_frame frame;     /* between gpu and encode */
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
+    size_t frame_bytes;         // guarded by: the pipeline's mutex; pixels accounted for this job
     double queue_ms, encode_ms;
     struct spl_error err;
 };
@@ -37,6 +38,7 @@ struct spl_pipeline_options {
     const struct spl_dataset *const *datasets; /* borrowed until destroy */
     size_t dataset_count;
     size_t queue, encoders;
+    size_t frame_bytes_max; /* host memory for frames that wait for an encoder, 0 = 1 GiB */
     struct spl_counters *counters;
     void (*wake)(void *context); /* called from any thread: a job is done, or the state changed */
     void *wake_context;

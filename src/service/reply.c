@@ -121,13 +121,35 @@ static void add_depth(struct request *request, const struct spl_job *job)
     }
 }
 
+/* Encoded bytes on their way to a client. */
+struct outgoing {
+    struct spl_service *service;
+    struct spl_encoded encoded;
+};
+
+static void release_outgoing(void *context)
+{
+    struct outgoing *outgoing = context;
+    outgoing->service->reply_bytes -= outgoing->encoded.length;
+    spl_encoded_finish(&outgoing->encoded);
+    free(outgoing);
+}
+
 void spl_reply_view(struct request *request, struct spl_job *job)
 {
     struct spl_pipeline_status status;
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback(job->encoded.length, job->encoded.bytes, free);
-    if (!request->response)
+    struct outgoing *outgoing = spl_alloc(1, sizeof *outgoing, NULL);
+    if (!outgoing)
         return;
+    request->status = MHD_HTTP_OK;
+    request->response = MHD_create_response_from_buffer_with_free_callback_cls(job->encoded.length, job->encoded.bytes,
+                                                                               release_outgoing, outgoing);
+    if (!request->response) {
+        free(outgoing);
+        return;
+    }
+    *outgoing = (struct outgoing){request->service, job->encoded};
+    request->service->reply_bytes += job->encoded.length;
     header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", job->encoded.media_type);
     const struct spl_frame_stats *s = &job->stats;
     header(request, "Server-Timing",
@@ -137,8 +159,8 @@ void spl_reply_view(struct request *request, struct spl_job *job)
            job->encode_ms, (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
     add_camera(request, &job->request.view.camera);
     add_depth(request, job);
+    job->encoded = (struct spl_encoded){0}; // the response owns the bytes
     header(request, "Splatd-Complete", "%s", s->complete ? "true" : "false");
     spl_pipeline_get_status(request->service->pipeline, &status);
     header(request, "Splatd-Device", "%s: %s", status.device.backend, status.device.name);
-    job->encoded = (struct spl_encoded){0}; // the response owns the bytes
 }

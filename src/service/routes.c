@@ -65,7 +65,13 @@ static void make_view(struct request *request, const struct spl_catalog_entry *e
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_job *job = NULL;
-    if (parse_view(request, entry, post, &view, &err) || !(job = spl_alloc(1, sizeof *job, &err)))
+    if (parse_view(request, entry, post, &view, &err))
+        goto refuse;
+    if (service->reply_bytes > reply_bytes_max) {
+        spl_fail(&err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
+        goto refuse;
+    }
+    if (!(job = spl_alloc(1, sizeof *job, &err)))
         goto refuse;
     job->dataset = entry->dataset;
     job->request = view;
@@ -122,7 +128,9 @@ static void refuse_method(struct request *request, unsigned methods, const char 
 static void refuse_query(struct request *request, bool post)
 {
     char name[64], detail[192];
-    snprintf(name, sizeof name, "%.*s", (int)strcspn(request->query, "=&"), request->query);
+    size_t length = strcspn(request->query, "=&");
+    memcpy(name, request->query, length = length < sizeof name ? length : sizeof name - 1);
+    name[length] = '\0';
     snprintf(detail, sizeof detail, "unknown parameter '%s'; %s", name,
              post ? "a POST takes its parameters in the body" : "this resource takes none");
     spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", name, detail);

@@ -20,6 +20,8 @@ struct spl_pipeline {
     atomic_int state;            /* enum spl_pipeline_state */
     struct spl_error failure;    /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
+    pthread_cond_t released;
+    size_t frame_bytes;            // guarded by: mutex; pixels of all frames between gpu and encode
     struct spl_device_info device; // guarded by: mutex
 };
 
@@ -29,6 +31,10 @@ void *spl_encode_thread_run(void *argument);
 
 /* Hands a job back to the loop, with `err` set or `encoded` filled. */
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);
+
+/* Accounts for the job's pixels before they are rendered; waits until the encoders have released enough of others', at
+ * most to the job's deadline. A frame larger than the whole budget is let through alone. */
+int spl_pipeline_reserve_frame(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* Sets the error of a job that nobody waits for, or whose deadline has passed; true then. */
 bool spl_job_is_over(struct spl_job *job);

@@ -14,6 +14,7 @@
 enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
+    reply_bytes_max = 1 << 30, /* in all; beyond, views are refused until clients have read theirs */
 };
 
 enum phase {
@@ -73,6 +74,7 @@ struct spl_service {
     LIST_HEAD(, connection) connections;
     LIST_HEAD(, request) waiting;
     size_t waiting_count, requests_open, connections_open;
+    size_t reply_bytes;          /* of views that clients have not read yet */
     bool draining;
     uint64_t drain_began_ns;
     struct spl_error failure;

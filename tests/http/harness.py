@@ -102,9 +102,9 @@ class Daemon:
         if self.code is None and self.process.poll() is None:
             code = self.stop()
         else:
-            code = 0 if self.code is not None else self.process.wait()
+            code = 0 if self.code is not None else self.process.wait() or "0, early"
         if kind or code:
-            sys.stdout.write("".join(self.lines))
+            sys.stdout.write("".join(self.lines) + f"the daemon's exit code: {code}\n")
         if not kind:
             assert code == 0, f"exit code {code}"
 

@@ -18,9 +18,12 @@ static void no_wake(void *context)
     (void)context;
 }
 
+static size_t frame_bytes_max;
+
 static struct spl_pipeline *start(size_t queue)
 {
-    struct spl_pipeline_options options = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake};
+    struct spl_pipeline_options options = {
+        .queue = queue, .encoders = 2, .frame_bytes_max = frame_bytes_max, .counters = &counters, .wake = no_wake};
     struct spl_pipeline *pipeline = NULL;
     struct spl_error err = {0};
     memset(&counters, 0, sizeof counters);
@@ -64,6 +67,13 @@ static void jobs_come_back_with_bytes(void **state)
     }
     assert_int_equal(counters.frames, 8);
     spl_pipeline_destroy(pipeline);
+}
+
+static void frames_beyond_the_budget_go_one_by_one(void **state)
+{
+    frame_bytes_max = 100; // less than one frame of 128 bytes
+    jobs_come_back_with_bytes(state);
+    frame_bytes_max = 0;
 }
 
 static void a_full_queue_refuses(void **state)
@@ -169,6 +179,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(jobs_come_back_with_bytes),
+        cmocka_unit_test(frames_beyond_the_budget_go_one_by_one),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
