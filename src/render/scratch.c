@@ -66,7 +66,8 @@ static int upload(struct spl_gpu *gpu, struct spl_gpu_buffer **buffer, const voi
         spl_gpu_buffer_destroy(gpu, *buffer);
         *buffer = replacement;
     }
-    memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
+    if (bytes)
+        memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
     return SPL_OK;
 }
 
