@@ -1,7 +1,9 @@
 /* Nearest neighbours over Morton order: every 16 points in a row are a leaf with a box, every 8 boxes a group with a box
- * of its own, up to one group. A search starts from a proven bound (the points beside it in order, or the last search's
- * ball moved to here), walks the boxes nearest first, collects what lies within the bound and tightens it whenever the
- * buffer is full; so neither a stray point nor a dense cluster makes it look at more than its surroundings.
+ * of its own, up to one group. A search starts from a proven bound, given by the points beside it in order; the 16 searches
+ * of a leaf share one walk over the boxes, which lists the leaves that any of their bounds reaches. Where these are too many
+ * (a stray point in the leaf, or two far ends of the order), each search walks alone, nearest boxes first. What lies within
+ * the bound is collected, and the bound tightened whenever the buffer is full; so neither a stray point nor a dense
+ * cluster makes a search look at more than its surroundings.
  *
  * Everything is doubles: a cloud of 10^9 metres with millimetre detail needs no special case. Loops over 16 points or
  * 8 boxes are written to vectorise, and compiled twice, for AVX2 and for the base architecture; contraction is off, so
@@ -14,7 +16,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { leaf = 16, fan = 8, levels_max = 12, buffer_max = 2 * SPL_NEIGHBOURS_MAX, stack_max = levels_max * fan };
+enum { leaf = SPL_NEAR_LEAF, fan = 8, levels_max = 12, stack_max = levels_max * fan,
+    spare = 40,                       /* candidates beyond the wanted ones that wait for a reduction */
+    buffer_max = SPL_NEIGHBOURS_MAX + 1 + spare + leaf };
 _Static_assert((int)leaf <= (int)SPL_POINTS_PAD, "the last leaf is read whole");
 
 struct group {
@@ -30,10 +34,10 @@ struct spl_neighbours {
 };
 
 struct candidates {
-    unsigned count, wanted;           /* wanted < buffer_max - leaf */
+    unsigned count, wanted;
     double bound;                     /* squared; `wanted` points lie within it */
-    double squared[buffer_max + leaf];
-    uint32_t index[buffer_max + leaf];
+    double squared[buffer_max];
+    uint32_t index[buffer_max];
 };
 
 struct entry {
@@ -117,6 +121,22 @@ void spl_neighbours_destroy(struct spl_neighbours *neighbours)
 
 #define INLINE static inline __attribute__((always_inline))
 
+/* Four doubles, unaligned in memory; comparisons give masks. */
+typedef double vec __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t mask __attribute__((vector_size(32), aligned(8), may_alias));
+enum { lanes = 4 };
+#define SPLAT(v) ((vec){v, v, v, v})
+
+/* How many of `n` values, padded with infinity to whole lanes, are at most `limit`. */
+INLINE unsigned count_within(const double *values, unsigned n, double limit)
+{
+    vec most = SPLAT(limit);
+    mask sum = {0};
+    for (unsigned i = 0; i < n; i += lanes)
+        sum -= *(const vec *)(values + i) <= most;
+    return (unsigned)(sum[0] + sum[1] + sum[2] + sum[3]);
+}
+
 /* Keeps the `wanted` nearest candidates and tightens the bound to the farthest of them. The threshold that counts just
  * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. */
 INLINE void reduce(struct candidates *c)
@@ -124,12 +144,12 @@ INLINE void reduce(struct candidates *c)
     unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted;
     if (n <= wanted)
         return;
+    for (unsigned i = n; i % lanes; i++)
+        c->squared[i] = INFINITY;
     double low = 0, high = c->bound, threshold = -1;
     for (int step = 0; step < 10 && threshold < 0; step++) {
         double t = low + (high - low) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
-        unsigned count = 0;
-        for (unsigned i = 0; i < n; i++)
-            count += c->squared[i] <= t;
+        unsigned count = count_within(c->squared, n, t);
         if (count == wanted) {
             threshold = t;
         } else if (count < wanted) {
@@ -148,8 +168,9 @@ INLINE void reduce(struct candidates *c)
             c->squared[kept] = d;
             c->index[kept] = c->index[i];
             kept += d <= threshold;
-            farthest = d <= threshold && d > farthest ? d : farthest;
         }
+        for (unsigned i = 0; i < wanted; i++)
+            farthest = c->squared[i] > farthest ? c->squared[i] : farthest;
     } else { /* ties, as on a grid */
         for (unsigned i = 1; i < n; i++) {
             double d = c->squared[i];
@@ -168,40 +189,57 @@ INLINE void reduce(struct candidates *c)
     c->bound = farthest;
 }
 
+/* Squared distances from `at` to points first..first + count - 1, count a multiple of the lanes. */
+INLINE void point_distances(const struct spl_points *p, size_t first, unsigned count, const double at[3],
+                            double *squared)
+{
+    vec x = SPLAT(at[0]), y = SPLAT(at[1]), z = SPLAT(at[2]);
+    for (unsigned k = 0; k < count; k += lanes) {
+        vec dx = *(const vec *)(p->axis[0] + first + k) - x;
+        vec dy = *(const vec *)(p->axis[1] + first + k) - y;
+        vec dz = *(const vec *)(p->axis[2] + first + k) - z;
+        *(vec *)(squared + k) = dx * dx + dy * dy + dz * dz;
+    }
+}
+
 INLINE void scan_leaf(const struct spl_points *p, size_t first, const double at[3], struct candidates *c)
 {
-    const double *x = p->axis[0] + first, *y = p->axis[1] + first, *z = p->axis[2] + first;
-    double squared[leaf];
-    for (int k = 0; k < leaf; k++) {
-        double dx = x[k] - at[0], dy = y[k] - at[1], dz = z[k] - at[2];
-        squared[k] = dx * dx + dy * dy + dz * dz;
-    }
+    double squared[leaf], bound = c->bound;
+    point_distances(p, first, leaf, at, squared);
     unsigned n = c->count, used = p->count - first < leaf ? (unsigned)(p->count - first) : leaf;
-    double bound = c->bound;
     for (unsigned k = 0; k < used; k++) {
         c->squared[n] = squared[k];
         c->index[n] = (uint32_t)first + k;
         n += squared[k] <= bound;
     }
     c->count = n;
-    if (n > buffer_max - leaf || n > c->wanted + 40)
+    if (n > c->wanted + spare)
         reduce(c);
 }
 
-/* Squared distances from `at` to the boxes of a group. */
-INLINE void group_distances(const struct group *g, const double at[3], double squared[fan])
+/* Squared distances from the box [from, to] to `lanes` boxes. */
+INLINE void box_distances(const double *const low[3], const double *const high[3], const double from[3],
+                          const double to[3], double *squared)
 {
-    for (int k = 0; k < fan; k++)
-        squared[k] = 0;
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < fan; k++) {
-            double below = g->low[c][k] - at[c], above = at[c] - g->high[c][k];
-            double d = below > above ? below : above;
-            d = d > 0 ? d : 0;
-            squared[k] += d * d;
-        }
+    vec sum = SPLAT(0.0);
+    for (int c = 0; c < 3; c++) {
+        vec a = SPLAT(from[c]), b = SPLAT(to[c]), l = *(const vec *)low[c], h = *(const vec *)high[c];
+        vec below = (vec)((mask)(l - b) & (l > b)), above = (vec)((mask)(a - h) & (a > h));
+        sum += below * below + above * above;
+    }
+    *(vec *)squared = sum;
 }
 
+INLINE void group_distances(const struct group *g, const double from[3], const double to[3], double squared[fan])
+{
+    for (int k = 0; k < fan; k += lanes) {
+        const double *low[3] = {&g->low[0][k], &g->low[1][k], &g->low[2][k]};
+        const double *high[3] = {&g->high[0][k], &g->high[1][k], &g->high[2][k]};
+        box_distances(low, high, from, to, squared + k);
+    }
+}
+
+/* A search on its own. */
 INLINE void walk(const struct spl_neighbours *n, const double at[3], struct candidates *c)
 {
     struct entry stack[stack_max];
@@ -212,7 +250,7 @@ INLINE void walk(const struct spl_neighbours *n, const double at[3], struct cand
         if (e.squared > c->bound)
             continue;
         double squared[fan];
-        group_distances(&n->groups[n->first[e.level] + e.box], at, squared);
+        group_distances(&n->groups[n->first[e.level] + e.box], at, at, squared);
         struct entry near[fan];
         int count = 0;
         for (unsigned k = 0; k < fan; k++) {
@@ -238,23 +276,80 @@ INLINE void walk(const struct spl_neighbours *n, const double at[3], struct cand
 }
 
 /* A squared distance within which at least `wanted` points lie, the point itself included: those beside it in order. */
-INLINE double bound_in_order(const struct spl_points *p, size_t i, const double at[3], unsigned wanted)
+INLINE double bound_in_order(const struct spl_points *p, size_t first, size_t size, const double at[3], unsigned wanted)
 {
-    struct candidates window;
-    size_t size = wanted + 8 < p->count ? wanted + 8 : p->count;
-    size_t first = i > size / 2 ? i - size / 2 : 0;
-    first = first + size > p->count ? p->count - size : first;
-    window.count = (unsigned)size;
-    window.wanted = wanted;
-    double farthest = 0;
-    for (size_t k = 0; k < size; k++) {
-        double dx = p->axis[0][first + k] - at[0], dy = p->axis[1][first + k] - at[1], dz = p->axis[2][first + k] - at[2];
-        window.squared[k] = dx * dx + dy * dy + dz * dz;
-        farthest = window.squared[k] > farthest ? window.squared[k] : farthest;
+    double squared[SPL_NEIGHBOURS_MAX + 1 + 3 * leaf], high = 0;
+    size_t padded = (size + lanes - 1) / lanes * lanes;
+    point_distances(p, first, (unsigned)padded, at, squared);
+    for (size_t k = size; k < padded; k++)
+        squared[k] = INFINITY;
+    for (size_t k = 0; k < size; k++)
+        high = squared[k] > high ? squared[k] : high;
+    double low = 0;
+    unsigned low_count = 0, high_count = (unsigned)size;
+    for (int step = 0; step < 4 && high_count > wanted; step++) {
+        double t = low + (high - low) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
+        unsigned count = count_within(squared, (unsigned)padded, t);
+        if (count < wanted) {
+            low = t;
+            low_count = count;
+        } else {
+            high = t;
+            high_count = count;
+        }
     }
-    window.bound = farthest;
-    reduce(&window);
-    return window.bound;
+    return high;
+}
+
+/* What the searches for the points of leaf `l` share. */
+INLINE void enter_leaf(const struct spl_neighbours *n, size_t l, unsigned wanted, struct spl_nearest *nearest)
+{
+    const struct spl_points *p = n->points;
+    size_t begin = l * leaf, end = begin + leaf < p->count ? begin + leaf : p->count;
+    size_t size = wanted + leaf < p->count ? wanted + leaf : p->count;
+    size_t before = (size - (end - begin)) / 2, first = begin > before ? begin - before : 0;
+    first = first + size > p->count ? p->count - size : first;
+    double reach = 0, from[3], to[3];
+    for (size_t i = begin; i < end; i++) {
+        const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+        double bound = nearest->bound[i - begin] = bound_in_order(p, first, size, at, wanted);
+        reach = bound > reach ? bound : reach;
+    }
+    const struct group *own = &n->groups[l / fan];
+    for (int c = 0; c < 3; c++) {
+        from[c] = own->low[c][l % fan];
+        to[c] = own->high[c][l % fan];
+    }
+    struct entry stack[stack_max];
+    unsigned depth = 0, leaves = 0;
+    stack[depth++] = (struct entry){0, 0, n->levels - 1};
+    while (depth && leaves <= SPL_NEAR_LEAVES) {
+        struct entry e = stack[--depth];
+        double squared[fan];
+        const struct group *g = &n->groups[n->first[e.level] + e.box];
+        group_distances(g, from, to, squared);
+        for (unsigned k = 0; k < fan; k++) {
+            if (!(squared[k] <= reach))
+                continue;
+            if (e.level > 0) {
+                stack[depth++] = (struct entry){squared[k], e.box * fan + k, e.level - 1};
+            } else if (leaves++ < SPL_NEAR_LEAVES) {
+                nearest->leaf_index[leaves - 1] = e.box * fan + k;
+                for (int c = 0; c < 3; c++) {
+                    nearest->low[c][leaves - 1] = g->low[c][k];
+                    nearest->high[c][leaves - 1] = g->high[c][k];
+                }
+            }
+        }
+    }
+    nearest->crowded = leaves > SPL_NEAR_LEAVES;
+    for (; leaves % lanes; leaves++)
+        for (int c = 0; c < 3 && !nearest->crowded; c++) {
+            nearest->low[c][leaves] = INFINITY;
+            nearest->high[c][leaves] = -INFINITY;
+        }
+    nearest->leaves = leaves;
+    nearest->leaf = l;
 }
 
 INLINE void find(const struct spl_neighbours *n, size_t i, unsigned k, struct spl_nearest *nearest)
@@ -264,30 +359,36 @@ INLINE void find(const struct spl_neighbours *n, size_t i, unsigned k, struct sp
     struct candidates c;
     c.count = 0;
     c.wanted = k + 1 < p->count ? k + 1 : (unsigned)p->count;
-    c.bound = INFINITY;
-    if (nearest->warm) { /* the last ball holds `wanted` points; so does one about here that contains it */
-        double dx = at[0] - nearest->at[0], dy = at[1] - nearest->at[1], dz = at[2] - nearest->at[2];
-        double reach = (sqrt(dx * dx + dy * dy + dz * dz) + nearest->farthest) * (1 + 1e-12);
-        c.bound = reach * reach;
+    if (nearest->leaf != i / leaf)
+        enter_leaf(n, i / leaf, c.wanted, nearest);
+    c.bound = nearest->bound[i % leaf];
+    if (nearest->crowded) {
+        walk(n, at, &c);
+    } else {
+        scan_leaf(p, i / leaf * leaf, at, &c);
+        for (unsigned b = 0; b < nearest->leaves; b += lanes) {
+            const double *low[3] = {&nearest->low[0][b], &nearest->low[1][b], &nearest->low[2][b]};
+            const double *high[3] = {&nearest->high[0][b], &nearest->high[1][b], &nearest->high[2][b]};
+            double squared[lanes];
+            box_distances(low, high, at, at, squared);
+            for (unsigned a = 0; a < lanes; a++)
+                if (squared[a] <= c.bound && nearest->leaf_index[b + a] != i / leaf)
+                    scan_leaf(p, (size_t)nearest->leaf_index[b + a] * leaf, at, &c);
+        }
     }
-    double beside = bound_in_order(p, i, at, c.wanted);
-    c.bound = beside < c.bound ? beside : c.bound;
-    walk(n, at, &c);
     reduce(&c);
 
     unsigned kept = 0;
-    double farthest = 0;
     for (unsigned a = 0; a < c.count; a++) {
         nearest->index[kept] = c.index[a];
         nearest->squared[kept] = c.squared[a];
         kept += c.index[a] != i;
-        farthest = c.squared[a] > farthest ? c.squared[a] : farthest;
     }
     nearest->count = kept < k ? kept : k;
+    double farthest = 0;
+    for (unsigned a = 0; a < nearest->count; a++)
+        farthest = nearest->squared[a] > farthest ? nearest->squared[a] : farthest;
     nearest->farthest = sqrt(farthest);
-    nearest->warm = true;
-    for (int axis = 0; axis < 3; axis++)
-        nearest->at[axis] = at[axis];
 }
 
 #if defined(__x86_64__)

@@ -6,16 +6,28 @@
 
 struct spl_neighbours;
 
-/* What a search found, and a hint for the next one: zero before the first, then reuse it for points that lie in order.
- * Unsorted. */
+enum { SPL_NEAR_LEAF = 16, SPL_NEAR_LEAVES = 64 };
+
+/* What a search found, unsorted, and what the searches for the points beside it in order share: spl_nearest_init() it, then
+ * reuse it. */
 struct spl_nearest {
     unsigned count;
     uint32_t index[SPL_NEIGHBOURS_MAX + 1];
     double squared[SPL_NEIGHBOURS_MAX + 1];  /* distances, squared */
     double farthest;                         /* distance of the farthest one */
-    bool warm;
-    double at[3];
+    /* Private: the leaf of the last point, bounds for its points, and the leaves around it where they are few. */
+    size_t leaf;
+    unsigned leaves;
+    bool crowded;
+    uint32_t leaf_index[SPL_NEAR_LEAVES];
+    double bound[SPL_NEAR_LEAF];
+    double low[3][SPL_NEAR_LEAVES], high[3][SPL_NEAR_LEAVES];
 };
+
+static inline void spl_nearest_init(struct spl_nearest *nearest)
+{
+    nearest->leaf = SIZE_MAX;
+}
 
 /* Indexes `points` (borrowed, sorted, at least 2, no two equal); memory: 3.5 bytes a point. NULL on SPL_E_NOMEM. */
 struct spl_neighbours *spl_neighbours_create(const struct spl_points *points, unsigned threads, struct spl_error *err);

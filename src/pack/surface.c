@@ -4,11 +4,18 @@
  * neighbour lists live as long as their block; only points with a neighbour in another block keep theirs, a few percent,
  * until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does the result.
  *
- * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K), with two limits that
- * keep stray and edge points from becoming blobs:
- * - the K neighbours of a point amid a surface fill a disc of radius d_K; at a border, on a wire or along a scan line
- *   they fill less, and their covariance tells how much: d_K^2 may be at most 4 sigma_1 sigma_2, its value on a disc;
- * - no radius exceeds a small multiple of the median radius around it. */
+ * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K): right amid a surface.
+ * Elsewhere it would make blobs, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the normal's PCA) and the
+ * surroundings limit it:
+ * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
+ * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows round.
+ *   A noisy surface looks like one too: more neighbours tell, and give the normal where they show a surface;
+ * - no radius exceeds a small multiple of the median of its neighbours' radii (a stray point beside a surface), nor of the
+ *   median of the few thousand points around it (a flock of strays): a smaller multiple where there is no surface.
+ * Scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along one or two lines, or all
+ * on one side. Where they do, more are asked: if they show a surface that goes on beyond the gap, the radius reaches
+ * across; if it ends there, the disc is made as small as a border's half of neighbours means.
+ */
 #include "pack/points.h"
 
 #include <math.h>
@@ -25,9 +32,15 @@ enum { block_points = 1 << 16 };
 static const float lone_radius = 0.01f;       /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;   /* keeps squares and quotients of floats in range */
 static const float stray_limit = 2.5f;        /* times the median radius of the neighbours */
+static const float flat_limit = 8, round_limit = 3; /* times the median radius of the run of points around */
+enum { run_points = 4096, run_sample = 256, wide_factor = 3 };
+static const double linear_below = 0.15, elongated_below = 0.4; /* sigma_1 / sigma_2 */
+static const double one_sided = 0.3;          /* distance of the neighbours' mean / d_K; 0.42 at a straight border */
+static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
 
 struct deferred {            /* a point with a neighbour in another block */
     uint32_t point;
+    float limit;             /* of its radius */
     float radius, uncertainty;
 };
 
@@ -41,6 +54,7 @@ struct block {
 
 struct scratch {             /* of one worker */
     uint32_t *neighbours;    /* k a point, unused ones UINT32_MAX */
+    float *limit;            /* of each point's radius: of its run, while being estimated a multiple of the median */
     struct spl_orient orient;
 };
 
@@ -53,15 +67,21 @@ struct surface {
     size_t block_count;
     uint32_t *label;         /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
-    unsigned k;
+    unsigned k, wide;
     atomic_bool failed;
 };
 
-/* Normal and radius of point i from its neighbours; true when the normal's side is known. */
-static bool estimate(struct spl_points *p, size_t i, const struct spl_nearest *near)
+/* How the points around one are spread. */
+struct spread {
+    double sigma[3];         /* ascending */
+    double normal[3], along[3]; /* of the least and of the largest sigma */
+    double mean[3];          /* of the neighbours, from the point */
+};
+
+static struct spread spread_of(const struct spl_points *p, const double at[3], const struct spl_nearest *near)
 {
-    double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
-    double sum[3] = {0}, m[6] = {0};
+    double sum[3] = {0}, m[6] = {0}, n = near->count + 1;
+    struct spread spread;
     for (unsigned a = 0; a < near->count; a++) {
         uint32_t j = near->index[a];
         double d[3] = {p->axis[0][j] - at[0], p->axis[1][j] - at[1], p->axis[2][j] - at[2]};
@@ -74,37 +94,141 @@ static bool estimate(struct spl_points *p, size_t i, const struct spl_nearest *n
         m[4] += d[1] * d[2];
         m[5] += d[2] * d[2];
     }
-    double n = near->count + 1, values[3], least[3], most[3];
     static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
     for (int e = 0; e < 6; e++)
         m[e] = m[e] / n - sum[row[e]] * sum[column[e]] / (n * n);
-    spl_eigen_symmetric(m, values, least, most);
+    spl_eigen_symmetric(m, spread.sigma, spread.normal, spread.along);
+    for (int c = 0; c < 3; c++) {
+        spread.sigma[c] = sqrt(fmax(0, spread.sigma[c]));
+        spread.mean[c] = sum[c] / near->count;
+    }
+    return spread;
+}
 
-    double reach = near->farthest * near->farthest;
-    double filled = 4 * sqrt(fmax(0, values[1]) * fmax(0, values[2]));
-    /* Along a line the share is a length; the disc then reaches the next point. */
-    double line = near->farthest / near->count;
-    double radius = 2 * sqrt(fmin(reach, filled) / near->count);
-    radius = fmax(radius, 1.5 * line);
-    p->radius[i] = fmaxf((float)radius, smallest_radius);
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* The larger of the distances to the nearest point in the quarters around `across` and against it; 0 where one is empty. */
+static double gap_across(const struct spl_points *p, const double at[3], const double across[3], const double normal[3],
+                         const struct spl_nearest *near)
+{
+    double gap[2] = {INFINITY, INFINITY}, along[3], aa = 0;
+    cross(normal, across, along);
+    for (int c = 0; c < 3; c++)
+        aa += across[c] * across[c];
+    for (unsigned a = 0; a < near->count && aa > 0; a++) {
+        uint32_t j = near->index[a];
+        double u = 0, v = 0;
+        for (int c = 0; c < 3; c++) {
+            u += along[c] * (p->axis[c][j] - at[c]);
+            v += across[c] * (p->axis[c][j] - at[c]);
+        }
+        if (fabs(v) > fabs(u))
+            gap[v > 0] = fmin(gap[v > 0], near->squared[a]);
+    }
+    double larger = fmax(gap[0], gap[1]);
+    return larger < INFINITY ? sqrt(larger) : 0;
+}
+
+/* 0 on a surface or a line, 1 in a volume. */
+static double roundness(const struct spread *spread)
+{
+    if (spread->sigma[1] < linear_below * spread->sigma[2])
+        return 0;
+    double t = (spread->sigma[0] / spread->sigma[1] - round_from) / (round_to - round_from);
+    t = fmin(1, fmax(0, t));
+    return t * t * (3 - 2 * t);
+}
+
+/* Normal and radius of point i, and the roundness of its surroundings. */
+static double radius_of(const struct surface *s, size_t i, struct spl_nearest *near, struct spl_nearest *wide,
+                        double normal[3], double *round)
+{
+    const struct spl_points *p = s->points;
+    const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+    struct spread spread = spread_of(p, at, near);
+    double reach = near->farthest, n = near->count, radius = 2 * reach / sqrt(n);
+    double mean = sqrt(spread.mean[0] * spread.mean[0] + spread.mean[1] * spread.mean[1] +
+                       spread.mean[2] * spread.mean[2]);
+    bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
+    bool elongated = spread.sigma[1] < elongated_below * spread.sigma[2];
+    memcpy(normal, spread.normal, sizeof spread.normal);
+    *round = roundness(&spread);
+    if (*round == 0 && !elongated && mean < one_sided * reach)
+        return radius;
+
+    spl_neighbours_find(s->neighbours, i, s->wide, wide);
+    struct spread wider = spread_of(p, at, wide);
+    bool surface = wider.sigma[1] >= linear_below * wider.sigma[2] && wider.sigma[0] < round_from * wider.sigma[1];
+    if (!surface && linear) /* a wire: its points are 2 reach / n apart */
+        return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
+    if (!surface)
+        return radius * (1 - 0.5 * *round);
+
+    if (linear || *round > 0)
+        memcpy(normal, wider.normal, sizeof wider.normal);
+    *round = 0;
+    double across[3];
+    cross(normal, spread.along, across);
+    double gap = gap_across(p, at, elongated ? across : spread.mean, normal, wide);
+    if (linear && gap == 0)
+        return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
+    if (gap == 0 && mean >= one_sided * reach)
+        return radius * 0.75;
+    return fmax(radius, fmin(0.55 * gap, 2 * radius));
+}
+
+/* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
+static bool estimate(const struct surface *s, size_t i, struct spl_nearest *near, struct spl_nearest *wide,
+                     float *limit)
+{
+    struct spl_points *p = s->points;
+    double least[3], round, side = 1;
+    p->radius[i] = fmaxf((float)radius_of(s, i, near, wide, least, &round), smallest_radius);
+    *limit = flat_limit + (float)round * (round_limit - flat_limit);
 
     float *normal = p->normal[i];
     if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0)
         return true;
-    double side = 1;
     bool known = p->station && p->station[i] != SPL_NO_STATION;
     if (known) {
         const double *pose = p->stations[p->station[i]];
-        side = least[0] * (pose[3] - at[0]) + least[1] * (pose[7] - at[1]) + least[2] * (pose[11] - at[2]);
+        side = 0;
+        for (int c = 0; c < 3; c++)
+            side += least[c] * (pose[4 * c + 3] - p->axis[c][i]);
     }
     for (int c = 0; c < 3; c++)
         normal[c] = (float)(side < 0 ? -least[c] : least[c]);
     return known;
 }
 
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Multiplies limit[] by the median radius of the run that each point belongs to. */
+static void limit_runs(const struct spl_points *p, size_t begin, size_t end, float *limit)
+{
+    for (size_t run = begin; run < end; run += run_points) {
+        size_t n = end - run < run_points ? end - run : run_points, sample = n < run_sample ? n : run_sample;
+        float radii[run_sample];
+        for (size_t i = 0; i < sample; i++)
+            radii[i] = p->radius[run + i * n / sample];
+        qsort(radii, sample, sizeof *radii, compare_floats);
+        for (size_t i = run; i < run + n; i++)
+            limit[i - begin] *= radii[sample / 2];
+    }
+}
+
 /* Radius and uncertainty of point i once the normals around it agree in sign. */
-static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float *radius,
-                   float *uncertainty)
+static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float limit,
+                   float *radius, float *uncertainty)
 {
     float around[SPL_NEIGHBOURS_MAX];
     unsigned n = 0;
@@ -119,13 +243,14 @@ static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbo
             around[at] = around[at - 1];
         around[at] = r;
     }
-    *radius = fminf(p->radius[i], stray_limit * around[n / 2]);
+    *radius = fminf(p->radius[i], fminf(limit, stray_limit * around[n / 2]));
     *uncertainty = (float)(*radius * sum / n);
 }
 
-static bool keep_deferred(struct surface *s, struct block *block, size_t begin, size_t end, const uint32_t *neighbours)
+static bool keep_deferred(struct surface *s, struct block *block, size_t begin, size_t end, const struct scratch *w)
 {
     unsigned k = s->k;
+    const uint32_t *neighbours = w->neighbours;
     size_t count = 0, at = 0;
     for (int store = 0; store < 2; store++) {
         for (size_t i = 0; i < end - begin; i++) {
@@ -137,6 +262,7 @@ static bool keep_deferred(struct surface *s, struct block *block, size_t begin, 
                 continue;
             if (store) {
                 block->deferred[at].point = (uint32_t)(begin + i);
+                block->deferred[at].limit = w->limit[i];
                 memcpy(block->neighbours + at++ * k, list, k * sizeof *list);
             }
             count += !store;
@@ -152,27 +278,25 @@ static bool keep_deferred(struct surface *s, struct block *block, size_t begin, 
     return true;
 }
 
-/* Settles what lies wholly in the block; raw radii are read until all are settled, so results wait in `neighbours`. */
-static void settle_inner(struct surface *s, const struct block *block, size_t begin, size_t end, uint32_t *neighbours)
+/* Settles what lies wholly in the block; raw radii are read until all are settled, so results wait in w->limit. */
+static void settle_inner(struct surface *s, const struct block *block, size_t begin, size_t end, struct scratch *w)
 {
     struct spl_points *p = s->points;
+    float *limit = w->limit;
     size_t next = 0;
     for (size_t i = begin; i < end; i++) {
         if (next < block->deferred_count && block->deferred[next].point == i) {
             next++;
             continue;
         }
-        uint32_t *list = neighbours + (i - begin) * s->k;
-        float radius;
-        settle(p, i, list, s->k, &radius, &p->uncertainty[i]);
-        memcpy(list, &radius, sizeof radius);
+        settle(p, i, w->neighbours + (i - begin) * s->k, s->k, limit[i - begin], &limit[i - begin], &p->uncertainty[i]);
     }
     next = 0;
     for (size_t i = begin; i < end; i++) {
         if (next < block->deferred_count && block->deferred[next].point == i)
             next++;
         else
-            memcpy(&p->radius[i], neighbours + (i - begin) * s->k, sizeof(float));
+            p->radius[i] = limit[i - begin];
     }
 }
 
@@ -199,23 +323,25 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     for (size_t b = begin_block; b < end_block; b++) {
         size_t begin = b * block_points;
         size_t end = begin + block_points < s->points->count ? begin + block_points : s->points->count;
-        struct spl_nearest near;
-        near.warm = false;
+        struct spl_nearest near, wide;
+        spl_nearest_init(&near);
+        spl_nearest_init(&wide);
         for (size_t i = begin; i < end; i++) {
             spl_neighbours_find(s->neighbours, i, s->k, &near);
             uint32_t *list = w->neighbours + (i - begin) * s->k;
             for (unsigned a = 0; a < s->k; a++)
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
-            w->orient.anchored[i - begin] = estimate(s->points, i, &near);
+            w->orient.anchored[i - begin] = estimate(s, i, &near, &wide, &w->limit[i - begin]);
             if ((i & 4095) == 4095)
                 spl_stage_add(s->stage, 4096, worker);
         }
-        if (!keep_deferred(s, &s->blocks[b], begin, end, w->neighbours) ||
+        limit_runs(s->points, begin, end, w->limit);
+        if (!keep_deferred(s, &s->blocks[b], begin, end, w) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
             atomic_store(&s->failed, true);
             return;
         }
-        settle_inner(s, &s->blocks[b], begin, end, w->neighbours);
+        settle_inner(s, &s->blocks[b], begin, end, w);
     }
 }
 
@@ -268,8 +394,8 @@ static void settle_deferred(void *context, size_t begin, size_t end, unsigned wo
     for (size_t b = begin; b < end; b++)
         for (size_t d = 0; d < s->blocks[b].deferred_count; d++) {
             struct deferred *deferred = &s->blocks[b].deferred[d];
-            settle(s->points, deferred->point, s->blocks[b].neighbours + d * s->k, s->k, &deferred->radius,
-                   &deferred->uncertainty);
+            settle(s->points, deferred->point, s->blocks[b].neighbours + d * s->k, s->k, deferred->limit,
+                   &deferred->radius, &deferred->uncertainty);
         }
 }
 
@@ -300,7 +426,8 @@ static int allocate(struct surface *s, struct spl_error *err)
     size_t capacity = p->count < block_points ? p->count : block_points;
     for (unsigned t = 0; t < s->stage->threads; t++) {
         s->scratch[t].neighbours = spl_alloc_raw(capacity, s->k * sizeof(uint32_t), err);
-        if (!s->scratch[t].neighbours || spl_orient_init(&s->scratch[t].orient, capacity, err))
+        s->scratch[t].limit = spl_alloc_raw(capacity, sizeof(float), err);
+        if (!s->scratch[t].neighbours || !s->scratch[t].limit || spl_orient_init(&s->scratch[t].orient, capacity, err))
             return SPL_E_NOMEM;
     }
     if (!all_sides_known(p)) {
@@ -321,6 +448,7 @@ static void finish(struct surface *s)
     }
     for (unsigned t = 0; s->scratch && t < s->stage->threads; t++) {
         free(s->scratch[t].neighbours);
+        free(s->scratch[t].limit);
         spl_orient_finish(&s->scratch[t].orient);
     }
     free(s->blocks);
@@ -341,6 +469,7 @@ static void lone_point(struct spl_points *p)
 int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err)
 {
     struct surface s = {.points = points, .stage = stage, .k = neighbours};
+    s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
     spl_stage_begin(stage, "normals and radii", points->count);
     int rc = allocate(&s, err);
     if (rc)
