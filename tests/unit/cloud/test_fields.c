@@ -54,8 +54,8 @@ static void numbers_equal_strtod(void **state)
         "1E+05",
         "7405438.123456789",
         "2.2250738585072011e-308",
-        "17976931348623158079372897140530341507993413271003782693617377898044496829276475094664901797758720709633028641"
-        "6692",
+        ("17976931348623158079372897140530341507993413271003782693617377898044496829276475094664901797758720709633028641"
+         "6692"),
     };
     (void)state;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
@@ -91,9 +91,9 @@ static void locale_does_not_matter(void **state)
     /* where the machine has a locale with a decimal comma */
     const char *set = setlocale(LC_ALL, "de_DE.UTF-8");
     double v;
-    assert_non_null(spl_number_parse("1.25", "1.25" + 4, &v));
+    const char *point = "1.25", *longer = "0.12345678901234567890";
+    assert_non_null(spl_number_parse(point, point + 4, &v));
     assert_true(v == 1.25);
-    const char *longer = "0.12345678901234567890";
     assert_ptr_equal(spl_number_parse(longer, longer + strlen(longer), &v), longer + strlen(longer));
     assert_true(v == 0.12345678901234567890);
     if (set)
@@ -134,13 +134,13 @@ static void other_texts_are_no_numbers(void **state)
 static void integers_refuse_overflow(void **state)
 {
     uint64_t v;
-    const char *most = "18446744073709551615", *more = "18446744073709551616";
+    const char *most = "18446744073709551615", *more = "18446744073709551616", *negative = "-1";
     (void)state;
     assert_ptr_equal(spl_integer_parse(most, most + 20, &v), most + 20);
     assert_true(v == UINT64_MAX);
     assert_null(spl_integer_parse(more, more + 20, &v));
-    assert_null(spl_integer_parse("-1", "-1" + 2, &v));
-    assert_null(spl_integer_parse("", "", &v));
+    assert_null(spl_integer_parse(negative, negative + 2, &v));
+    assert_null(spl_integer_parse(most, most, &v));
 }
 
 static void fields_split_by_separator(void **state)
