@@ -12,7 +12,7 @@ struct spl_catalog_entry {
     struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
     struct spl_view_defaults defaults;
-    char uri[512];  /* "/v1/datasets/{id}", percent-encoded */
+    char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
 };
 
 struct spl_catalog {

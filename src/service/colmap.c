@@ -27,9 +27,10 @@ int spl_colmap_apply(int model, const struct value *params, struct spl_camera *c
                               models[model].name, count, params->count);
     for (unsigned i = focals + 2; i < count; i++)
         if (params->n[i] != 0)
-            return spl_fail_field(err, SPL_E_INPUT, "params",
-                                  "params has the distortion coefficient %g; undistort the camera, only pinholes are drawn",
-                                  params->n[i]);
+            return spl_fail_field(
+                err, SPL_E_INPUT, "params",
+                "params has the distortion coefficient %g; undistort the camera, only pinholes are drawn",
+                params->n[i]);
     camera->fx = params->n[0];
     camera->fy = params->n[focals - 1];
     camera->cx = params->n[focals];

@@ -1,5 +1,4 @@
 /* Datasets and the service as JSON. Owned by the loop's thread. */
-#include <math.h>
 #include <stdio.h>
 #include <unistd.h>
 
@@ -34,31 +33,46 @@ static const char *format_name(int i)
     return spl_format_name((enum spl_format)i);
 }
 
+static json_t *count(uint64_t n)
+{
+    return json_integer((json_int_t)n);
+}
+
+/* A member that memory was refused for is left out. */
+static void set(json_t *object, const char *name, json_t *value)
+{
+    json_object_set_new(object, name, value);
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
-    json_t *json = json_pack("{s:s, s:s, s:o, s:s, s:I, s:I, s:I, s:{s:o, s:o}}", "id", info->id, "uri", entry->uri,
-                             "view", json_sprintf("%s/view", entry->uri), "unit", "m", "splats", (json_int_t)info->splats,
-                             "points", (json_int_t)info->points, "bytes", (json_int_t)info->file_bytes, "bounds", "min",
-                             vector(info->bounds_min), "max", vector(info->bounds_max));
-    if (!json)
-        return NULL;
-    json_object_set_new(json, "version", json_sprintf("%016llx", (unsigned long long)info->version));
+    json_t *json = json_object();
+    set(json, "id", json_string(info->id));
+    set(json, "version", json_sprintf("%016llx", (unsigned long long)info->version));
+    set(json, "uri", json_string(entry->uri));
+    set(json, "view", json_sprintf("%s/view", entry->uri));
+    set(json, "unit", json_string("m"));
+    set(json, "splats", count(info->splats));
+    set(json, "points", count(info->points));
+    set(json, "bytes", count(info->file_bytes));
+    set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
     if (!full)
         return json;
-    json_t *more = json_pack(
-        "{s:I, s:I, s:I, s:f, s:o, s:o, s:o, s:{s:o, s:o, s:o, s:f}}", "levels", (json_int_t)info->levels, "leaf_splats",
-        (json_int_t)info->leaf_splats, "page_bytes", (json_int_t)info->page_bytes, "splat_radius", info->splat_radius,
-        "layers", names(layer_name, SPL_LAYER_COUNT), "methods", names(method_name, SPL_METHOD_COUNT), "formats",
-        names(format_name, SPL_FORMAT_COUNT), "default_view", "eye", vector(info->default_eye), "target",
-        vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov);
-    if (more)
-        json_object_update(json, more);
-    json_decref(more);
+    set(json, "levels", count(info->levels));
+    set(json, "leaf_splats", count(info->leaf_splats));
+    set(json, "page_bytes", count(info->page_bytes));
+    set(json, "splat_radius", json_real(info->splat_radius));
+    set(json, "layers", names(layer_name, SPL_LAYER_COUNT));
+    set(json, "methods", names(method_name, SPL_METHOD_COUNT));
+    set(json, "formats", names(format_name, SPL_FORMAT_COUNT));
+    set(json, "default_view",
+        json_pack("{s:o, s:o, s:o, s:f}", "eye", vector(info->default_eye), "target", vector(info->default_target),
+                  "up", vector(info->default_up), "fov", info->default_fov));
     return json;
 }
 
-static json_int_t resident_bytes(void)
+static uint64_t resident_bytes(void)
 {
     unsigned long long size = 0, resident = 0;
     FILE *file = fopen("/proc/self/statm", "r");
@@ -66,7 +80,7 @@ static json_int_t resident_bytes(void)
         resident = 0;
     if (file)
         fclose(file);
-    return (json_int_t)resident * sysconf(_SC_PAGESIZE);
+    return resident * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
 static json_t *describe_device(const struct spl_device_info *device)
@@ -78,31 +92,51 @@ static json_t *describe_device(const struct spl_device_info *device)
 static json_t *describe_counters(struct spl_counters *counters)
 {
     json_t *json = json_object();
-#define COUNTER(name, help) json_object_set_new(json, #name, json_integer((json_int_t)atomic_load(&counters->name)));
+#define COUNTER(name, help) set(json, #name, count(atomic_load(&counters->name)));
 #include "service/counters.def"
 #undef COUNTER
     return json;
 }
 
+static json_t *describe_limits(const struct spl_service_options *options)
+{
+    json_t *json = json_object();
+    set(json, "side_px", count(SPL_SERVICE_SIDE_MAX));
+    set(json, "pixels", count(options->pixels_max));
+    set(json, "body_bytes", count(body_max));
+    set(json, "url_bytes", count(uri_max));
+    set(json, "deadline_ms", count(options->deadline_ms));
+    return json;
+}
+
+static json_t *describe_queue(size_t length, size_t capacity)
+{
+    return json_pack("{s:o, s:o}", "length", count(length), "capacity", count(capacity));
+}
+
 json_t *spl_describe_status(struct spl_service *service)
 {
     static const char *const states[] = {"starting", "ready", "rebuilding", "failed"};
-    const struct spl_service_options *options = service->options;
     struct spl_pipeline_status status;
     spl_pipeline_get_status(service->pipeline, &status);
-    json_t *ids = json_array();
+    const char *state = service->draining ? "stopping" : states[spl_pipeline_get_state(service->pipeline)];
+    json_t *json = json_object(), *ids = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
         json_array_append_new(ids, json_string(service->catalog.entries[i].info->id));
-    return json_pack(
-        "{s:s, s:s, s:f, s:o, s:{s:i, s:I, s:i, s:i, s:i}, s:o, s:{s:I, s:I}, s:{s:{s:I, s:I}, s:{s:I, s:I}}, s:f, s:I, "
-        "s:o}",
-        "version", SPLATD_VERSION, "state", service->draining ? "stopping" : states[spl_pipeline_get_state(service->pipeline)],
-        "uptime_s", (double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S, "device",
-        describe_device(&status.device), "limits", "side_px", (int)SPL_SERVICE_SIDE_MAX, "pixels",
-        (json_int_t)options->pixels_max, "body_bytes", (int)body_max, "url_bytes", (int)uri_max, "deadline_ms",
-        (int)options->deadline_ms, "datasets", ids, "memory", "device_bytes", (json_int_t)status.device_bytes,
-        "resident_bytes", resident_bytes(), "queues", "render", "length", (json_int_t)status.render_length, "capacity",
-        (json_int_t)status.render_capacity, "encode", "length", (json_int_t)status.encode_length, "capacity",
-        (json_int_t)status.encode_capacity, "frame_ms", status.frame_ms, "connections",
-        (json_int_t)service->connections_open, "counters", describe_counters(&service->counters));
+    set(json, "version", json_string(SPLATD_VERSION));
+    set(json, "state", json_string(state));
+    set(json, "uptime_s", json_real((double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S));
+    set(json, "device", describe_device(&status.device));
+    set(json, "limits", describe_limits(service->options));
+    set(json, "datasets", ids);
+    set(json, "memory",
+        json_pack("{s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "resident_bytes",
+                  count(resident_bytes()), "reply_bytes", count(service->reply_bytes)));
+    set(json, "queues",
+        json_pack("{s:o, s:o}", "render", describe_queue(status.render_length, status.render_capacity), "encode",
+                  describe_queue(status.encode_length, status.encode_capacity)));
+    set(json, "frame_ms", json_real(status.frame_ms));
+    set(json, "connections", count(service->connections_open));
+    set(json, "counters", describe_counters(&service->counters));
+    return json;
 }

@@ -1,5 +1,5 @@
-/* The encode threads: one layer of one frame in, bytes of a format out. Each frame's pixels are released as soon as they
- * are encoded, so that what waits for slow clients is compressed. */
+/* The encode threads: one layer of one frame in, bytes of a format out. Each frame's pixels are released as soon as
+ * they are encoded, so that what waits for slow clients is compressed. */
 #include "base/clock.h"
 #include "service/stages.h"
 

@@ -1,8 +1,8 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
- * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a new
- * renderer is made from the mapped datasets. More than `rebuilds_max` losses within `rebuild_window_ns` end the process,
- * for its supervisor to decide.
+ * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
+ * new renderer is made from the mapped datasets. More than `rebuilds_max` losses within `rebuild_window_ns` end the
+ * process, for its supervisor to decide.
  *
  * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
  * lost, K times in all (1 when left out). */

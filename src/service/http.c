@@ -1,10 +1,10 @@
-/* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer, and
- * a request whose view is being made is suspended, so that nothing here ever blocks.
+/* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer,
+ * and a request whose view is being made is suspended, so that nothing here ever blocks.
  *
  * Limits: the connection pool bounds request line and headers together; the request line has its own, smaller bound, so
  * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
- * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes does
- * not extend. Invariant: a suspended request is in `waiting` and has a job. Owned by the loop's thread. */
+ * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes
+ * does not extend. Invariant: a suspended request is in `waiting` and has a job. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,8 +67,9 @@ static void on_connection(void *context, struct MHD_Connection *handle, void **s
  * view has is answered past it, right on the socket, and the connection ended. */
 static bool refuse_many_parameters(struct request *request, const char *uri)
 {
-    static const char body[] = "{\"type\": \"urn:splatd:error:limit\", \"title\": \"URI Too Long\", \"status\": 414, \"detail\": "
-                               "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%llu\", \"field\": \"url\"}";
+    static const char body[] =
+        "{\"type\": \"urn:splatd:error:limit\", \"title\": \"URI Too Long\", \"status\": 414, \"detail\": "
+        "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%llu\", \"field\": \"url\"}";
     unsigned count = 0;
     for (; *uri && count <= parameters_max; uri++)
         count += *uri == '&';
@@ -78,7 +79,8 @@ static bool refuse_many_parameters(struct request *request, const char *uri)
     int length = snprintf(text, sizeof text, body, (unsigned long long)request->id);
     length = snprintf(reply, sizeof reply,
                       "HTTP/1.1 414 URI Too Long\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                      "Content-Length: %d\r\n\r\n%s", length, text);
+                      "Content-Length: %d\r\n\r\n%s",
+                      length, text);
     if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
         spl_count(&request->service->counters, replies_4xx);
     shutdown(request->connection->fd, SHUT_RDWR);
@@ -184,8 +186,8 @@ static void refuse_body(struct request *request)
     spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", "the body is larger than 1 MiB");
 }
 
-/* Replies at once to a body that is announced as too large, where the client waits for our word before it sends or means
- * to send more than we care to read. */
+/* Replies at once to a body that is announced as too large, where the client waits for our word before it sends or
+ * means to send more than we care to read. */
 static bool refuse_announced_body(struct request *request)
 {
     const char *length = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_LENGTH);
@@ -256,7 +258,8 @@ static void on_slow_timer(uv_timer_t *timer)
     struct spl_service *service = timer->data;
     uint64_t now = spl_now_ns();
     struct connection *connection;
-    LIST_FOREACH(connection, &service->connections, link) {
+    LIST_FOREACH(connection, &service->connections, link)
+    {
         if (now - connection->since_ns <= phase_max_ns[connection->phase])
             continue;
         spl_count(&service->counters, slow_closed);

@@ -50,8 +50,8 @@ int spl_listen(const char *address, int *fd, char *url, size_t url_capacity, str
 {
     char text[256], *host, *port;
     if (strlen(address) >= sizeof text || !split(strcpy(text, address), &host, &port) || strtol(port, NULL, 10) > 65535)
-        return spl_fail_field(err, SPL_E_USAGE, "--listen", "'%.200s' is no ADDR:PORT; write 127.0.0.1:8080 or [::1]:8080",
-                              address);
+        return spl_fail_field(err, SPL_E_USAGE, "--listen",
+                              "'%.200s' is no ADDR:PORT; write 127.0.0.1:8080 or [::1]:8080", address);
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *found = NULL;
     int rc = getaddrinfo(host, port, &hints, &found);
     if (rc)

@@ -22,10 +22,10 @@ struct spl_job {
     atomic_bool dropped; /* set by the loop at any time: nobody waits for it, skip the work */
     void *owner;         // owned by: loop
 
-    struct spl_frame frame;     /* between gpu and encode */
+    struct spl_frame frame; /* between gpu and encode */
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
-    size_t frame_bytes;         // guarded by: the pipeline's mutex; pixels accounted for this job
+    size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
     double queue_ms, encode_ms;
     struct spl_error err;
 };
@@ -45,7 +45,7 @@ struct spl_pipeline_options {
 };
 
 enum spl_pipeline_state {
-    SPL_PIPELINE_STARTING,   /* device and datasets are being loaded */
+    SPL_PIPELINE_STARTING, /* device and datasets are being loaded */
     SPL_PIPELINE_READY,
     SPL_PIPELINE_REBUILDING, /* the device was lost */
     SPL_PIPELINE_FAILED,     /* for good; see spl_pipeline_get_failure() */

@@ -31,8 +31,7 @@ static void header(struct request *request, const char *name, const char *format
 static void set_text(struct request *request, unsigned status, const char *type, char *body)
 {
     request->status = status;
-    request->response =
-        body ? MHD_create_response_from_buffer(strlen(body), body, MHD_RESPMEM_MUST_FREE) : NULL;
+    request->response = body ? MHD_create_response_from_buffer(strlen(body), body, MHD_RESPMEM_MUST_FREE) : NULL;
     if (!request->response)
         free(body);
     else

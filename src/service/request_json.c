@@ -59,7 +59,8 @@ static int parse_object(struct values *values, json_t *object, enum value_place 
 {
     const char *name;
     json_t *json;
-    json_object_foreach(object, name, json) {
+    json_object_foreach(object, name, json)
+    {
         int rc;
         if (place == BODY && !strcmp(name, "camera")) {
             if (!json_is_object(json))
@@ -91,7 +92,8 @@ int spl_view_request_from_json(const char *body, size_t length, const struct spl
             rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line,
                                 where.column, where.text);
         else if (!json_is_object(document))
-            rc = spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s", type_name(document));
+            rc =
+                spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s", type_name(document));
         else
             rc = parse_object(&values, document, BODY, err);
         json_decref(document);

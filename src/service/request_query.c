@@ -22,8 +22,8 @@ int spl_percent_decode(const char *text, size_t length, char *out, size_t capaci
             int high = i + 2 < length ? spl_hex_digit(text[i + 1]) : -1;
             int low = i + 2 < length ? spl_hex_digit(text[i + 2]) : -1;
             if (high < 0 || low < 0)
-                return spl_fail_field(err, SPL_E_INPUT, field, "'%%' at byte %zu of %s is not followed by two hex digits",
-                                      i + 1, field);
+                return spl_fail_field(err, SPL_E_INPUT, field,
+                                      "'%%' at byte %zu of %s is not followed by two hex digits", i + 1, field);
             byte = high * 16 + low;
             i += 2;
         }

@@ -19,8 +19,8 @@ static void index_page(struct request *request, const struct spl_catalog_entry *
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
         json_array_append_new(views, json_sprintf("%s/view", service->catalog.entries[i].uri));
-    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "datasets",
-                                      "/v1/datasets", "status", "/v1/status", "views", views));
+    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION,
+                                      "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
 }
 
 static void list_datasets(struct request *request, const struct spl_catalog_entry *entry, bool post)
@@ -51,9 +51,10 @@ static int parse_view(struct request *request, const struct spl_catalog_entry *e
                       struct spl_view_request *view, struct spl_error *err)
 {
     struct spl_view_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = request->service->options->pixels_max};
-    int rc = post ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)
-                  : spl_view_request_from_query(request->query, strlen(request->query), &entry->defaults, &limits, view,
-                                                err);
+    int rc =
+        post
+            ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)
+            : spl_view_request_from_query(request->query, strlen(request->query), &entry->defaults, &limits, view, err);
     if (rc && rc != SPL_E_NOMEM)
         err->code = SPL_E_INPUT; // whatever is wrong with a view is the client's to change
     return rc;
@@ -91,7 +92,7 @@ refuse:
 static const struct route {
     const char *pattern; /* "{id}" stands for one dataset */
     unsigned methods;
-    bool query;          /* takes parameters */
+    bool query; /* takes parameters */
     void (*handle)(struct request *request, const struct spl_catalog_entry *entry, bool post);
 } routes[] = {
     {"/", ALLOW_GET, false, index_page},
@@ -167,7 +168,8 @@ static void enter(struct request *request, const struct route *route, const char
 void spl_route(struct request *request, const char *method)
 {
     if (!request->uri) {
-        spl_reply_problem(request, MHD_HTTP_URI_TOO_LONG, "limit", "url", "the URL is longer than 8 KiB; POST takes long views");
+        spl_reply_problem(request, MHD_HTTP_URI_TOO_LONG, "limit", "url",
+                          "the URL is longer than 8 KiB; POST takes long views");
         return;
     }
     for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {

@@ -15,10 +15,10 @@ struct spl_pipeline {
     pthread_t gpu_thread, encode_threads[ENCODERS_MAX];
     size_t encode_started;
     bool gpu_started;
-    atomic_size_t in_flight;     /* jobs inside; bounded, so that `done` always has room */
+    atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
     _Atomic uint64_t device_bytes, frame_ns;
-    atomic_int state;            /* enum spl_pipeline_state */
-    struct spl_error failure;    /* written by the gpu thread before state becomes FAILED */
+    atomic_int state;         /* enum spl_pipeline_state */
+    struct spl_error failure; /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
     pthread_cond_t released;
     size_t frame_bytes;            // guarded by: mutex; pixels of all frames between gpu and encode

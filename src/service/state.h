@@ -28,25 +28,25 @@ enum phase {
 struct connection {
     LIST_ENTRY(connection) link; // spl_service.connections
     struct spl_service *service;
-    int fd;                      // owned by: MHD
+    int fd; // owned by: MHD
     enum phase phase;
-    uint64_t since_ns;           /* when the phase began */
+    uint64_t since_ns; /* when the phase began */
 };
 
 /* One request, from its first line until its reply is written. */
 struct request {
-    LIST_ENTRY(request) link;    // spl_service.waiting, while `job` is set
+    LIST_ENTRY(request) link; // spl_service.waiting, while `job` is set
     struct spl_service *service;
     struct MHD_Connection *handle;
     struct connection *connection;
     uint64_t id, began_ns;
-    char *uri;                   /* path, cut at '?'; NULL when the URI was too long */
-    const char *query;           /* inside uri, "" when there is none */
-    char *body;                  // may be NULL
+    char *uri;         /* path, cut at '?'; NULL when the URI was too long */
+    const char *query; /* inside uri, "" when there is none */
+    char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
     bool started;
-    bool abandoned;              /* the client has left: close without a reply */
-    struct spl_job *job;         /* in the pipeline; NULL otherwise */
+    bool abandoned;                /* the client has left: close without a reply */
+    struct spl_job *job;           /* in the pipeline; NULL otherwise */
     struct MHD_Response *response; // may be NULL
     unsigned status;
 };
@@ -59,22 +59,22 @@ struct spl_service {
     struct spl_counters counters;
     uint64_t started_ns;
     char url[192];
-    int listen_fd;               /* -1 once MHD has it */
+    int listen_fd; /* -1 once MHD has it */
 
     uv_loop_t loop;
     uv_async_t wake;
     uv_signal_t signals[2];
     uv_poll_t http_poll;
-    uv_timer_t http_timer;       /* MHD's own timeouts */
-    uv_timer_t wait_timer;       /* deadlines and departures, while requests wait */
-    uv_timer_t slow_timer;       /* connections that take too long */
-    uv_timer_t drain_timer;      /* while stopping */
+    uv_timer_t http_timer;  /* MHD's own timeouts */
+    uv_timer_t wait_timer;  /* deadlines and departures, while requests wait */
+    uv_timer_t slow_timer;  /* connections that take too long */
+    uv_timer_t drain_timer; /* while stopping */
 
-    struct MHD_Daemon *daemon;   // may be NULL
+    struct MHD_Daemon *daemon; // may be NULL
     LIST_HEAD(, connection) connections;
     LIST_HEAD(, request) waiting;
     size_t waiting_count, requests_open, connections_open;
-    size_t reply_bytes;          /* of views that clients have not read yet */
+    size_t reply_bytes; /* of views that clients have not read yet */
     bool draining;
     uint64_t drain_began_ns;
     struct spl_error failure;
@@ -82,14 +82,14 @@ struct spl_service {
 
 /* http.c: the MHD daemon inside the uv loop. */
 int spl_http_start(struct spl_service *service, struct spl_error *err);
-void spl_http_quiesce(struct spl_service *service);  /* stops accepting; idempotent */
-void spl_http_stop(struct spl_service *service);     /* closes every connection; idempotent */
-void spl_http_pump(struct spl_service *service);     /* lets MHD work; call after a resume */
+void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
+void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
+void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
 
 /* waiting.c: requests whose view is in the pipeline. */
 void spl_waiting_add(struct request *request, struct spl_job *job);
-void spl_waiting_complete(struct spl_service *service);       /* answers every job that is done */
-void spl_waiting_sweep(struct spl_service *service);          /* deadlines and departures */
+void spl_waiting_complete(struct spl_service *service); /* answers every job that is done */
+void spl_waiting_sweep(struct spl_service *service);    /* deadlines and departures */
 void spl_waiting_refuse_all(struct spl_service *service);
 
 /* routes.c: fills request->response, or hands a job to the pipeline. */

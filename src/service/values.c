@@ -24,7 +24,8 @@ enum param spl_param_find(const char *name, enum value_place place, struct spl_e
         if (info->places & place)
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
-                       info->places & CAMERA ? "give it in the \"camera\" object of a POST" : "give it beside \"camera\"");
+                       info->places & CAMERA ? "give it in the \"camera\" object of a POST"
+                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
     spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; api/openapi.yaml lists those of a view", name);
@@ -41,9 +42,9 @@ int spl_values_claim(struct values *values, enum param param, const char *name, 
 
 void spl_kind_get_count(enum value_kind kind, unsigned *least, unsigned *most)
 {
-    *least = *most = kind == KIND_NUMBER || kind == KIND_COUNT ? 1
-                     : kind == KIND_VECTOR                     ? 3
-                     : kind == KIND_QUATERNION                 ? 4
+    *least = *most = kind == KIND_NUMBER || kind == KIND_COUNT     ? 1
+                     : kind == KIND_VECTOR                         ? 3
+                     : kind == KIND_QUATERNION                     ? 4
                      : kind == KIND_MATRIX || kind == KIND_NUMBERS ? VALUE_NUMBERS_MAX
                                                                    : 0;
     if (kind == KIND_NUMBERS)
@@ -52,7 +53,10 @@ void spl_kind_get_count(enum value_kind kind, unsigned *least, unsigned *most)
 
 int spl_hex_digit(char c)
 {
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
 }
 
 static int parse_color(struct value *value, const char *name, const char *text, struct spl_error *err)
@@ -67,8 +71,8 @@ static int parse_color(struct value *value, const char *name, const char *text, 
     for (size_t i = 0; good && i < length; i++)
         good = spl_hex_digit(digits[i]) >= 0;
     if (!good)
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write RRGGBB, RRGGBBAA or transparent", name,
-                              text);
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write RRGGBB, RRGGBBAA or transparent",
+                              name, text);
     value->n[3] = 255;
     for (size_t i = 0; i < length / 2; i++)
         value->n[i] = spl_hex_digit(digits[2 * i]) * 16 + spl_hex_digit(digits[2 * i + 1]);

@@ -1,5 +1,5 @@
-/* The request parser: the first byte chooses query or JSON, the rest is the request. Whatever is accepted must be a view
- * that the renderer takes, within the limits. */
+/* The request parser: the first byte chooses query or JSON, the rest is the request. Whatever is accepted must be a
+ * view that the renderer takes, within the limits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -23,8 +23,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (rc ? err.code != rc || !err.message[0] : err.code != 0)
         abort();
     const struct spl_camera *camera = &request.view.camera;
-    if (!rc && (spl_view_check(&request.view, &err) || camera->width > limits.side_px || camera->height > limits.side_px ||
-                (uint64_t)camera->width * camera->height > limits.pixels || request.view.layers != 1u << request.layer))
+    if (!rc &&
+        (spl_view_check(&request.view, &err) || camera->width > limits.side_px || camera->height > limits.side_px ||
+         (uint64_t)camera->width * camera->height > limits.pixels || request.view.layers != 1u << request.layer))
         abort();
     return 0;
 }

@@ -1,6 +1,6 @@
-/* Runs a fuzz target without libFuzzer: each file named, each file of each folder named, then deterministic mutations of
- * every one of them (bits, bytes, interesting numbers, cuts, repeats, splices). The file at work is named when a target
- * aborts, and the input lies in $FUZZ_KEEP when that is set.
+/* Runs a fuzz target without libFuzzer: each file named, each file of each folder named, then deterministic mutations
+ * of every one of them (bits, bytes, interesting numbers, cuts, repeats, splices). The file at work is named when a
+ * target aborts, and the input lies in $FUZZ_KEEP when that is set.
  *
  * usage: fuzz-TARGET [--mutations N] FILE|DIR… */
 #include <dirent.h>
@@ -94,8 +94,18 @@ static void run(const uint8_t *bytes, size_t size)
 
 static size_t mutate(uint8_t *out, size_t size)
 {
-    static const uint64_t numbers[] = {0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x7fffffff, 0xffffffff, 0x7ff0000000000000,
-                                       0x7fffffffffffffff, 0xffffffffffffffff, 0x8000000000000000};
+    static const uint64_t numbers[] = {0,
+                                       1,
+                                       0x7f,
+                                       0xff,
+                                       0x7fff,
+                                       0xffff,
+                                       0x7fffffff,
+                                       0xffffffff,
+                                       0x7ff0000000000000,
+                                       0x7fffffffffffffff,
+                                       0xffffffffffffffff,
+                                       0x8000000000000000};
     size_t at = below(size), length = 1 + below(size - at < 64 ? size - at : 64);
     const struct input *other = &inputs[below(input_count)];
     switch (below(8)) {

@@ -19,8 +19,10 @@ QUERIES = [
     ("height=9e99", "height"), ("near=0", "near"), ("near=-1", "near"), ("near=2&far=1", "far"), ("far=nan", "far"),
     ("method=raytrace", "method"), ("lod=-1", "lod"), ("lod=much", "lod"), ("layer=smell", "layer"),
     ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
-    ("background=red", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"), ("margin=1e9", "margin"),
-    ("depth_scale=0", "depth_scale"), ("colour=red", "colour"), ("eye=1,2,3&eye=1,2,3", "eye"), ("POC=1,2,3&eye=1,2,3", "eye"),
+    ("background=red", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"),
+    ("margin=1e9", "margin"),
+    ("depth_scale=0", "depth_scale"), ("colour=red", "colour"), ("eye=1,2,3&eye=1,2,3", "eye"),
+    ("POC=1,2,3&eye=1,2,3", "eye"),
     ("width", "width"), ("width=", "width"), ("width=%zz", "width"), ("width=%4", "width"), ("width=%00", "width"),
     ("width=1%0d%0aX:1", "width"), ("%ff%fe=1", None), ("matrix=1", "matrix"),
 ]
@@ -28,7 +30,8 @@ BODIES = [
     ('{"camera":', "body"), ("[1,2]", "body"), ("no", "body"), ("\xff\xfe", "body"), ('{"lod": NaN}', "body"),
     ('{"lod":1,"lod":2}', "body"), ('{"colour":1}', "colour"), ('{"camera":5}', "camera"), ('{"width":"640"}', "width"),
     ('{"width":0}', "width"), ('{"eye":[1,2,3]}', "eye"), ('{"camera":{"eye":[1,2]}}', "eye"),
-    ('{"camera":{"eye":[0,0,0],"target":[0,0,0]}}', "target"), ('{"camera":{"matrix":[1],"convention":"opengl"}}', "matrix"),
+    ('{"camera":{"eye":[0,0,0],"target":[0,0,0]}}', "target"),
+    ('{"camera":{"matrix":[1],"convention":"opengl"}}', "matrix"),
     ('{"camera":{"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}', "convention"),
     ('{"camera":{"q":[0,0,0,0],"t":[0,0,0]}}', "q"), ('{"camera":{"q":[1,0,0,0]}}', "t"),
     ('{"camera":{"model":"OPENCV","params":[1,1,1,1,0.1,0,0,0]}}', "params"), ("[" * 100000, "body"),
@@ -62,7 +65,8 @@ def test_unknown_things_are_not_found():
                      "/v1/datasets/%2e%2e/view", "/v1/datasets/Wall"]:
             reply = d.ask(path)
             assert reply.status == 404 and reply.json()["field"] == "id", (path, reply.body)
-        for path in ["/v1", "/v2/datasets", "/v1/datasets/", "/v1/datasets/wall/", "/v1/datasets/wall/view/", "/v1/datasets//view",
+        for path in ["/v1", "/v2/datasets", "/v1/datasets/", "/v1/datasets/wall/", "/v1/datasets/wall/view/",
+                     "/v1/datasets//view",
                      "/v1/datasets/wall/../wall", "/etc/passwd", "//"]:
             assert d.ask(path).status == 404, path
         for path in ["/v1/datasets/%zz", "/v1/datasets/a%00b/view", "/v1/datasets/" + "a" * 300]:
@@ -119,17 +123,20 @@ def test_large_bodies_are_refused():
         head = f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n".encode()
         assert b" 413 " in raw(d, head + b"Content-Length: 2000000\r\nExpect: 100-continue\r\n\r\n")
         assert b" 413 " in raw(d, head + b"Content-Length: 99999999999\r\n\r\n")
-        chunked = head + b"Transfer-Encoding: chunked\r\n\r\n" + (b"10000\r\n" + b"x" * 65536 + b"\r\n") * 20 + b"0\r\n\r\n"
+        chunk = b"10000\r\n" + b"x" * 65536 + b"\r\n"
+        chunked = head + b"Transfer-Encoding: chunked\r\n\r\n" + chunk * 20 + b"0\r\n\r\n"
         assert b" 413 " in raw(d, chunked)
         assert d.status()["counters"]["frames"] == 1
 
 
 def test_broken_http_is_survived():
     with Daemon(FAKE) as d:
-        for data in [b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\n\n",
+        for data in [b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n",
+                     b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\n\n",
                      b"GET / HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
                      b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 50000 + b"\r\n",
-                     b"GET " + b"a" * 300000 + b" HTTP/1.1\r\n\r\n", b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
+                     b"GET " + b"a" * 300000 + b" HTTP/1.1\r\n\r\n",
+                     b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
                      b"GET /\x01 HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"]:
             try:
                 with socket.create_connection(("127.0.0.1", d.port), 15) as s:  # half a request is cut after 10 s

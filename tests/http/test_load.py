@@ -1,5 +1,5 @@
-"""More than the device can do, clients that leave or dawdle, a device that is lost, a daemon that is told to stop: every
-reply is 200 or says when to come back, and none is dropped."""
+"""More than the device can do, clients that leave or dawdle, a device that is lost, a daemon that is told to stop:
+every reply is 200 or says when to come back, and none is dropped."""
 import re
 import signal
 import socket

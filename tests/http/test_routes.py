@@ -66,7 +66,8 @@ def test_status_says_how_it_is():
         assert d.view(width=64, height=48).status == 200
         status = d.status()
         assert status["state"] == "ready" and status["datasets"] == ["wall"]
-        assert status["device"]["backend"] in ("vulkan", "egl") and status["device"]["name"] and status["device"]["driver"]
+        device = status["device"]
+        assert device["backend"] in ("vulkan", "egl") and device["name"] and device["driver"]
         assert status["counters"]["frames"] == 1 and status["counters"]["replies_2xx"] == 1
         assert status["memory"]["device_bytes"] > 0 and status["memory"]["resident_bytes"] > 0
         assert status["queues"]["render"] == {"length": 0, "capacity": 32}
@@ -96,7 +97,8 @@ def test_every_format_of_every_layer():
             assert npy[10 + len(header):] == raw
             jpeg = d.view(**LOOK, width=64, height=48, layer=layer, format="jpg")
             assert jpeg.headers["Content-Type"] == "image/jpeg" and jpeg_size(jpeg.body) == (64, 48)
-            width, height, depth, color, row = png_pixels(d.view(**LOOK, width=64, height=48, layer=layer, format="png").body)
+            png = d.view(**LOOK, width=64, height=48, layer=layer, format="png").body
+            width, height, depth, color, row = png_pixels(png)
             wanted = {"depth": (16, 0), "range": (16, 0), "coverage": (8, 0), "normal": (8, 2)}.get(layer, (8, 6))
             assert (width, height, (depth, color)) == (64, 48, wanted)
             assert row == 64 * depth // 8 * {0: 1, 2: 3, 6: 4}[color]
@@ -118,20 +120,23 @@ def test_depth_headers_say_what_pixels_mean():
 
 def test_depth_is_metres_along_the_axis():
     with Daemon(REAL) as d:
-        raw = d.view(eye="3,0,1", target="0,0,1", up="0,0,1", fov=60, width=65, height=49, layer="depth", format="raw").body
+        pose = dict(eye="3,0,1", target="0,0,1", up="0,0,1", fov=60)
+        raw = d.view(**pose, width=65, height=49, layer="depth", format="raw").body
         middle = struct.unpack("<f", raw[4 * (24 * 65 + 32):][:4])[0]
         assert abs(middle - 3) < 0.01, middle
 
 
 def test_view_headers():
     with Daemon(REAL) as d:
-        headers = d.view(eye="3,0.5,1", target="0,0,1", fx=100, fy=101, cx=30, cy=20, width=64, height=48, near=0.5, far=9).headers
+        wanted = dict(fx=100, fy=101, cx=30, cy=20, width=64, height=48, near=0.5, far=9)
+        headers = d.view(eye="3,0.5,1", target="0,0,1", **wanted).headers
         stages = dict(re.findall(r"(\w+);dur=([\d.]+)", headers["Server-Timing"]))
-        assert list(stages) == ["queue", "frame", "select", "depth", "shade", "resolve", "readback", "encode", "total"], headers["Server-Timing"]
+        assert list(stages) == ["queue", "frame", "select", "depth", "shade", "resolve", "readback", "encode",
+                                "total"], headers["Server-Timing"]
         assert float(stages["total"]) >= float(stages["encode"]) > 0
         camera = json.loads(headers["Splatd-Camera"])
         assert camera["eye"] == [3, 0.5, 1] and len(camera["rotation"]) == 9
-        assert [camera[k] for k in ("fx", "fy", "cx", "cy", "width", "height", "near", "far")] == [100, 101, 30, 20, 64, 48, 0.5, 9]
+        assert {k: camera[k] for k in wanted} == wanted
         assert headers["Splatd-Complete"] == "true"
         assert headers["Splatd-Device"].startswith(d.status()["device"]["backend"])
 
@@ -186,7 +191,8 @@ def test_openapi_knows_every_parameter_and_route():
     listed = set(re.findall(r"^        - name: (\w+)$", text, re.M))
     schemas = {name: set(re.findall(r"^        (\w+):", body, re.M)) for name, body in
                re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
-    rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z| ]+),', (ROOT / "src/service/view_params.def").read_text(), re.M)
+    table = (ROOT / "src/service/view_params.def").read_text()
+    rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z| ]+),', table, re.M)
     assert len(rows) > 20
     assert listed == {name for name, _, places in rows if "QUERY" in places}
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}

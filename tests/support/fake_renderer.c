@@ -29,7 +29,8 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
         return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
     if (!(*out = spl_alloc(1, sizeof **out, err)))
         return SPL_E_NOMEM;
-    (*out)->device = (struct spl_device_info){.backend = "fake", .name = "flat colour", .driver = "tests", .software = true};
+    (*out)->device =
+        (struct spl_device_info){.backend = "fake", .name = "flat colour", .driver = "tests", .software = true};
     return 0;
 }
 

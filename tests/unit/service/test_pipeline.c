@@ -35,7 +35,8 @@ static struct spl_pipeline *start(size_t queue)
 
 static struct spl_job *make_job(unsigned deadline_ms)
 {
-    static const struct spl_view_defaults defaults = {.eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
+    static const struct spl_view_defaults defaults = {
+        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
     static const struct spl_view_limits limits = {.side_px = 64, .pixels = 4096};
     struct spl_job *job = calloc(1, sizeof *job);
     const char *query = "width=8&height=4&format=raw";
@@ -129,7 +130,8 @@ static void a_lost_device_is_reopened(void **state)
         spl_job_destroy(job);
         /* A job that comes while the device is reopened is refused as well. */
         for (int ms = 0; ms < 10000 && (counters.device_losses < (uint64_t)lost ||
-                                        spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY); ms++)
+                                        spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY);
+             ms++)
             usleep(1000);
     }
     assert_int_equal(lost, 1);

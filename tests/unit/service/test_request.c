@@ -49,9 +49,12 @@ static void every_parameter_arrives(void **state)
     (void)state;
     struct spl_view_request r;
     struct spl_error err;
-    assert_int_equal(query("eye=1,-2,3e0&target=0,0,0&up=0,1,0&fx=500&fy=510&cx=300&cy=200.5&width=640&height=480&near=0.5&"
-                           "far=90&method=points&lod=2&layer=depth&supersample=2&margin=1.5&background=%23102030&"
-                           "transparent=true&format=npy&quality=77&depth_scale=5000", &r, &err), 0);
+    assert_int_equal(
+        query("eye=1,-2,3e0&target=0,0,0&up=0,1,0&fx=500&fy=510&cx=300&cy=200.5&width=640&height=480&near=0.5&"
+              "far=90&method=points&lod=2&layer=depth&supersample=2&margin=1.5&background=%23102030&"
+              "transparent=true&format=npy&quality=77&depth_scale=5000",
+              &r, &err),
+        0);
     const struct spl_camera *c = &r.view.camera;
     assert_true(c->eye[1] == -2 && c->fx == 500 && c->fy == 510 && c->cx == 300 && c->cy == 200.5);
     assert_true(c->near == 0.5 && c->far == 90 && c->width == 640 && c->height == 480);
@@ -77,8 +80,9 @@ static void ogc_names_mean_the_same(void **state)
     struct spl_view_request a, b;
     struct spl_error err;
     assert_int_equal(query("eye=1,2,3&target=4,5,6&up=0,1,0&fov=50&background=ff8000&transparent=false", &a, &err), 0);
-    assert_int_equal(query("POC=1,2,3&poi=4,5,6&UP=0,1,0&Fovy=50&BackgroundColor=0xFF8000&TransparentBackground=FALSE", &b,
-                           &err), 0);
+    assert_int_equal(
+        query("POC=1,2,3&poi=4,5,6&UP=0,1,0&Fovy=50&BackgroundColor=0xFF8000&TransparentBackground=FALSE", &b, &err),
+        0);
     assert_memory_equal(&a, &b, sizeof a);
 }
 
@@ -98,9 +102,11 @@ static void camera_forms_agree(void **state)
     /* At (0, -5, 0) looking along +y with z up: x right, y_camera = -z, z_camera = +y. */
     static const char *const forms[] = {
         "{\"camera\":{\"eye\":[0,-5,0],\"target\":[0,0,0],\"up\":[0,0,1],\"fx\":100,\"fy\":110,\"cx\":40,\"cy\":30}}",
-        "{\"camera\":{\"matrix\":[1,0,0,0, 0,0,1,-5, 0,-1,0,0, 0,0,0,1],\"convention\":\"opencv\",\"fx\":100,\"fy\":110,"
+        "{\"camera\":{\"matrix\":[1,0,0,0, 0,0,1,-5, 0,-1,0,0, "
+        "0,0,0,1],\"convention\":\"opencv\",\"fx\":100,\"fy\":110,"
         "\"cx\":40,\"cy\":30}}",
-        "{\"camera\":{\"matrix\":[1,0,0,0, 0,0,-1,-5, 0,1,0,0, 0,0,0,1],\"convention\":\"opengl\",\"fx\":100,\"fy\":110,"
+        "{\"camera\":{\"matrix\":[1,0,0,0, 0,0,-1,-5, 0,1,0,0, "
+        "0,0,0,1],\"convention\":\"opengl\",\"fx\":100,\"fy\":110,"
         "\"cx\":40,\"cy\":30}}",
         "{\"camera\":{\"q\":[1,1,0,0],\"t\":[0,0,5],\"model\":\"PINHOLE\",\"params\":[100,110,40,30]}}",
         "{\"camera\":{\"q\":[2,2,0,0],\"t\":[0,0,5],\"model\":\"OPENCV\",\"params\":[100,110,40,30,0,0,0,0]}}",
@@ -127,7 +133,8 @@ static void assert_refused(int (*parse)(const char *, struct spl_view_request *,
         if (!parse(refusals[i].text, &r, &err))
             fail_msg("accepted: %s", refusals[i].text);
         if (strcmp(err.field, refusals[i].field))
-            fail_msg("%s: field '%s' instead of '%s' (%s)", refusals[i].text, err.field, refusals[i].field, err.message);
+            fail_msg("%s: field '%s' instead of '%s' (%s)", refusals[i].text, err.field, refusals[i].field,
+                     err.message);
         if (!err.message[0] || strchr(err.message, '\n'))
             fail_msg("%s: message '%s'", refusals[i].text, err.message);
     }
@@ -137,27 +144,85 @@ static void queries_are_refused_by_name(void **state)
 {
     (void)state;
     static const struct refusal refusals[] = {
-        {"eye=1,2", "eye"}, {"eye=1,2,3,4", "eye"}, {"eye=1,2,", "eye"}, {"eye=", "eye"}, {"eye", "eye"},
-        {"eye=1,2,x", "eye"}, {"eye=nan,0,0", "eye"}, {"eye=inf,0,0", "eye"}, {"eye=0,-Infinity,0", "eye"},
-        {"eye=1e999,0,0", "eye"}, {"eye=0x10,0,0", "eye"}, {"eye=1%202,0,0", "eye"}, {"POC=a,b,c", "POC"},
-        {"eye=1e13,0,0", "eye"}, {"target=10,0,0", "target"}, {"eye=0,0,0", "target"}, {"up=0,0,0", "up"},
-        {"up=1,0,0", "up"}, {"eye=1,2,3&eye=1,2,3", "eye"}, {"eye=1,2,3&POC=1,2,3", "POC"},
+        {"eye=1,2", "eye"},
+        {"eye=1,2,3,4", "eye"},
+        {"eye=1,2,", "eye"},
+        {"eye=", "eye"},
+        {"eye", "eye"},
+        {"eye=1,2,x", "eye"},
+        {"eye=nan,0,0", "eye"},
+        {"eye=inf,0,0", "eye"},
+        {"eye=0,-Infinity,0", "eye"},
+        {"eye=1e999,0,0", "eye"},
+        {"eye=0x10,0,0", "eye"},
+        {"eye=1%202,0,0", "eye"},
+        {"POC=a,b,c", "POC"},
+        {"eye=1e13,0,0", "eye"},
+        {"target=10,0,0", "target"},
+        {"eye=0,0,0", "target"},
+        {"up=0,0,0", "up"},
+        {"up=1,0,0", "up"},
+        {"eye=1,2,3&eye=1,2,3", "eye"},
+        {"eye=1,2,3&POC=1,2,3", "POC"},
         {"eye=1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1", "eye"},
-        {"fov=0", "fov"}, {"fov=180", "fov"}, {"fov=-5", "fov"}, {"fov=wide", "fov"}, {"fov=50&fx=100", "fov"},
-        {"fy=100", "fx"}, {"fx=0", "fx"}, {"fx=-1", "fx"}, {"fx=10&fy=0", "fy"}, {"cx=nan", "cx"}, {"cy=1,2", "cy"},
-        {"width=0&height=0", "width"}, {"width=1000000&height=1000000", "width"}, {"width=8193", "width"},
-        {"height=-1", "height"}, {"width=10.5", "width"}, {"height=1e99", "height"}, {"height=", "height"},
-        {"near=0", "near"}, {"near=-1", "near"}, {"near=5&far=4", "far"}, {"far=inf", "far"}, {"near=x", "near"},
-        {"method=magic", "method"}, {"method=", "method"}, {"method=Splat", "method"}, {"layer=smell", "layer"},
-        {"lod=-1", "lod"}, {"lod=65", "lod"}, {"lod=1;2", "lod"}, {"supersample=3", "supersample"},
-        {"supersample=0", "supersample"}, {"margin=-1", "margin"}, {"margin=99", "margin"}, {"format=gif", "format"},
-        {"quality=0", "quality"}, {"quality=101", "quality"}, {"quality=90.5", "quality"},
-        {"background=red", "background"}, {"background=12345", "background"}, {"background=%231234567", "background"},
-        {"BackgroundColor=0xGG0000", "BackgroundColor"}, {"transparent=maybe", "transparent"},
-        {"depth_scale=0", "depth_scale"}, {"depth_scale=-1000", "depth_scale"}, {"depth_scale=1e300", "depth_scale"},
-        {"smell=1", "smell"}, {"=1", ""}, {"matrix=1", "matrix"}, {"q=1,0,0,0", "q"}, {"model=PINHOLE", "model"},
-        {"width=%3", "width"}, {"width=%", "width"}, {"width=%zz", "width"}, {"width=%00", "width"}, {"%zz=1", "a parameter's name"},
-        {"width=1%0a2", "width"}, {"Eye=1,2,3", "Eye"},
+        {"fov=0", "fov"},
+        {"fov=180", "fov"},
+        {"fov=-5", "fov"},
+        {"fov=wide", "fov"},
+        {"fov=50&fx=100", "fov"},
+        {"fy=100", "fx"},
+        {"fx=0", "fx"},
+        {"fx=-1", "fx"},
+        {"fx=10&fy=0", "fy"},
+        {"cx=nan", "cx"},
+        {"cy=1,2", "cy"},
+        {"width=0&height=0", "width"},
+        {"width=1000000&height=1000000", "width"},
+        {"width=8193", "width"},
+        {"height=-1", "height"},
+        {"width=10.5", "width"},
+        {"height=1e99", "height"},
+        {"height=", "height"},
+        {"near=0", "near"},
+        {"near=-1", "near"},
+        {"near=5&far=4", "far"},
+        {"far=inf", "far"},
+        {"near=x", "near"},
+        {"method=magic", "method"},
+        {"method=", "method"},
+        {"method=Splat", "method"},
+        {"layer=smell", "layer"},
+        {"lod=-1", "lod"},
+        {"lod=65", "lod"},
+        {"lod=1;2", "lod"},
+        {"supersample=3", "supersample"},
+        {"supersample=0", "supersample"},
+        {"margin=-1", "margin"},
+        {"margin=99", "margin"},
+        {"format=gif", "format"},
+        {"quality=0", "quality"},
+        {"quality=101", "quality"},
+        {"quality=90.5", "quality"},
+        {"background=red", "background"},
+        {"background=12345", "background"},
+        {"background=%231234567", "background"},
+        {"BackgroundColor=0xGG0000", "BackgroundColor"},
+        {"transparent=maybe", "transparent"},
+        {"depth_scale=0", "depth_scale"},
+        {"depth_scale=-1000", "depth_scale"},
+        {"depth_scale=1e300", "depth_scale"},
+        {"smell=1", "smell"},
+        {"=1", ""},
+        {"matrix=1", "matrix"},
+        {"q=1,0,0,0", "q"},
+        {"model=PINHOLE", "model"},
+        {"width=%3", "width"},
+        {"width=%", "width"},
+        {"width=%zz", "width"},
+        {"width=%00", "width"},
+        {"%zz=1", "a parameter's name"},
+        {"width=1%0a2", "width"},
+        {"Eye=1,2,3", "Eye"},
     };
     assert_refused(query, refusals, sizeof refusals / sizeof *refusals);
     char text[2000] = "eye=";
@@ -171,26 +236,47 @@ static void bodies_are_refused_by_name(void **state)
 {
     (void)state;
     static const struct refusal refusals[] = {
-        {"{", "body"}, {"[]", "body"}, {"null", "body"}, {"{}x", "body"}, {"{\"width\":1,\"width\":2}", "body"},
-        {"{\"lod\":NaN}", "body"}, {"{\"lod\":1e999}", "body"}, {"{\"width\":99999999999999999999}", "body"},
-        {"{\"smell\":1}", "smell"}, {"{\"eye\":[1,2,3]}", "eye"}, {"{\"camera\":{\"quality\":3}}", "quality"},
-        {"{\"camera\":[]}", "camera"}, {"{\"camera\":null}", "camera"}, {"{\"camera\":{\"POC\":[1,2,3]}}", "POC"},
-        {"{\"camera\":{\"eye\":\"1,2,3\"}}", "eye"}, {"{\"camera\":{\"eye\":[1,2]}}", "eye"},
-        {"{\"camera\":{\"eye\":[1,2,\"3\"]}}", "eye"}, {"{\"camera\":{\"eye\":[1,2,null]}}", "eye"},
-        {"{\"width\":\"640\"}", "width"}, {"{\"width\":[640]}", "width"}, {"{\"width\":true}", "width"},
-        {"{\"width\":640,\"camera\":{\"width\":640}}", "width"}, {"{\"layer\":1}", "layer"},
-        {"{\"transparent\":1}", "transparent"}, {"{\"transparent\":\"true\"}", "transparent"},
-        {"{\"background\":[1,2,3]}", "background"}, {"{\"camera\":{\"matrix\":[1,2,3],\"convention\":\"opencv\"}}", "matrix"},
+        {"{", "body"},
+        {"[]", "body"},
+        {"null", "body"},
+        {"{}x", "body"},
+        {"{\"width\":1,\"width\":2}", "body"},
+        {"{\"lod\":NaN}", "body"},
+        {"{\"lod\":1e999}", "body"},
+        {"{\"width\":99999999999999999999}", "body"},
+        {"{\"smell\":1}", "smell"},
+        {"{\"eye\":[1,2,3]}", "eye"},
+        {"{\"camera\":{\"quality\":3}}", "quality"},
+        {"{\"camera\":[]}", "camera"},
+        {"{\"camera\":null}", "camera"},
+        {"{\"camera\":{\"POC\":[1,2,3]}}", "POC"},
+        {"{\"camera\":{\"eye\":\"1,2,3\"}}", "eye"},
+        {"{\"camera\":{\"eye\":[1,2]}}", "eye"},
+        {"{\"camera\":{\"eye\":[1,2,\"3\"]}}", "eye"},
+        {"{\"camera\":{\"eye\":[1,2,null]}}", "eye"},
+        {"{\"width\":\"640\"}", "width"},
+        {"{\"width\":[640]}", "width"},
+        {"{\"width\":true}", "width"},
+        {"{\"width\":640,\"camera\":{\"width\":640}}", "width"},
+        {"{\"layer\":1}", "layer"},
+        {"{\"transparent\":1}", "transparent"},
+        {"{\"transparent\":\"true\"}", "transparent"},
+        {"{\"background\":[1,2,3]}", "background"},
+        {"{\"camera\":{\"matrix\":[1,2,3],\"convention\":\"opencv\"}}", "matrix"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}", "convention"},
         {"{\"camera\":{\"convention\":\"opengl\"}}", "matrix"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"directx\"}}", "convention"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1],\"convention\":\"opengl\"}}", "matrix"},
         {"{\"camera\":{\"matrix\":[2,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"opengl\"}}", "matrix"},
-        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"opengl\",\"eye\":[1,2,3]}}", "eye"},
-        {"{\"camera\":{\"q\":[1,0,0,0]}}", "t"}, {"{\"camera\":{\"t\":[0,0,0]}}", "q"},
-        {"{\"camera\":{\"q\":[0,0,0,0],\"t\":[0,0,0]}}", "q"}, {"{\"camera\":{\"q\":[1,0,0],\"t\":[0,0,0]}}", "q"},
+        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"opengl\",\"eye\":[1,2,3]}}",
+         "eye"},
+        {"{\"camera\":{\"q\":[1,0,0,0]}}", "t"},
+        {"{\"camera\":{\"t\":[0,0,0]}}", "q"},
+        {"{\"camera\":{\"q\":[0,0,0,0],\"t\":[0,0,0]}}", "q"},
+        {"{\"camera\":{\"q\":[1,0,0],\"t\":[0,0,0]}}", "q"},
         {"{\"camera\":{\"q\":[1,0,0,0],\"t\":[0,0,0],\"up\":[0,0,1]}}", "up"},
-        {"{\"camera\":{\"model\":\"PINHOLE\"}}", "params"}, {"{\"camera\":{\"params\":[1,2,3]}}", "model"},
+        {"{\"camera\":{\"model\":\"PINHOLE\"}}", "params"},
+        {"{\"camera\":{\"params\":[1,2,3]}}", "model"},
         {"{\"camera\":{\"model\":\"FISHEYE\",\"params\":[1,2,3]}}", "model"},
         {"{\"camera\":{\"model\":\"PINHOLE\",\"params\":[1,2,3]}}", "params"},
         {"{\"camera\":{\"model\":\"RADIAL\",\"params\":[500,2,3,0.1,0]}}", "params"},
@@ -214,19 +300,17 @@ static void percent_decoding_is_exact(void **state)
     assert_string_equal(out, "A/b+");
     assert_int_equal(spl_percent_decode("1234567", 7, out, sizeof out, "id", &err), 0);
     assert_int_equal(spl_percent_decode("12345678", 8, out, sizeof out, "id", &err), SPL_E_INPUT);
-    for (const char *const *bad = (const char *const[]){"%", "%4", "%4g", "%g4", "a%", "\x7f", "%1f", NULL}; *bad; bad++)
+    for (const char *const *bad = (const char *const[]){"%", "%4", "%4g", "%g4", "a%", "\x7f", "%1f", NULL}; *bad;
+         bad++)
         assert_int_equal(spl_percent_decode(*bad, strlen(*bad), out, sizeof out, "id", NULL), SPL_E_INPUT);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_given_is_the_default_view),
-        cmocka_unit_test(every_parameter_arrives),
-        cmocka_unit_test(ogc_names_mean_the_same),
-        cmocka_unit_test(camera_forms_agree),
-        cmocka_unit_test(queries_are_refused_by_name),
-        cmocka_unit_test(bodies_are_refused_by_name),
+        cmocka_unit_test(nothing_given_is_the_default_view), cmocka_unit_test(every_parameter_arrives),
+        cmocka_unit_test(ogc_names_mean_the_same),           cmocka_unit_test(camera_forms_agree),
+        cmocka_unit_test(queries_are_refused_by_name),       cmocka_unit_test(bodies_are_refused_by_name),
         cmocka_unit_test(percent_decoding_is_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
