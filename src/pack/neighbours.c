@@ -16,9 +16,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { leaf = SPL_NEAR_LEAF, fan = 8, levels_max = 12, stack_max = levels_max * fan,
+enum { lanes = 4, leaf = SPL_NEAR_LEAF, fan = 8, levels_max = 12, stack_max = levels_max * fan,
     spare = 40,                       /* candidates beyond the wanted ones that wait for a reduction */
-    buffer_max = SPL_NEIGHBOURS_MAX + 1 + spare + leaf };
+    buffer_max = (SPL_NEIGHBOURS_MAX + 1 + spare + leaf + lanes - 1) / lanes * lanes };
 _Static_assert((int)leaf <= (int)SPL_POINTS_PAD, "the last leaf is read whole");
 
 struct group {
@@ -124,7 +124,6 @@ void spl_neighbours_destroy(struct spl_neighbours *neighbours)
 /* Four doubles, unaligned in memory; comparisons give masks. */
 typedef double vec __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t mask __attribute__((vector_size(32), aligned(8), may_alias));
-enum { lanes = 4 };
 #define SPLAT(v) ((vec){v, v, v, v})
 
 /* How many of `n` values, padded with infinity to whole lanes, are at most `limit`. */

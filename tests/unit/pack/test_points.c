@@ -1,0 +1,332 @@
+/* Order, duplicates, neighbours, normals, radii: each against brute force or a closed form. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "clouds.h"
+#include "geom/morton.h"
+#include "pack/neighbours.h"
+#include "pack/order.h"
+
+static int compare_places(const void *a, const void *b)
+{
+    return memcmp(a, b, 3 * sizeof(double));
+}
+
+static struct spl_points sorted(const double (*position)[3], size_t count, unsigned threads)
+{
+    struct spl_points p = cloud_of(position, count);
+    struct spl_stage stage = quiet_stage(threads);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    return p;
+}
+
+static void test_order_sorts_and_drops(void **state)
+{
+    (void)state;
+    for (int shape = 0; shape < SHAPES; shape++) {
+        size_t count = 20000;
+        double(*position)[3] = shape_points((enum shape)shape, count, 1);
+        struct spl_points p = sorted((const double(*)[3])position, count, 2);
+        for (size_t i = 1; i < p.count; i++)
+            assert_true(spl_points_key(&p, i - 1) <= spl_points_key(&p, i));
+        for (size_t i = 0; i < p.count; i++)
+            for (int c = 0; c < 3; c++)
+                assert_true(p.axis[c][i] == position[p.color_class[i]][c]);
+        /* Exactly the distinct places are left. */
+        double(*places)[3] = malloc(count * sizeof *places);
+        memcpy(places, position, count * sizeof *places);
+        qsort(places, count, sizeof *places, compare_places);
+        size_t distinct = 1;
+        for (size_t i = 1; i < count; i++)
+            distinct += compare_places(places[i - 1], places[i]) != 0;
+        assert_int_equal(p.count, distinct);
+        assert_int_equal(p.duplicates, count - distinct);
+        free(places);
+        free(position);
+        spl_points_finish(&p);
+    }
+}
+
+static void test_first_duplicate_stays(void **state)
+{
+    (void)state;
+    double position[300][3];
+    for (int i = 0; i < 300; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = i % 3;
+    struct spl_points p = sorted((const double(*)[3])position, 300, 1);
+    assert_int_equal(p.count, 3);
+    for (size_t i = 0; i < 3; i++)
+        assert_int_equal(p.color_class[i], i);
+    spl_points_finish(&p);
+}
+
+/* Thousands of points in a cell that the keys cannot divide keep a spatial order, and double places are still found. */
+static void test_order_below_key_resolution(void **state)
+{
+    (void)state;
+    enum { count = 20001 };
+    double(*position)[3] = malloc(count * sizeof *position);
+    uint64_t random = 5;
+    for (size_t i = 0; i < count - 1; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = i % 2 ? position[i - 1][c] : 1e-3 * uniform(&random);
+    position[count - 1][0] = position[count - 1][1] = position[count - 1][2] = 1e9;
+    struct spl_points p = sorted((const double(*)[3])position, count, 2);
+    assert_int_equal(p.count, (count - 1) / 2 + 1);
+    double steps = 0;
+    for (size_t i = 1; i < p.count - 1; i++)
+        for (int c = 0; c < 3; c++)
+            steps += fabs(p.axis[c][i] - p.axis[c][i - 1]);
+    assert_true(steps / (double)p.count < 0.3e-3); /* 1e-3 on the average without any order */
+    free(position);
+    spl_points_finish(&p);
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double squared_distance(const struct spl_points *p, size_t i, size_t j)
+{
+    double d = 0;
+    for (int c = 0; c < 3; c++)
+        d += (p->axis[c][i] - p->axis[c][j]) * (p->axis[c][i] - p->axis[c][j]);
+    return d;
+}
+
+static void check_neighbours(const struct spl_points *p, unsigned k, size_t step)
+{
+    struct spl_neighbours *n = spl_neighbours_create(p, 2, NULL);
+    double *all = malloc(p->count * sizeof *all);
+    struct spl_nearest nearest;
+    spl_nearest_init(&nearest);
+    for (size_t i = 0; i < p->count; i += step) {
+        spl_neighbours_find(n, i, k, &nearest);
+        unsigned expected = k < p->count - 1 ? k : (unsigned)p->count - 1;
+        assert_int_equal(nearest.count, expected);
+        size_t others = 0;
+        for (size_t j = 0; j < p->count; j++)
+            if (j != i)
+                all[others++] = squared_distance(p, i, j);
+        qsort(all, others, sizeof *all, compare_doubles);
+        double found[SPL_NEIGHBOURS_MAX];
+        for (unsigned a = 0; a < expected; a++) {
+            assert_true(nearest.index[a] != i && nearest.index[a] < p->count);
+            assert_true(nearest.squared[a] == squared_distance(p, nearest.index[a], i));
+            found[a] = nearest.squared[a];
+            for (unsigned b = 0; b < a; b++)
+                assert_true(nearest.index[a] != nearest.index[b]);
+        }
+        qsort(found, expected, sizeof *found, compare_doubles);
+        for (unsigned a = 0; a < expected; a++)
+            assert_true(found[a] == all[a]);
+        assert_true(nearest.farthest == sqrt(all[expected - 1]));
+    }
+    free(all);
+    spl_neighbours_destroy(n);
+}
+
+static void test_neighbours_against_brute_force(void **state)
+{
+    (void)state;
+    static const unsigned ks[] = {1, 12, 36, SPL_NEIGHBOURS_MAX};
+    static const size_t counts[] = {2, 3, 13, 17, 130, 4000};
+    for (int shape = 0; shape < SHAPES; shape++)
+        for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+            double(*position)[3] = shape_points((enum shape)shape, counts[c], 11);
+            struct spl_points p = sorted((const double(*)[3])position, counts[c], 1);
+            for (size_t k = 0; k < sizeof ks / sizeof *ks; k++)
+                check_neighbours(&p, ks[k], counts[c] > 1000 ? 37 : 1);
+            free(position);
+            spl_points_finish(&p);
+        }
+}
+
+static void surface(struct spl_points *p, unsigned threads)
+{
+    struct spl_stage stage = quiet_stage(threads);
+    assert_int_equal(spl_surface(p, 12, &stage, NULL), 0);
+    for (size_t i = 0; i < p->count; i++) {
+        double length = 0;
+        for (int c = 0; c < 3; c++)
+            length += p->normal[i][c] * p->normal[i][c];
+        assert_true(fabs(length - 1) < 1e-5);
+        assert_true(p->radius[i] > 0 && isfinite(p->radius[i]));
+        assert_true(p->uncertainty[i] >= 0 && isfinite(p->uncertainty[i]));
+    }
+}
+
+static void test_normals_of_a_sphere(void **state)
+{
+    (void)state;
+    size_t count = 150000; /* several blocks, so that signs must agree between them */
+    double(*position)[3] = shape_points(SHAPE_SPHERE, count, 3);
+    struct spl_points p = sorted((const double(*)[3])position, count, 2);
+    surface(&p, 2);
+    double error = 0, outward = 0;
+    for (size_t i = 0; i < p.count; i++) {
+        double dot = 0;
+        for (int c = 0; c < 3; c++)
+            dot += p.normal[i][c] * p.axis[c][i];
+        outward += dot > 0;
+        error += acos(fmin(1, fabs(dot)));
+    }
+    assert_true(error / (double)p.count * 180 / M_PI < 0.5);
+    assert_true(outward == 0 || outward == (double)p.count);
+    free(position);
+    spl_points_finish(&p);
+}
+
+/* The same sphere seen by a scanner inside: normals look inwards. */
+static void test_normals_face_the_station(void **state)
+{
+    (void)state;
+    size_t count = 5000;
+    double(*position)[3] = shape_points(SHAPE_SPHERE, count, 4);
+    struct spl_points p = cloud_of((const double(*)[3])position, count);
+    p.station = calloc(count + SPL_POINTS_PAD, sizeof *p.station);
+    p.stations = calloc(1, sizeof *p.stations);
+    p.stations[0][3] = 0.2; /* off the centre */
+    p.station_count = 1;
+    struct spl_stage stage = quiet_stage(2);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    surface(&p, 2);
+    for (size_t i = 0; i < p.count; i++)
+        assert_true(p.normal[i][0] * p.axis[0][i] + p.normal[i][1] * p.axis[1][i] + p.normal[i][2] * p.axis[2][i] < 0);
+    free(position);
+    spl_points_finish(&p);
+}
+
+static void test_given_normals_stay(void **state)
+{
+    (void)state;
+    size_t count = 1000;
+    double(*position)[3] = shape_points(SHAPE_PLANE, count, 6);
+    struct spl_points p = cloud_of((const double(*)[3])position, count);
+    p.normal = calloc(count + SPL_POINTS_PAD, sizeof *p.normal);
+    for (size_t i = 0; i < count; i += 2)
+        p.normal[i][2] = -1;
+    struct spl_stage stage = quiet_stage(1);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    surface(&p, 1);
+    for (size_t i = 0; i < p.count; i++) {
+        if (p.color_class[i] % 2 == 0)
+            assert_true(p.normal[i][2] == -1);
+        else /* the others agree with them */
+            assert_true(p.normal[i][2] < -0.9);
+    }
+    free(position);
+    spl_points_finish(&p);
+}
+
+/* On a square grid of spacing h the twelve nearest reach to 2 h: r = 2 sqrt(4 / 12) h. */
+static void test_radius_of_a_grid(void **state)
+{
+    (void)state;
+    size_t count = 10000;
+    double(*position)[3] = shape_points(SHAPE_GRID, count, 1);
+    struct spl_points p = sorted((const double(*)[3])position, count, 2);
+    surface(&p, 2);
+    for (size_t i = 0; i < p.count; i++) {
+        double x = p.axis[0][i], y = p.axis[1][i];
+        assert_true(p.radius[i] < 0.16);
+        if (x > 0.35 && x < 9.55 && y > 0.35 && y < 9.55) {
+            assert_true(fabs(p.radius[i] - 0.1154701) < 1e-4);
+            assert_true(fabs(p.uncertainty[i] - p.radius[i]) < 1e-4); /* eq. 21: all normals agree */
+        }
+    }
+    free(position);
+    spl_points_finish(&p);
+}
+
+/* A point that floats beside a surface, a flock of strays far off, and a wire must not become blobs. */
+static void test_no_blobs(void **state)
+{
+    (void)state;
+    enum { grid = 10000, flock = 40, wire = 200, count = grid + flock + wire + 1 };
+    double(*position)[3] = shape_points(SHAPE_GRID, count, 1);
+    uint64_t random = 9;
+    for (size_t i = grid; i < grid + flock; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = 20 + 40 * uniform(&random);
+    for (size_t i = grid + flock; i < count - 1; i++) {
+        position[i][0] = 0.05 * (double)(i - grid - flock);
+        position[i][1] = 5;
+        position[i][2] = 4 + 1e-3 * uniform(&random);
+    }
+    position[count - 1][0] = position[count - 1][1] = 5.02;
+    position[count - 1][2] = 2;
+    struct spl_points p = sorted((const double(*)[3])position, count, 1);
+    surface(&p, 1);
+    for (size_t i = 0; i < p.count; i++) {
+        uint32_t who = p.color_class[i];
+        if (who == count - 1)
+            assert_true(p.radius[i] < 0.3);
+        else if (who >= grid + flock)
+            assert_true(p.radius[i] < 0.08); /* 0.17 by eq. 20, and twice that at the ends */
+        else if (who >= grid)
+            assert_true(p.radius[i] < 1); /* 12 neighbours in tens of metres: 6 m by eq. 20 */
+    }
+    free(position);
+    spl_points_finish(&p);
+}
+
+static void test_degenerate_surfaces(void **state)
+{
+    (void)state;
+    for (int shape = 0; shape < SHAPES; shape++)
+        for (size_t count = 1; count < 20; count++) {
+            double(*position)[3] = shape_points((enum shape)shape, count, count);
+            struct spl_points p = sorted((const double(*)[3])position, count, 2);
+            surface(&p, 2);
+            free(position);
+            spl_points_finish(&p);
+        }
+}
+
+static void test_threads_do_not_matter(void **state)
+{
+    (void)state;
+    for (int shape = 0; shape < SHAPES; shape++) {
+        size_t count = 140000;
+        double(*position)[3] = shape_points((enum shape)shape, count, 8);
+        struct spl_points a = sorted((const double(*)[3])position, count, 1);
+        struct spl_points b = sorted((const double(*)[3])position, count, 3);
+        surface(&a, 1);
+        surface(&b, 3);
+        assert_int_equal(a.count, b.count);
+        assert_memory_equal(a.color_class, b.color_class, a.count * sizeof *a.color_class);
+        assert_memory_equal(a.normal, b.normal, a.count * sizeof *a.normal);
+        assert_memory_equal(a.radius, b.radius, a.count * sizeof *a.radius);
+        assert_memory_equal(a.uncertainty, b.uncertainty, a.count * sizeof *a.uncertainty);
+        free(position);
+        spl_points_finish(&a);
+        spl_points_finish(&b);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_order_sorts_and_drops),
+        cmocka_unit_test(test_first_duplicate_stays),
+        cmocka_unit_test(test_order_below_key_resolution),
+        cmocka_unit_test(test_neighbours_against_brute_force),
+        cmocka_unit_test(test_normals_of_a_sphere),
+        cmocka_unit_test(test_normals_face_the_station),
+        cmocka_unit_test(test_given_normals_stay),
+        cmocka_unit_test(test_radius_of_a_grid),
+        cmocka_unit_test(test_no_blobs),
+        cmocka_unit_test(test_degenerate_surfaces),
+        cmocka_unit_test(test_threads_do_not_matter),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
