@@ -13,7 +13,7 @@
 struct ptx {
     uint64_t cells, taken; /* of the current station */
     unsigned fields;       /* values of a cell of this station, 0 before its first */
-    unsigned first_fields; /* of the file's first station */
+    unsigned first_fields; /* of the file's first station with cells */
     size_t station_capacity;
     double pose[16]; /* row-major, station to world */
 };
@@ -244,13 +244,15 @@ static int ptx_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
     return SPL_OK;
 }
 
-/* Looks at the first station and its first cell, which say what the file holds. */
+/* Looks at the first cell of the first station that has any, which says what the file holds. */
 static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct ptx *ptx = cloud->state = spl_alloc(1, sizeof *ptx, err);
     int code = ptx ? take_header(cloud, err) : SPL_E_NOMEM;
     cloud->rows.count = 0;
-    if (code > 0 && ptx->cells > 0)
+    while (code > 0 && ptx->cells == 0)
+        code = take_header(cloud, err);
+    if (code > 0)
         code = take_cell(cloud, &cloud->rows, err);
     if (code < 0)
         return code;

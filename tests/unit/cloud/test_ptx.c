@@ -68,6 +68,7 @@ static void odd_but_sound_files_load(void **state)
     assert_int_equal(l.points, 1); /* a station without cells */
     assert_int_equal(l.station_count, 2);
     assert_int_equal(l.first.station[0], 1);
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR | SPL_CLOUD_STATION);
     loaded_finish(&l);
 }
 
