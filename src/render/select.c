@@ -11,6 +11,10 @@
 
 enum { stack_max = 8 * 64 };
 
+/* Clusters lie more evenly than scanned points: a tenth less radius covers them, with a fifth fewer fragments. Against a
+ * 16 times supersampled frame of a vault at lod 2 this changes PSNR by -0.1 to +0.2 dB and holes from 0.15 to 0.26 %. */
+static const double cluster_radius_share = 0.9;
+
 struct walk {
     const struct spl_select_params *params;
     struct spl_draw_list *list;
@@ -47,7 +51,7 @@ static struct spl_chunk_bounds occlusion_bounds(const struct spl_camera *camera,
 }
 
 static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
-                      struct spl_error *err)
+                      double radius_share, struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
     double origin[3], size[3];
@@ -59,7 +63,7 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     struct spl_view_box box = spl_view_box(camera, origin, size);
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
-    double scale = sqrt((double)chunk->count / count);
+    double scale = sqrt((double)chunk->count / count) * radius_share;
     double radius_codes = (1u << (chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15u)) - 1;
     double radius = (chunk->radius_min + chunk->radius_step * radius_codes) * scale;
     for (int i = 0; i < 3; i++)
@@ -101,8 +105,10 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
 static int draw_node(struct walk *w, const struct spl_node *node, const double node_to_eye[3], struct spl_error *err)
 {
     w->list->nodes++;
+    double radius_share = node->child_count ? cluster_radius_share : 1;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
-        int rc = draw_chunk(w, node_to_eye, &w->chunks[node->first_chunk + i], node->page, err);
+        int rc = draw_chunk(w, node_to_eye, &w->chunks[node->first_chunk + i], node->page,
+                            radius_share, err);
         if (rc)
             return rc;
     }
