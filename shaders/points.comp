@@ -21,24 +21,19 @@ layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
 layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint payloads[]; };
 #endif
 
-uint payload(splat s)
+uint payload(spl_draw_chunk chunk, splat s)
 {
     if (GROUP == SPL_SUMS_COLOR) {
-        uvec3 c = load_color(s);
+        uvec3 c = load_color(chunk, s.index);
         return c.x | c.y << 8 | c.z << 16;
     }
     if (GROUP == SPL_SUMS_NORMAL)
         return pack_normal(s.normal);
-    return draw_chunks[s.chunk].first_id + s.index;
+    return chunk.first_id + s.index;
 }
 
-void main()
+void draw(spl_draw_chunk chunk, splat s)
 {
-    uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
-    splat s;
-    if (entry >= frame.entries ||
-        !load_splat(entry, gl_GlobalInvocationID.x % SPL_GROUP_SPLATS, GROUP != SPL_SUMS_NORMAL, s))
-        return;
     vec3 p = s.position;
     if (!(p.z >= frame.near && p.z <= frame.far))
         return;
@@ -48,13 +43,20 @@ void main()
     uint at = sample_index(ivec2(center)), bits = floatBitsToUint(p.z);
 #ifdef SPL_ATOMICS_64
     if (bits <= uint(depth[at] >> 32))
-        atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload(s)));
+        atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload(chunk, s)));
 #else
     if (PASS == 0) {
         if (bits < depth[at])
             atomicMin(depth[at], bits);
     } else if (bits == depth[at]) {
-        atomicMin(payloads[at], payload(s));
+        atomicMin(payloads[at], payload(chunk, s));
     }
 #endif
+}
+
+void main()
+{
+    splat_run run = load_splat_run();
+    for (uint i = run.first; i < run.end; i += SPL_LANES)
+        draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
 }

@@ -19,9 +19,12 @@
 
 /* A chunk: the unit of culling and decoding. Its splats lie in pruning order: the first n are an even subsample. */
 #define SPL_CHUNK_SPLATS 128
-/* A draw-list entry is a dense group of splats of one chunk: chunk index << 4 | group. */
-#define SPL_GROUP_SPLATS 8
-#define SPL_GROUP_BITS 4
+/* A draw-list entry is a run of splats of one chunk: chunk index << 2 | run. SPL_LANES invocations share an entry and draw
+ * its splats in steps, so that the chunk's header is loaded once for several splats. Counts are multiples of SPL_LANES:
+ * an idle lane costs as much as a busy one on software drivers, whose subgroups have that many. */
+#define SPL_RUN_SPLATS 32
+#define SPL_RUN_BITS 2
+#define SPL_LANES 8
 #define SPL_WORKGROUP 64
 
 /* Every binding is a std430 storage buffer (a uniform block would pad arrays to 16 bytes an element); one numbering

@@ -7,12 +7,8 @@ layout(local_size_x = SPL_WORKGROUP) in;
 
 layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
 
-void main()
+void draw(splat s)
 {
-    uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
-    splat s;
-    if (entry >= frame.entries || !load_splat(entry, gl_GlobalInvocationID.x % SPL_GROUP_SPLATS, false, s))
-        return;
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
     disc d = make_disc(s);
@@ -25,4 +21,11 @@ void main()
         }
         next_sample(d, at);
     }
+}
+
+void main()
+{
+    splat_run run = load_splat_run();
+    for (uint i = run.first; i < run.end; i += SPL_LANES)
+        draw(load_splat(run.chunk, i, false));
 }

@@ -57,17 +57,13 @@ void shade(uint at, float first, float z, float distance, float pushed, uvec3 va
     }
 }
 
-void main()
+void draw(spl_draw_chunk chunk, splat s)
 {
-    uint entry = gl_GlobalInvocationID.x / SPL_GROUP_SPLATS;
-    splat s;
-    if (entry >= frame.entries || !load_splat(entry, gl_GlobalInvocationID.x % SPL_GROUP_SPLATS, false, s))
-        return;
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
     uvec3 value = uvec3(0u);
     if (GROUP == SPL_SUMS_COLOR)
-        value = load_color(s);
+        value = load_color(chunk, s.index);
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s);
@@ -79,8 +75,15 @@ void main()
         if (distance < 1.0) {
             float first = uintBitsToFloat(depth[at]);
             if (z <= first)
-                shade(at, first, z, distance, z + d.margin, value, draw_chunks[s.chunk].first_id + s.index);
+                shade(at, first, z, distance, z + d.margin, value, chunk.first_id + s.index);
         }
         next_sample(d, sample_at);
     }
+}
+
+void main()
+{
+    splat_run run = load_splat_run();
+    for (uint i = run.first; i < run.end; i += SPL_LANES)
+        draw(run.chunk, load_splat(run.chunk, i, false));
 }

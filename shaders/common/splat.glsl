@@ -12,8 +12,13 @@ struct splat {
     vec3 position; /* view space */
     vec3 normal;   /* view space, unit */
     float radius;
-    uint chunk;    /* index into draw_chunks */
     uint index;    /* within the chunk */
+};
+
+/* A run of splats of one chunk: what an invocation draws every SPL_LANES-th splat of. */
+struct splat_run {
+    spl_draw_chunk chunk;
+    uint first, end;
 };
 
 /* A run of codes in registers: a load from memory costs more than the shifts that take a code off the low end. */
@@ -77,16 +82,29 @@ vec3 rotate_to_view(vec3 v)
     return r;
 }
 
-/* False for the idle lanes behind a chunk's or the list's end. `geometry_only` splats have no normal and radius. */
-bool load_splat(uint entry, uint lane, bool position_only, out splat s)
+/* The invocation's run; empty behind the list's end. */
+splat_run load_splat_run()
 {
-    uint packed_entry = draw_entries[frame.first_entry + entry];
-    s.chunk = packed_entry >> SPL_GROUP_BITS;
-    s.index = (packed_entry & ((1u << SPL_GROUP_BITS) - 1u)) * SPL_GROUP_SPLATS + lane;
-    if (s.index >= draw_chunks[s.chunk].count)
-        return false;
+    splat_run r;
+    r.first = 0u;
+    r.end = 0u;
+    uint entry = gl_GlobalInvocationID.x / SPL_LANES;
+    if (entry < frame.entries) {
+        uint packed_entry = draw_entries[frame.first_entry + entry];
+        r.chunk = draw_chunks[packed_entry >> SPL_RUN_BITS];
+        uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_SPLATS;
+        r.first = first + gl_GlobalInvocationID.x % SPL_LANES;
+        r.end = min(first + SPL_RUN_SPLATS, r.chunk.count);
+    }
+    return r;
+}
 
-    uint widths = draw_chunks[s.chunk].geometry_bits, word = draw_chunks[s.chunk].geometry_word;
+/* Splat `index` of `chunk`. With `position_only` it has no normal and radius. */
+splat load_splat(spl_draw_chunk chunk, uint index, bool position_only)
+{
+    splat s;
+    s.index = index;
+    uint widths = chunk.geometry_bits, word = chunk.geometry_word;
     uint nx = bitfieldExtract(widths, SPL_GEOMETRY_X, 5), ny = bitfieldExtract(widths, SPL_GEOMETRY_Y, 5);
     uint nz = bitfieldExtract(widths, SPL_GEOMETRY_Z, 5), nu = bitfieldExtract(widths, SPL_GEOMETRY_U, 4);
     uint nv = bitfieldExtract(widths, SPL_GEOMETRY_V, 4), nr = bitfieldExtract(widths, SPL_GEOMETRY_RADIUS, 4);
@@ -96,34 +114,34 @@ bool load_splat(uint entry, uint lane, bool position_only, out splat s)
     code.x = float(take(run, nx));
     code.y = float(take(run, ny));
     code.z = float(take(run, nz));
-    precise vec3 offset = rotate_to_view(code * draw_chunks[s.chunk].step);
-    s.position = vec3(draw_chunks[s.chunk].origin_x, draw_chunks[s.chunk].origin_y, draw_chunks[s.chunk].origin_z) +
+    precise vec3 offset = rotate_to_view(code * chunk.step);
+    s.position = vec3(chunk.origin_x, chunk.origin_y, chunk.origin_z) +
                  offset;
     s.normal = vec3(0.0);
     s.radius = 0.0;
     if (position_only)
-        return true;
+        return s;
     precise vec2 e;
-    e.x = draw_chunks[s.chunk].normal_u + draw_chunks[s.chunk].normal_step * float(take(run, nu));
-    e.y = draw_chunks[s.chunk].normal_v + draw_chunks[s.chunk].normal_step * float(take(run, nv));
+    e.x = chunk.normal_u + chunk.normal_step * float(take(run, nu));
+    e.y = chunk.normal_v + chunk.normal_step * float(take(run, nv));
     vec3 n = octahedral_decode(e);
     uint axis = bitfieldExtract(widths, SPL_GEOMETRY_AXIS, 2);
     n = axis == 0u ? n.zxy : axis == 1u ? n.yzx : n;
     s.normal = rotate_to_view(bitfieldExtract(widths, SPL_GEOMETRY_AXIS + 2, 1) != 0u ? -n : n);
-    precise float radius = draw_chunks[s.chunk].radius_min + draw_chunks[s.chunk].radius_step *
+    precise float radius = chunk.radius_min + chunk.radius_step *
                            float(take(run, nr));
     s.radius = radius;
-    return true;
+    return s;
 }
 
 /* 8 bit sRGB, exact. */
-uvec3 load_color(splat s)
+uvec3 load_color(spl_draw_chunk chunk, uint index)
 {
-    uint widths = draw_chunks[s.chunk].color_bits, base = draw_chunks[s.chunk].color_base;
-    uint word = draw_chunks[s.chunk].color_word;
+    uint widths = chunk.color_bits, base = chunk.color_base;
+    uint word = chunk.color_word;
     uint ny = bitfieldExtract(widths, SPL_COLOR_Y, 4), nu = bitfieldExtract(widths, SPL_COLOR_U, 4);
     uint nv = bitfieldExtract(widths, SPL_COLOR_V, 4), length = ny + nu + nv;
-    bit_run run = load_run(word, s.index * length, length);
+    bit_run run = load_run(word, index * length, length);
     int y = int(bitfieldExtract(widths, SPL_COLOR_BASE_Y, 8) + take(run, ny));
     int u = bitfieldExtract(int(base), 0, 16) + int(take(run, nu));
     int v = bitfieldExtract(int(base), 16, 16) + int(take(run, nv));

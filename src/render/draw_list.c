@@ -22,9 +22,9 @@ static int grow(void **array, size_t *capacity, size_t wanted, size_t size, stru
     return SPL_OK;
 }
 
-static uint32_t groups(const struct spl_draw_chunk *chunk)
+static uint32_t runs(const struct spl_draw_chunk *chunk)
 {
-    return (chunk->count + SPL_GROUP_SPLATS - 1) / SPL_GROUP_SPLATS;
+    return (chunk->count + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
@@ -38,8 +38,8 @@ void spl_draw_list_clear(struct spl_draw_list *list)
 int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct spl_draw_chunk *chunk,
                       const struct spl_chunk_bounds *bounds, struct spl_error *err)
 {
-    if (list->entry_count + groups(chunk) > ENTRIES_MAX)
-        return spl_fail_field(err, SPL_E_LIMIT, "lod", "this view needs more than %u groups of splats; raise lod",
+    if (list->entry_count + runs(chunk) > ENTRIES_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, "lod", "this view needs more than %u runs of splats; raise lod",
                               ENTRIES_MAX);
     if (list->chunk_count == list->chunk_capacity) {
         size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a;
@@ -52,7 +52,7 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct sp
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
     list->page_of_chunk[list->chunk_count++] = page;
-    list->entry_count += groups(chunk);
+    list->entry_count += runs(chunk);
     list->splats += chunk->count;
     return SPL_OK;
 }
@@ -74,7 +74,7 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
             *batch = (uint32_t)list->batch_count;
             list->batches[list->batch_count++] = (struct spl_draw_batch){.page = list->page_of_chunk[i], .back = back};
         }
-        list->batches[*batch].entries += groups(&list->chunks[i]);
+        list->batches[*batch].entries += runs(&list->chunks[i]);
     }
     return SPL_OK;
 }
@@ -98,8 +98,8 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl
     for (size_t i = 0; i < list->chunk_count && !rc; i++) {
         bool back = i >= list->first_back_chunk;
         struct spl_draw_batch *batch = &list->batches[batch_of_page[(back ? pages : 0) + list->page_of_chunk[i]]];
-        for (uint32_t group = 0; group < groups(&list->chunks[i]); group++)
-            list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_GROUP_BITS | group;
+        for (uint32_t run = 0; run < runs(&list->chunks[i]); run++)
+            list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_RUN_BITS | run;
     }
     free(batch_of_page);
     return rc;

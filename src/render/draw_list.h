@@ -1,4 +1,4 @@
-/* What one tile of a frame draws: chunks, and their splats in dense groups of SPL_GROUP_SPLATS as the kernels take them.
+/* What one tile of a frame draws: chunks, and their splats in runs of SPL_RUN_SPLATS as the kernels take them.
  * Owned by the renderer; its arrays are reused from tile to tile. */
 #ifndef SPL_RENDER_DRAW_LIST_H
 #define SPL_RENDER_DRAW_LIST_H
@@ -21,7 +21,7 @@ struct spl_draw_batch {
 struct spl_draw_list {
     struct spl_draw_chunk *chunks;    /* visible chunks, roughly front to back */
     struct spl_chunk_bounds *bounds;  /* parallel to chunks */
-    uint32_t *entries;                /* chunk index << SPL_GROUP_BITS | group, batch after batch */
+    uint32_t *entries;                /* chunk index << SPL_RUN_BITS | run, batch after batch */
     struct spl_draw_batch *batches;   /* in the order in which their pages were first met */
     size_t first_back_chunk;          /* chunks from here on are of the back phase */
     size_t chunk_count, entry_count, batch_count;

@@ -24,7 +24,7 @@ struct walk {
     struct spl_occupancy occupancy;
 };
 
-/* The share of the chunk's splats that keeps them `lod` samples apart, as a count of whole groups. */
+/* The share of the chunk's splats that keeps them `lod` samples apart, as a count that fills the lanes. */
 static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_samples, double lod)
 {
     double fraction = lod > 0 ? spacing_samples / lod * (spacing_samples / lod) : 1;
@@ -32,7 +32,7 @@ static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_sample
         return chunk->count;
     if (fraction < 0.25)
         fraction = 0.25;
-    uint32_t count = (uint32_t)ceil(chunk->count * fraction / SPL_GROUP_SPLATS) * SPL_GROUP_SPLATS;
+    uint32_t count = (uint32_t)ceil(chunk->count * fraction / SPL_LANES) * SPL_LANES;
     return count < chunk->count ? count : chunk->count;
 }
 

@@ -70,7 +70,7 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
 int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases,
                              struct spl_error *err)
 {
-    enum { entries_per_workgroup = SPL_WORKGROUP / SPL_GROUP_SPLATS };
+    enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
     const struct spl_draw_list *list = &tile->renderer->list;
     uint64_t most = (uint64_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * entries_per_workgroup;
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];

@@ -168,10 +168,10 @@ static void for_each_disc(struct scene *s, bool shade)
         const struct spl_draw_batch *batch = &s->list.batches[b];
         size_t bytes;
         const uint32_t *page = spl_dataset_get_page(s->dataset, batch->page, &bytes);
-        for (uint32_t e = 0; e < batch->entries * SPL_GROUP_SPLATS; e++) {
-            uint32_t entry = s->list.entries[batch->first_entry + e / SPL_GROUP_SPLATS];
-            const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_GROUP_BITS];
-            uint32_t index = (entry & 15) * SPL_GROUP_SPLATS + e % SPL_GROUP_SPLATS;
+        for (uint32_t e = 0; e < batch->entries * SPL_RUN_SPLATS; e++) {
+            uint32_t entry = s->list.entries[batch->first_entry + e / SPL_RUN_SPLATS];
+            const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_RUN_BITS];
+            uint32_t index = (entry & 3) * SPL_RUN_SPLATS + e % SPL_RUN_SPLATS;
             if (index >= draw->count)
                 continue;
             const struct spl_chunk *chunk = find_chunk(chunks, chunk_count, draw->first_id);
