@@ -11,9 +11,6 @@
 #include "pack/chunks.h"
 
 enum { batch_nodes = 256 };
-/* Quantised radii and positions may stand out of the exact disc a little. */
-static const float box_slack = 1.1f;
-
 struct encoded {                 /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
@@ -78,6 +75,19 @@ static int compare_floats(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+/* The discs as they decode: codes may stand out by a step. */
+static void grow_box(struct spl_node *node, const struct spl_splat *splats, double (*position)[3],
+                     const struct spl_chunk *chunk)
+{
+    double slack = 1.001 * ((double)chunk->step + chunk->radius_step);
+    for (uint32_t i = 0; i < chunk->count; i++)
+        for (int c = 0; c < 3; c++) {
+            double reach = splats[i].radius + slack + 1e-6 * fabs(position[i][c]);
+            node->box_min[c] = fminf(node->box_min[c], (float)(position[i][c] - reach));
+            node->box_max[c] = fmaxf(node->box_max[c], (float)(position[i][c] + reach));
+        }
+}
+
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
 {
     const struct spl_tree_node *node = &e->tree->nodes[index];
@@ -92,10 +102,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
     for (uint32_t i = 0; i < count; i++) {
         float radius = leaf ? p->radius[node->begin + i] : node->splats[i].radius;
         for (int c = 0; c < 3; c++) {
-            float v = leaf ? (float)(p->axis[c][node->begin + i] - node->origin[c]) : node->splats[i].position[c];
-            w->items[i].position[c] = v;
-            header->box_min[c] = fminf(header->box_min[c], v - box_slack * radius);
-            header->box_max[c] = fmaxf(header->box_max[c], v + box_slack * radius);
+            w->items[i].position[c] =
+                leaf ? (float)(p->axis[c][node->begin + i] - node->origin[c]) : node->splats[i].position[c];
         }
         w->items[i].index = i;
         w->radii[i] = radius;
@@ -126,6 +134,7 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         struct spl_chunk_error error;
         uint32_t words = spl_chunk_encode(splats, (const double(*)[3])position, used, e->options, &out->chunks[c],
                                           w->words + out->word_count, &error);
+        grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
         out->error.position_over_radius += error.position_over_radius;

@@ -14,6 +14,8 @@
 #include "cloud/cloud.h"
 
 enum { batch_points = 65536 };
+/* Coordinates below it are 0: so is -0, and no two places are closer than floats relative to a node can tell. */
+static const double nothing = 1e-15;
 static const uint32_t grey = 0xb0b0b0; /* of points without any colour or intensity */
 
 static int grow(void **array, size_t capacity, size_t size, struct spl_error *err)
@@ -69,7 +71,7 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, uin
                 return spl_fail(err, SPL_E_INPUT, "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
                                 "file's scale and columns", path, (unsigned long long)(p->points_read + i), "xyz"[c], v,
                                 SPL_COORDINATE_MAX);
-            p->axis[c][at] = v + 0.0; /* -0 and 0 are the same place */
+            p->axis[c][at] = fabs(v) < nothing ? 0 : v;
         }
         uint32_t color = grey;
         if (attributes & SPL_CLOUD_COLOR)

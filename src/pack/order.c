@@ -66,11 +66,11 @@ static void find_cube(struct order *o)
     p->cube_size = p->cube_size > 0 ? nextafterf((float)p->cube_size, INFINITY) : 1;
 }
 
-uint64_t spl_points_key(const struct spl_points *points, size_t i)
+uint64_t spl_points_key(const struct spl_points *points, size_t i, const double low[3], double size)
 {
     uint32_t cell[3];
     for (int c = 0; c < 3; c++)
-        cell[c] = spl_morton_cell(points->axis[c][i], points->bounds_min[c], points->cube_size);
+        cell[c] = spl_morton_cell(points->axis[c][i], low[c], size);
     return spl_morton_encode(cell[0], cell[1], cell[2]);
 }
 
@@ -78,7 +78,7 @@ static void key_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
     for (size_t i = begin; i < end; i++) {
-        o->key[i] = spl_points_key(o->points, i);
+        o->key[i] = spl_points_key(o->points, i, o->points->bounds_min, o->points->cube_size);
         o->index[i] = (uint32_t)i;
     }
     spl_stage_add(o->stage, end - begin, worker);
@@ -133,32 +133,6 @@ static void radix_sort(struct order *o)
     }
 }
 
-static int compare_places(const struct spl_points *p, uint32_t a, uint32_t b)
-{
-    for (int c = 0; c < 3; c++)
-        if (p->axis[c][a] != p->axis[c][b])
-            return p->axis[c][a] < p->axis[c][b] ? -1 : 1;
-    return 0;
-}
-
-static void order_short_run(const struct spl_points *p, uint32_t *index, size_t n)
-{
-    for (size_t i = 1; i < n; i++) {
-        uint32_t moved = index[i];
-        size_t k = i;
-        for (; k > 0 && compare_places(p, index[k - 1], moved) > 0; k--)
-            index[k] = index[k - 1];
-        index[k] = moved;
-    }
-    uint32_t kept = index[0];
-    for (size_t i = 1; i < n; i++) {
-        if (compare_places(p, kept, index[i]) == 0)
-            index[i] = dropped;
-        else
-            kept = index[i];
-    }
-}
-
 struct pair {
     uint64_t key;
     uint32_t index;
@@ -177,10 +151,6 @@ static int compare_pairs(const void *a, const void *b)
 static void order_run(struct order *o, uint32_t *index, size_t n)
 {
     const struct spl_points *p = o->points;
-    if (n <= short_run) {
-        order_short_run(p, index, n);
-        return;
-    }
     double low[3], size = 0;
     for (int c = 0; c < 3; c++) {
         double high = low[c] = p->axis[c][index[0]];
@@ -196,17 +166,14 @@ static void order_run(struct order *o, uint32_t *index, size_t n)
             index[i] = dropped;
         return;
     }
-    struct pair *pairs = spl_alloc_raw(n, sizeof *pairs, NULL);
+    struct pair few[short_run], *many = n <= short_run ? NULL : spl_alloc_raw(n, sizeof *many, NULL);
+    struct pair *pairs = n <= short_run ? few : many;
     if (!pairs) {
         atomic_store(&o->failed, true);
         return;
     }
-    for (size_t i = 0; i < n; i++) {
-        uint32_t cell[3];
-        for (int c = 0; c < 3; c++)
-            cell[c] = spl_morton_cell(p->axis[c][index[i]], low[c], size);
-        pairs[i] = (struct pair){spl_morton_encode(cell[0], cell[1], cell[2]), index[i]};
-    }
+    for (size_t i = 0; i < n; i++)
+        pairs[i] = (struct pair){spl_points_key(p, index[i], low, size), index[i]};
     qsort(pairs, n, sizeof *pairs, compare_pairs);
     for (size_t i = 0; i < n; i++)
         index[i] = pairs[i].index;
@@ -216,7 +183,7 @@ static void order_run(struct order *o, uint32_t *index, size_t n)
         if (end - i > 1)
             order_run(o, index + i, end - i);
     }
-    free(pairs);
+    free(many);
 }
 
 /* A piece does the runs that begin in it. */

@@ -1,21 +1,29 @@
 /* Octree by binary search over Morton order: a node is a range of points, its children are the eight ranges of the next
  * three key bits. A cube whose points all lie in one octant is replaced by that octant, so a dense cluster in a wide cloud
- * costs no chain of nodes. Below the keys' resolution a range is split into eight equal parts, which are compact too
- * because equal keys are ordered among themselves. One thread; milliseconds. */
+ * costs no chain of nodes. Points of equal keys go on in the cube around themselves that spl_points_order() ordered them
+ * in. One thread; milliseconds. */
 #include "pack/tree.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
 #include "geom/morton.h"
 #include "pack/order.h"
 
-/* First point of [begin, end) whose key, above `shift`, is at least `prefix`. */
-static size_t lower_bound(const struct spl_points *points, size_t begin, size_t end, unsigned shift, uint64_t prefix)
+static uint64_t key_of(const struct spl_tree_node *node, const struct spl_points *points, size_t i)
 {
+    return spl_points_key(points, i, node->frame_low, node->frame_size);
+}
+
+/* First point of [begin, node->end) whose key, above `shift`, is at least `prefix`. */
+static size_t lower_bound(const struct spl_tree_node *node, const struct spl_points *points, size_t begin,
+                          unsigned shift, uint64_t prefix)
+{
+    size_t end = node->end;
     while (begin < end) {
         size_t middle = begin + (end - begin) / 2;
-        if (spl_points_key(points, middle) >> shift < prefix)
+        if (key_of(node, points, middle) >> shift < prefix)
             begin = middle + 1;
         else
             end = middle;
@@ -23,10 +31,32 @@ static size_t lower_bound(const struct spl_points *points, size_t begin, size_t 
     return begin;
 }
 
-/* The smallest cube of the octree that holds the node's points; returns its level, 0 = the whole cloud. */
-static unsigned shrink_cube(struct spl_tree_node *node, const struct spl_points *points)
+/* The cube around the node's points, as spl_points_order() takes it. */
+static void frame_points(struct spl_tree_node *node, const struct spl_points *points)
 {
-    uint64_t first = spl_points_key(points, node->begin), last = spl_points_key(points, node->end - 1);
+    node->frame_size = 0;
+    for (int c = 0; c < 3; c++) {
+        double low = points->axis[c][node->begin], high = low;
+        for (size_t i = node->begin; i < node->end; i++) {
+            low = fmin(low, points->axis[c][i]);
+            high = fmax(high, points->axis[c][i]);
+        }
+        node->frame_low[c] = low;
+        node->frame_size = fmax(node->frame_size, high - low);
+    }
+}
+
+/* The smallest cube of the octree that holds the node's points, in `parent`'s (NULL for the root); returns the shift of
+ * the key bits that divide it. */
+static unsigned shrink_cube(struct spl_tree_node *node, const struct spl_tree_node *parent,
+                            const struct spl_points *points)
+{
+    uint64_t first = key_of(node, points, node->begin), last = key_of(node, points, node->end - 1);
+    if (first == last && node->end - node->begin > 1) {
+        frame_points(node, points);
+        first = key_of(node, points, node->begin);
+        last = key_of(node, points, node->end - 1);
+    }
     unsigned level = SPL_MORTON_BITS;
     if (first != last)
         level = SPL_MORTON_BITS - 1 - (63 - (unsigned)__builtin_clzll(first ^ last)) / 3;
@@ -34,10 +64,13 @@ static unsigned shrink_cube(struct spl_tree_node *node, const struct spl_points 
     for (unsigned bit = 0; bit < level; bit++)
         for (unsigned c = 0; c < 3; c++)
             cell[c] = cell[c] << 1 | (first >> (3 * (SPL_MORTON_BITS - 1 - bit) + c) & 1);
-    node->size = points->cube_size / (double)(1u << level);
-    for (unsigned c = 0; c < 3; c++)
-        node->origin[c] = points->bounds_min[c] + cell[c] * node->size;
-    return level;
+    node->size = node->frame_size / (double)(1u << level);
+    for (unsigned c = 0; c < 3; c++) {
+        node->origin[c] = node->frame_low[c] + cell[c] * node->size;
+        if (parent) /* a cube around points may stand out of the cell that they lie in */
+            node->origin[c] = fmin(node->origin[c], parent->origin[c] + parent->size - node->size);
+    }
+    return level < SPL_MORTON_BITS ? 3 * (SPL_MORTON_BITS - 1 - level) : 0;
 }
 
 /* Whether floats relative to the cube are too coarse for its smallest splat: positions are kept to 2^-25 of the cube. */
@@ -49,8 +82,7 @@ static bool too_wide(const struct spl_tree_node *node, const struct spl_points *
     return node->size > smallest * (double)(1 << 18);
 }
 
-static int add_node(struct spl_tree *tree, size_t *capacity, size_t begin, size_t end, uint32_t depth,
-                    struct spl_error *err)
+static int add_node(struct spl_tree *tree, size_t *capacity, const struct spl_tree_node *node, struct spl_error *err)
 {
     if (tree->count == *capacity) {
         size_t wanted = *capacity ? *capacity * 2 : 64;
@@ -60,31 +92,33 @@ static int add_node(struct spl_tree *tree, size_t *capacity, size_t begin, size_
         tree->nodes = bigger;
         *capacity = wanted;
     }
-    tree->nodes[tree->count++] = (struct spl_tree_node){.begin = begin, .end = end, .depth = depth};
-    tree->levels = depth + 1 > tree->levels ? depth + 1 : tree->levels;
+    tree->nodes[tree->count++] = *node;
+    tree->levels = node->depth + 1 > tree->levels ? node->depth + 1 : tree->levels;
     return 0;
 }
 
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err)
 {
     size_t capacity = 0;
-    int rc = add_node(tree, &capacity, 0, points->count, 0, err);
+    struct spl_tree_node root = {.end = points->count, .frame_size = points->cube_size};
+    for (int c = 0; c < 3; c++)
+        root.frame_low[c] = points->bounds_min[c];
+    int rc = add_node(tree, &capacity, &root, err);
     for (uint32_t i = 0; !rc && i < tree->count; i++) {
         struct spl_tree_node node = tree->nodes[i];
-        unsigned level = shrink_cube(&node, points);
+        unsigned shift = shrink_cube(&node, i ? &tree->nodes[node.parent] : NULL, points);
         size_t count = node.end - node.begin, at = node.begin;
-        bool splits = level < SPL_MORTON_BITS && count > 1 && count <= SPL_LEAF_POINTS && too_wide(&node, points);
-        if (count > SPL_LEAF_POINTS || splits) {
+        if (count > SPL_LEAF_POINTS || (count > 1 && too_wide(&node, points))) {
+            struct spl_tree_node child = {.parent = i, .depth = node.depth + 1, .frame_size = node.frame_size};
+            for (int c = 0; c < 3; c++)
+                child.frame_low[c] = node.frame_low[c];
             node.first_child = tree->count;
-            unsigned shift = level < SPL_MORTON_BITS ? 3 * (SPL_MORTON_BITS - 1 - level) : 0;
-            uint64_t prefix = spl_points_key(points, node.begin) >> shift & ~(uint64_t)7;
+            uint64_t prefix = key_of(&node, points, node.begin) >> shift & ~(uint64_t)7;
             for (unsigned octant = 0; !rc && octant < 8; octant++) {
-                size_t end = level < SPL_MORTON_BITS
-                    ? lower_bound(points, at, node.end, shift, prefix + octant + 1)
-                    : node.begin + count * (octant + 1) / 8;
-                if (end > at)
-                    rc = add_node(tree, &capacity, at, end, node.depth + 1, err);
-                at = end;
+                child.begin = at;
+                child.end = at = lower_bound(&node, points, at, shift, prefix + octant + 1);
+                if (child.end > child.begin)
+                    rc = add_node(tree, &capacity, &child, err);
             }
             node.child_count = tree->count - node.first_child;
         } else {

@@ -16,8 +16,10 @@ struct spl_inner_splat {
 struct spl_tree_node {
     double origin[3];         /* least corner of its cube */
     double size;
+    double frame_low[3], frame_size; /* the cube that its points' keys are counted in, see pack/order.h */
     size_t begin, end;        /* points below it, in Morton order */
     uint32_t first_child, child_count; /* 0 children: a leaf */
+    uint32_t parent;
     uint32_t depth;           /* of the tree: cubes that hold all points of their parent are skipped */
     struct spl_inner_splat *splats; /* of an inner node, made by spl_levels_build() */
     uint32_t splat_count;     /* leaf: end - begin */

@@ -1,0 +1,157 @@
+/* A pack that is killed leaves the old dataset or none, never half a one; one that is asked to stop cleans up as well. */
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <splatd/dataset.h>
+
+#include "base/clock.h"
+
+enum { points = 150000, kills = 20 };
+static char folder[] = "/tmp/splatd-kill-XXXXXX", input[64], output[64];
+
+static pid_t start_pack(void)
+{
+    const char *binary = getenv("SPLATD_BINARY");
+    pid_t pid = fork();
+    if (pid == 0) {
+        int null = open("/dev/null", O_WRONLY);
+        dup2(null, STDERR_FILENO);
+        execl(binary, binary, "pack", input, "-o", output, (char *)NULL);
+        _exit(127);
+    }
+    assert_true(pid > 0);
+    return pid;
+}
+
+/* Milliseconds that an undisturbed pack takes. */
+static double time_pack(void)
+{
+    int status;
+    uint64_t begin = spl_now_ns();
+    assert_true(waitpid(start_pack(), &status, 0) > 0);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    return (double)(spl_now_ns() - begin) / 1e6;
+}
+
+static int parts(bool remove)
+{
+    int count = 0;
+    DIR *d = opendir(folder);
+    for (struct dirent *e; (e = readdir(d));)
+        if (strstr(e->d_name, ".part-")) {
+            char path[512];
+            snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
+            count++;
+            if (remove)
+                unlink(path);
+        }
+    closedir(d);
+    return count;
+}
+
+/* Ends a pack by `signal` after a random time; returns whether it was still at work. */
+static bool interrupt_pack(int signal, double duration_ms, unsigned *random)
+{
+    *random = *random * 1664525u + 1013904223u;
+    double wait_ms = duration_ms * (double)(*random >> 8) / (1 << 24);
+    pid_t pid = start_pack();
+    usleep((useconds_t)(wait_ms * 1000));
+    kill(pid, signal);
+    int status;
+    assert_true(waitpid(pid, &status, 0) == pid);
+    return WIFSIGNALED(status);
+}
+
+static void expect_whole_or_none(bool old)
+{
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    if (access(output, F_OK)) {
+        assert_false(old);
+        return;
+    }
+    if (spl_dataset_open(output, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(spl_dataset_get_info(dataset)->points, points);
+    spl_dataset_close(dataset);
+}
+
+static void test_kill(void **state)
+{
+    (void)state;
+    double duration_ms = time_pack();
+    unsigned random = 7;
+    int interrupted = 0;
+    for (int i = 0; i < kills; i++) {
+        bool old = i % 2;
+        if (!old)
+            unlink(output);
+        else if (access(output, F_OK))
+            time_pack();
+        interrupted += interrupt_pack(SIGKILL, duration_ms, &random);
+        expect_whole_or_none(old);
+        parts(true);
+    }
+    assert_true(interrupted > kills / 4);
+}
+
+static void test_terminate(void **state)
+{
+    (void)state;
+    double duration_ms = time_pack();
+    static const int signals[] = {SIGTERM, SIGINT, SIGHUP};
+    unsigned random = 11;
+    for (int i = 0; i < 6; i++) {
+        unlink(output);
+        interrupt_pack(signals[i % 3], duration_ms, &random);
+        expect_whole_or_none(false);
+        assert_int_equal(parts(false), 0);
+    }
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    if (!getenv("SPLATD_BINARY") || !mkdtemp(folder))
+        return -1;
+    snprintf(input, sizeof input, "%s/in.xyz", folder);
+    snprintf(output, sizeof output, "%s/out.spld", folder);
+    FILE *f = fopen(input, "w");
+    unsigned random = 3;
+    for (int i = 0; i < points; i++) {
+        unsigned v[3];
+        for (int c = 0; c < 3; c++)
+            v[c] = (random = random * 1664525u + 1013904223u) >> 12;
+        fprintf(f, "%u.%u %u %u\n", v[0] % 400, v[0], v[1] % 400000, v[2] % 7);
+    }
+    return fclose(f);
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    parts(true);
+    unlink(input);
+    unlink(output);
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kill), cmocka_unit_test(test_terminate)};
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,311 @@
+/* Whole packs of small clouds: what went in is in the dataset, within the stated errors, whatever the cloud and the threads;
+ * what cannot be packed leaves nothing behind. */
+#include <dirent.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <splatd/pack.h>
+
+#include "base/memory.h"
+#include "clouds.h"
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
+
+static char folder[] = "/tmp/splatd-pack-XXXXXX";
+
+static const char *path_of(const char *name)
+{
+    static char paths[4][512];
+    static int next;
+    char *path = paths[next++ % 4];
+    snprintf(path, 512, "%s/%s", folder, name);
+    return path;
+}
+
+/* A binary PLY of doubles; the colour is the point's number. */
+static void write_ply(const char *path, const double (*position)[3], size_t count)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty double x\nproperty double y\n"
+            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n", count);
+    for (size_t i = 0; i < count; i++) {
+        uint8_t color[3] = {(uint8_t)i, (uint8_t)(i >> 8), (uint8_t)(i >> 16)};
+        fwrite(position[i], sizeof(double), 3, f);
+        fwrite(color, 1, 3, f);
+    }
+    assert_int_equal(fclose(f), 0);
+}
+
+static int pack_file(const char *input, const char *output, unsigned threads, struct spl_pack_report *report,
+                     struct spl_error *err)
+{
+    struct spl_pack_options options = {.inputs = &input, .input_count = 1, .output = output, .threads = threads};
+    return spl_pack(&options, report, err);
+}
+
+static int files_in_folder(void)
+{
+    int count = 0;
+    DIR *d = opendir(folder);
+    for (struct dirent *e; (e = readdir(d));)
+        count += e->d_name[0] != '.';
+    closedir(d);
+    return count;
+}
+
+/* Walks the whole dataset: each leaf splat is an input point, within `bound` radii; every point once; children and boxes
+ * nest. Returns the mean position error in radii. */
+static double check_dataset(const char *path, const double (*position)[3], size_t count, bool distinct)
+{
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    if (spl_dataset_open(path, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    uint32_t node_count, chunk_count, next_id = 0;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    uint8_t *seen = calloc(count, 1);
+    uint64_t leaf_splats = 0;
+    double error = 0;
+    for (uint32_t n = 0; n < node_count; n++) {
+        const struct spl_node *node = &nodes[n];
+        size_t page_bytes;
+        const uint32_t *page = spl_dataset_get_page(dataset, node->page, &page_bytes);
+        assert_true(node->chunk_count > 0);
+        for (uint32_t c = 0; c < node->child_count; c++) {
+            const struct spl_node *child = &nodes[node->first_child + c];
+            assert_int_equal(child->depth, node->depth + 1);
+            for (int a = 0; a < 3; a++) {
+                double shift = child->origin[a] - node->origin[a];
+                assert_true(shift >= -1e-6 * node->size && shift + child->size <= node->size * (1 + 1e-6));
+                assert_true(shift + child->box_min[a] >= node->box_min[a] && shift + child->box_max[a] <= node->box_max[a]);
+            }
+        }
+        for (uint32_t c = 0; c < node->chunk_count; c++) {
+            const struct spl_chunk *chunk = &chunks[node->first_chunk + c];
+            assert_int_equal(chunk->first_id, next_id);
+            next_id += chunk->count;
+            for (uint32_t i = 0; i < chunk->count; i++) {
+                struct spl_splat s;
+                spl_chunk_decode(chunk, page, i, &s);
+                assert_true(s.radius > 0);
+                for (int a = 0; a < 3; a++) {
+                    assert_true(s.position[a] - s.radius >= node->box_min[a]);
+                    assert_true(s.position[a] + s.radius <= node->box_max[a]);
+                }
+                if (node->child_count)
+                    continue;
+                size_t who = s.color[0] | (size_t)s.color[1] << 8 | (size_t)s.color[2] << 16;
+                double d = 0;
+                assert_true(who < count && !seen[who]);
+                seen[who] = 1;
+                leaf_splats++;
+                for (int a = 0; a < 3; a++) {
+                    double e = node->origin[a] + s.position[a] - position[who][a];
+                    d += e * e;
+                }
+                assert_true(sqrt(d) < 0.9 * chunk->step + 1e-6 * node->size);
+                error += sqrt(d) / s.radius;
+            }
+        }
+    }
+    assert_int_equal(leaf_splats, info->leaf_splats);
+    assert_int_equal(info->points, count);
+    if (distinct)
+        assert_int_equal(leaf_splats, count);
+    assert_int_equal(next_id, info->splats);
+    free(seen);
+    spl_dataset_close(dataset);
+    return error / (double)leaf_splats;
+}
+
+static void test_every_point_is_there(void **state)
+{
+    (void)state;
+    for (int shape = 0; shape < SHAPES; shape++) {
+        size_t count = 60000;
+        double(*position)[3] = shape_points((enum shape)shape, count, 31);
+        struct spl_pack_report report;
+        struct spl_error err = {0};
+        write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+        assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, &report, &err), 0);
+        double error = check_dataset(path_of("out.spld"), (const double(*)[3])position, count, report.duplicates == 0);
+        assert_true(report.normal_error <= 1);
+        if (shape != SHAPE_CLUSTERS) { /* chunks of a thousand to one outrun 24 bits */
+            assert_true(error <= 0.0165);
+            assert_true(report.position_error <= 0.016);
+        }
+        assert_true((double)report.splats <= 1.4 * (double)report.leaf_splats);
+        free(position);
+    }
+}
+
+static void expect_same_files(const char *a, const char *b)
+{
+    struct stat sa, sb;
+    assert_int_equal(stat(a, &sa), 0);
+    assert_int_equal(stat(b, &sb), 0);
+    assert_int_equal(sa.st_size, sb.st_size);
+    char *x = malloc((size_t)sa.st_size), *y = malloc((size_t)sb.st_size);
+    FILE *f = fopen(a, "rb"), *g = fopen(b, "rb");
+    assert_int_equal(fread(x, 1, (size_t)sa.st_size, f), (size_t)sa.st_size);
+    assert_int_equal(fread(y, 1, (size_t)sb.st_size, g), (size_t)sb.st_size);
+    assert_memory_equal(x, y, (size_t)sa.st_size);
+    fclose(f);
+    fclose(g);
+    free(x);
+    free(y);
+}
+
+static void test_threads_do_not_matter(void **state)
+{
+    (void)state;
+    size_t count = 200000;
+    double(*position)[3] = shape_points(SHAPE_SPHERE, count, 41);
+    struct spl_error err = {0};
+    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    assert_int_equal(pack_file(path_of("in.ply"), path_of("one.spld"), 1, NULL, &err), 0);
+    assert_int_equal(pack_file(path_of("in.ply"), path_of("five.spld"), 5, NULL, &err), 0);
+    expect_same_files(path_of("one.spld"), path_of("five.spld"));
+    unlink(path_of("one.spld"));
+    unlink(path_of("five.spld"));
+    free(position);
+}
+
+/* From one point on, in every shape; all equal; a dense cluster in a wide cloud; 10^9 metres. */
+static void test_degenerate_clouds(void **state)
+{
+    (void)state;
+    static const size_t counts[] = {1, 2, 3, 4, 13, 200};
+    for (int shape = 0; shape < SHAPES; shape++)
+        for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+            double(*position)[3] = shape_points((enum shape)shape, counts[c], c);
+            struct spl_error err = {0};
+            write_ply(path_of("in.ply"), (const double(*)[3])position, counts[c]);
+            assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, NULL, &err), 0);
+            check_dataset(path_of("out.spld"), (const double(*)[3])position, counts[c], false);
+            free(position);
+        }
+    enum { many = 30000 };
+    double(*position)[3] = calloc(many, sizeof *position);
+    struct spl_pack_report report;
+    struct spl_error err = {0};
+    write_ply(path_of("in.ply"), (const double(*)[3])position, many);
+    assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, &report, &err), 0);
+    assert_true(report.leaf_splats == 1 && report.splats == 1 && report.duplicates == many - 1);
+    uint64_t random = 51;
+    for (size_t i = 0; i < many; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = i % 1000 ? 1e-3 * uniform(&random) : 1e9 * (uniform(&random) - 0.5);
+    write_ply(path_of("in.ply"), (const double(*)[3])position, many);
+    assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, &report, &err), 0);
+    check_dataset(path_of("out.spld"), (const double(*)[3])position, many, true);
+    free(position);
+}
+
+static void expect_refusal(const char *input, const char *output, int code, const char *part)
+{
+    struct spl_error err = {0};
+    int files = files_in_folder();
+    assert_int_equal(pack_file(input, output, 2, NULL, &err), code);
+    if (!strstr(err.message, part))
+        fail_msg("'%s' does not say '%s'", err.message, part);
+    assert_int_equal(files_in_folder(), files);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    const double far[2][3] = {{0, 0, 0}, {0, 2e12, 0}}, nan[2][3] = {{NAN, 0, 0}, {0, INFINITY, 0}};
+    unlink(path_of("out.spld"));
+    write_ply(path_of("far.ply"), far, 2);
+    expect_refusal(path_of("far.ply"), path_of("out.spld"), SPL_E_INPUT, "far.ply");
+    write_ply(path_of("nan.ply"), nan, 2);
+    expect_refusal(path_of("nan.ply"), path_of("out.spld"), SPL_E_INPUT, "nan.ply");
+    write_ply(path_of("none.ply"), far, 0);
+    expect_refusal(path_of("none.ply"), path_of("out.spld"), SPL_E_INPUT, "none.ply");
+    write_ply(path_of("one.ply"), far, 1);
+    expect_refusal(path_of("one.ply"), path_of("one.ply"), SPL_E_USAGE, "input too");
+    expect_refusal(path_of("one.ply"), folder, SPL_E_USAGE, "no file");
+    struct stat before, after;
+    assert_int_equal(stat(path_of("one.ply"), &before), 0);
+    expect_refusal(path_of("one.ply"), path_of("no/such/out.spld"), SPL_E_IO, "no/such");
+    assert_int_equal(stat(path_of("one.ply"), &after), 0);
+    assert_int_equal(before.st_size, after.st_size);
+    struct spl_error err = {0};
+    const char *input = path_of("one.ply");
+    struct spl_pack_options options = {.inputs = &input, .input_count = 1, .output = path_of("out.spld")};
+    struct spl_pack_options wrong = options;
+    wrong.neighbours = 2;
+    assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "neighbours");
+    wrong = options;
+    wrong.position_error = -1;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
+    wrong = options;
+    wrong.normal_error = NAN;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
+}
+
+/* Each of the first allocations in turn is refused, then every fifth: an error, no file, no leak (the sanitizers look). */
+static void test_refused_memory(void **state)
+{
+    (void)state;
+    size_t count = 9000; /* enough for two levels */
+    double(*position)[3] = shape_points(SHAPE_CLUSTERS, count, 61);
+    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    free(position);
+    unlink(path_of("out.spld"));
+    int files = files_in_folder();
+    for (long n = 1;; n += n < 64 ? 1 : 5) {
+        struct spl_error err = {0};
+        spl_memory_fail_after(n);
+        int rc = pack_file(path_of("in.ply"), path_of("out.spld"), 1, NULL, &err);
+        spl_memory_fail_after(0);
+        if (rc == 0) {
+            assert_true(n > 20);
+            break;
+        }
+        assert_int_equal(rc, SPL_E_NOMEM);
+        assert_int_equal(files_in_folder(), files);
+    }
+    unlink(path_of("out.spld"));
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    DIR *d = opendir(folder);
+    for (struct dirent *e; (e = readdir(d));)
+        unlink(path_of(e->d_name));
+    closedir(d);
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_point_is_there),
+        cmocka_unit_test(test_threads_do_not_matter),
+        cmocka_unit_test(test_degenerate_clouds),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_refused_memory),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
