@@ -302,9 +302,15 @@ static inline void put(struct bit_writer *w, int32_t code, unsigned bits)
     }
 }
 
-/* Writes one stream: `fields` codes a splat, one after the other, then the rest of the last word. */
+/* Writes one stream: `fields` codes a splat, one after the other, then the rest of the last word. A stream without width
+ * has no codes: nobody set them where the attribute is absent. */
 static void put_stream(struct bit_writer *w, int32_t *const *code, const unsigned *bits, int fields, uint32_t count)
 {
+    unsigned width = 0;
+    for (int f = 0; f < fields; f++)
+        width += bits[f];
+    if (!width)
+        return;
     for (uint32_t i = 0; i < count; i++)
         for (int f = 0; f < fields; f++)
             put(w, code[f][i], bits[f]);

@@ -129,6 +129,8 @@ static void test_random(void **state)
 {
     (void)state;
     static const double up[3] = {0, 0, 1};
+    struct spl_chunk_options no_class = defaults;
+    no_class.has_class = false;
     struct sample s;
     for (uint32_t round = 0; round < 300; round++) {
         random_state = round + 1;
@@ -136,6 +138,7 @@ static void test_random(void **state)
         double extent = exp2(20 * uniform() - 12), radius = extent * exp2(-8 * uniform());
         make_sheet(&s, count, extent, extent * exp2(-16 * uniform()), radius, 2 * uniform(), up);
         check_sample(&s, &defaults);
+        check_sample(&s, &no_class); /* nothing of the classes just encoded shows in the uncertainties */
         check_sample(&s, &(struct spl_chunk_options){.position_error = 0.1, .normal_error = 0.1, .radius_error = 0.2});
         check_sample(
             &s, &(struct spl_chunk_options){.position_error = 0.001, .normal_error = 0.001, .radius_error = 0.001});
