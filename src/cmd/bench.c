@@ -124,7 +124,7 @@ static int take_option(struct arguments *a, int option, struct spl_error *err)
         status = each("--lod", optarg, take_lod, a, err);
         break;
     default:
-        status = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' lists the options");
+        status = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
     }
     return status;
 }
@@ -149,7 +149,7 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
     while (!status && (option = getopt_long(argc, argv, "", options, NULL)) != -1)
         status = take_option(a, option, err);
     if (!status && optind == argc)
-        status = spl_fail(err, SPL_E_USAGE, "bench needs a dataset: splatd bench NAME.spld");
+        status = spl_fail(err, SPL_E_USAGE, "bench needs at least one NAME.spld; 'splatd bench --help' shows how");
     if (!status && argc - optind > LIST_MAX)
         status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);
     if (!status && a->set && !a->views)

@@ -2,10 +2,11 @@
 #include "cmd/cmd.h"
 
 #include <stdio.h>
+#include <string.h>
 
 int spl_cmd_fail(const struct spl_error *err)
 {
-    if (err->field[0])
+    if (err->field[0] && !strstr(err->message, err->field))
         fprintf(stderr, "splatd: %s: %s\n", err->field, err->message);
     else
         fprintf(stderr, "splatd: %s\n", err->message);

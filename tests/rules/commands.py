@@ -1,0 +1,37 @@
+"""What every subcommand owes its users: --help teaches by example on stdout, a wrong option is refused with exit code 2 and
+a message on stderr, README.md names the command.
+
+usage: commands.py SPLATD README.md"""
+import re
+import subprocess
+import sys
+
+SPLATD, README = sys.argv[1], open(sys.argv[2], encoding="utf-8").read()
+wrong = []
+
+
+def check(arguments, code, where):
+    """Runs splatd; wants `code`, something on `where` and nothing on the other stream. Returns what was said."""
+    done = subprocess.run([SPLATD, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+    said, silent = (done.stdout, done.stderr) if where == "stdout" else (done.stderr, done.stdout)
+    if done.returncode != code or not said or silent:
+        wrong.append(f"splatd {' '.join(arguments)}: exit {done.returncode}, stdout {done.stdout!r}, stderr {done.stderr!r}")
+    return said
+
+
+overview = check(["--help"], 0, "stdout")
+commands = re.findall(r"^  ([a-z]+) {2,}\S", overview, re.MULTILINE)
+if sorted(commands) != sorted("serve pack render info synth bench devices".split()):
+    wrong.append(f"splatd --help lists {commands}")
+for command in commands:
+    text = check([command, "--help"], 0, "stdout")
+    if len(re.findall(rf"^\s+(?:\S+ )*splatd {command}\b", text, re.MULTILINE)) < 2:
+        wrong.append(f"splatd {command} --help shows fewer than two examples")
+    check([command, "--no-such-option"], 2, "stderr")
+    if f"`splatd {command}" not in README:
+        wrong.append(f"README.md does not show splatd {command}")
+check(["no-such-command"], 2, "stderr")
+check([], 2, "stderr")
+check(["--version"], 0, "stdout")
+print("\n".join(wrong) or f"{len(commands)} commands")
+sys.exit(1 if wrong else 0)
