@@ -9,12 +9,12 @@
  * surroundings limit it:
  * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
  * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows round.
- *   A noisy surface looks like one too: more neighbours tell, and give the normal where they show a surface;
+ *   A noisy surface looks like one too: the neighbours' neighbours tell, and give the normal where they show a surface;
  * - no radius exceeds a small multiple of the median of its neighbours' radii (a stray point beside a surface), nor of the
  *   median of the few thousand points around it (a flock of strays): a smaller multiple where there is no surface.
- * Scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along one or two lines, or all
- * on one side. Where they do, more are asked: if they show a surface that goes on beyond the gap, the radius reaches
- * across; if it ends there, the disc is made as small as a border's half of neighbours means.
+ * Scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all on one
+ * side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest point in each
+ * direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much closer.
  */
 #include "pack/points.h"
 
@@ -32,10 +32,10 @@ enum { block_points = 1 << 16 };
 static const float lone_radius = 0.01f;       /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;   /* keeps squares and quotients of floats in range */
 static const float stray_limit = 2.5f;        /* times the median radius of the neighbours */
-static const float flat_limit = 8, round_limit = 3; /* times the median radius of the run of points around */
+static const float flat_limit = 4, round_limit = 2; /* times the median radius of the run of points around */
 enum { run_points = 4096, run_sample = 256, wide_factor = 3 };
-static const double linear_below = 0.15, elongated_below = 0.4; /* sigma_1 / sigma_2 */
-static const double one_sided = 0.3;          /* distance of the neighbours' mean / d_K; 0.42 at a straight border */
+static const double linear_below = 0.15;      /* sigma_1 / sigma_2 */
+static const double coplanar = 0.25;          /* slope within which a far point continues a surface */
 static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
 
 struct deferred {            /* a point with a neighbour in another block */
@@ -52,9 +52,16 @@ struct block {
     uint32_t component_count, first_component;
 };
 
+/* What a point's neighbours sum up to, relative to the point. */
+struct moments {
+    float count, sum[3], square[6]; /* xx xy xz yy yz zz; the point itself counts and adds nothing */
+};
+
 struct scratch {             /* of one worker */
+    struct moments *moments; /* of each point of the block */
     uint32_t *neighbours;    /* k a point, unused ones UINT32_MAX */
-    float *limit;            /* of each point's radius: of its run, while being estimated a multiple of the median */
+    float *limit;            /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
+                                radius, that times the median, its settled radius */
     struct spl_orient orient;
 };
 
@@ -71,20 +78,14 @@ struct surface {
     atomic_bool failed;
 };
 
-/* How the points around one are spread. */
-struct spread {
-    double sigma[3];         /* ascending */
-    double normal[3], along[3]; /* of the least and of the largest sigma */
-    double mean[3];          /* of the neighbours, from the point */
-};
+static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
-static struct spread spread_of(const struct spl_points *p, const double at[3], const struct spl_nearest *near)
+static struct moments moments_of(const struct spl_points *p, size_t i, const struct spl_nearest *near)
 {
-    double sum[3] = {0}, m[6] = {0}, n = near->count + 1;
-    struct spread spread;
+    double sum[3] = {0}, m[6] = {0};
     for (unsigned a = 0; a < near->count; a++) {
         uint32_t j = near->index[a];
-        double d[3] = {p->axis[0][j] - at[0], p->axis[1][j] - at[1], p->axis[2][j] - at[2]};
+        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
         for (int c = 0; c < 3; c++)
             sum[c] += d[c];
         m[0] += d[0] * d[0];
@@ -94,44 +95,111 @@ static struct spread spread_of(const struct spl_points *p, const double at[3], c
         m[4] += d[1] * d[2];
         m[5] += d[2] * d[2];
     }
-    static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
+    struct moments moments = {.count = (float)near->count + 1};
+    for (int c = 0; c < 3; c++)
+        moments.sum[c] = (float)sum[c];
     for (int e = 0; e < 6; e++)
-        m[e] = m[e] / n - sum[row[e]] * sum[column[e]] / (n * n);
-    spl_eigen_symmetric(m, spread.sigma, spread.normal, spread.along);
-    for (int c = 0; c < 3; c++) {
-        spread.sigma[c] = sqrt(fmax(0, spread.sigma[c]));
-        spread.mean[c] = sum[c] / near->count;
+        moments.square[e] = (float)m[e];
+    return moments;
+}
+
+/* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost. */
+static struct moments widen(const struct surface *s, const struct scratch *w, size_t begin, size_t end, size_t i)
+{
+    const struct spl_points *p = s->points;
+    const uint32_t *list = w->neighbours + (i - begin) * s->k;
+    struct moments wide = w->moments[i - begin];
+    for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++) {
+        size_t j = list[a];
+        if (j < begin || j >= end)
+            continue;
+        const struct moments *m = &w->moments[j - begin];
+        float d[3];
+        for (int c = 0; c < 3; c++) {
+            d[c] = (float)(p->axis[c][j] - p->axis[c][i]);
+            wide.sum[c] += m->sum[c] + m->count * d[c];
+        }
+        for (int e = 0; e < 6; e++)
+            wide.square[e] += m->square[e] + d[row[e]] * m->sum[column[e]] + m->sum[row[e]] * d[column[e]] +
+                              m->count * d[row[e]] * d[column[e]];
+        wide.count += m->count;
     }
+    return wide;
+}
+
+/* How the points around one are spread. */
+struct spread {
+    double sigma[3];         /* ascending */
+    double normal[3], along[3]; /* of the least and of the largest sigma */
+};
+
+static struct spread spread_of(const struct moments *moments)
+{
+    double m[6], n = moments->count;
+    struct spread spread;
+    for (int e = 0; e < 6; e++)
+        m[e] = moments->square[e] / n - (double)moments->sum[row[e]] * moments->sum[column[e]] / (n * n);
+    spl_eigen_symmetric(m, spread.sigma, spread.normal, spread.along);
+    for (int c = 0; c < 3; c++)
+        spread.sigma[c] = sqrt(fmax(0, spread.sigma[c]));
     return spread;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+/* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none is.
+ * Points that stand out of the plane by more than `slope` of their distance do not count. */
+static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count,
+                    const double normal[3], double slope, double nearest[8])
 {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
+    /* any two axes across the normal, of equal length */
+    int least = fabs(normal[0]) < fabs(normal[1]) ? 0 : 1;
+    least = fabs(normal[2]) < fabs(normal[least]) ? 2 : least;
+    int b = (least + 1) % 3, c = (least + 2) % 3;
+    double x[3], y[3];
+    x[least] = 0, x[b] = normal[c], x[c] = -normal[b];
+    y[least] = normal[b] * x[c] - normal[c] * x[b], y[b] = normal[c] * x[least] - normal[least] * x[c];
+    y[c] = normal[least] * x[b] - normal[b] * x[least];
+    for (int e = 0; e < 8; e++)
+        nearest[e] = INFINITY;
+    for (unsigned a = 0; a < count && neighbours[a] != UINT32_MAX; a++) {
+        uint32_t j = neighbours[a];
+        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
+        double u = d[0] * x[0] + d[1] * x[1] + d[2] * x[2], v = d[0] * y[0] + d[1] * y[1] + d[2] * y[2];
+        double h = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2];
+        double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        if (h * h > slope * slope * squared)
+            continue;
+        static const uint8_t turn[8] = {4, 5, 3, 2, 7, 6, 0, 1}; /* counted around */
+        uint8_t e = turn[(u > 0) * 4 + (v > 0) * 2 + (fabs(v) > fabs(u))];
+        nearest[e] = squared < nearest[e] ? squared : nearest[e];
+    }
 }
 
-/* The larger of the distances to the nearest point in the quarters around `across` and against it; 0 where one is empty. */
-static double gap_across(const struct spl_points *p, const double at[3], const double across[3], const double normal[3],
-                         const struct spl_nearest *near)
+/* What the eighths say of a point's place. */
+struct place {
+    double gap;    /* largest distance to the nearest point in a quarter of the plane, of quarters that hold any */
+    double filled; /* share of the eighths that hold any */
+    bool on_line;  /* two opposite quarters are empty */
+    bool one_sided; /* three eighths in a row are empty */
+};
+
+static struct place place_of(const double nearest[8])
 {
-    double gap[2] = {INFINITY, INFINITY}, along[3], aa = 0;
-    cross(normal, across, along);
-    for (int c = 0; c < 3; c++)
-        aa += across[c] * across[c];
-    for (unsigned a = 0; a < near->count && aa > 0; a++) {
-        uint32_t j = near->index[a];
-        double u = 0, v = 0;
-        for (int c = 0; c < 3; c++) {
-            u += along[c] * (p->axis[c][j] - at[c]);
-            v += across[c] * (p->axis[c][j] - at[c]);
-        }
-        if (fabs(v) > fabs(u))
-            gap[v > 0] = fmin(gap[v > 0], near->squared[a]);
+    struct place place = {0};
+    double quarter[8];
+    unsigned empty = 0;
+    for (int e = 0; e < 8; e++) {
+        quarter[e] = fmin(nearest[e], nearest[(e + 1) % 8]);
+        if (quarter[e] < INFINITY)
+            place.gap = fmax(place.gap, quarter[e]);
+        place.filled += nearest[e] < INFINITY ? 0.125 : 0;
+        empty |= (unsigned)!(nearest[e] < INFINITY) << e;
     }
-    double larger = fmax(gap[0], gap[1]);
-    return larger < INFINITY ? sqrt(larger) : 0;
+    empty |= empty << 8;
+    place.one_sided = empty & empty >> 1 & empty >> 2;
+    for (int e = 0; e < 4; e++)
+        place.on_line |= !(quarter[e] < INFINITY) && !(quarter[e + 4] < INFINITY);
+    place.gap = sqrt(place.gap);
+    return place;
 }
 
 /* 0 on a surface or a line, 1 in a volume. */
@@ -144,52 +212,56 @@ static double roundness(const struct spread *spread)
     return t * t * (3 - 2 * t);
 }
 
-/* Normal and radius of point i, and the roundness of its surroundings. */
-static double radius_of(const struct surface *s, size_t i, struct spl_nearest *near, struct spl_nearest *wide,
-                        double normal[3], double *round)
+/* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
+static double radius_of(const struct surface *s, const struct scratch *w, size_t begin, size_t end, size_t i,
+                        double reach, struct spl_nearest *near, double normal[3], double *round)
 {
     const struct spl_points *p = s->points;
-    const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
-    struct spread spread = spread_of(p, at, near);
-    double reach = near->farthest, n = near->count, radius = 2 * reach / sqrt(n);
-    double mean = sqrt(spread.mean[0] * spread.mean[0] + spread.mean[1] * spread.mean[1] +
-                       spread.mean[2] * spread.mean[2]);
+    const struct moments *moments = &w->moments[i - begin];
+    struct spread spread = spread_of(moments);
+    double n = moments->count - 1, radius = 2 * reach / sqrt(n), nearest[8];
     bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
-    bool elongated = spread.sigma[1] < elongated_below * spread.sigma[2];
     memcpy(normal, spread.normal, sizeof spread.normal);
     *round = roundness(&spread);
-    if (*round == 0 && !elongated && mean < one_sided * reach)
+    if (*round > 0) {
+        struct moments around = widen(s, w, begin, end, i);
+        struct spread wide = spread_of(&around);
+        double wide_round = roundness(&wide);
+        if (wide_round < *round) {
+            memcpy(normal, wide.normal, sizeof wide.normal);
+            *round = wide_round;
+        }
+    }
+    radius *= 1 - 0.5 * *round;
+    eighths(p, i, w->neighbours + (i - begin) * s->k, s->k, normal, 1, nearest);
+    struct place place = place_of(nearest);
+    if (*round > 0.1 || !(linear || place.on_line || place.one_sided))
         return radius;
 
-    spl_neighbours_find(s->neighbours, i, s->wide, wide);
-    struct spread wider = spread_of(p, at, wide);
-    bool surface = wider.sigma[1] >= linear_below * wider.sigma[2] && wider.sigma[0] < round_from * wider.sigma[1];
-    if (!surface && linear) /* a wire: its points are 2 reach / n apart */
-        return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
-    if (!surface)
-        return radius * (1 - 0.5 * *round);
-
-    if (linear || *round > 0)
-        memcpy(normal, wider.normal, sizeof wider.normal);
-    *round = 0;
-    double across[3];
-    cross(normal, spread.along, across);
-    double gap = gap_across(p, at, elongated ? across : spread.mean, normal, wide);
-    if (linear && gap == 0)
-        return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
-    if (gap == 0 && mean >= one_sided * reach)
-        return radius * 0.75;
-    return fmax(radius, fmin(0.55 * gap, 2 * radius));
+    spl_neighbours_find(s->neighbours, i, s->wide, near);
+    if (linear) {
+        struct moments around = moments_of(p, i, near);
+        struct spread wide = spread_of(&around);
+        bool surface = wide.sigma[1] >= linear_below * wide.sigma[2] && roundness(&wide) == 0;
+        eighths(p, i, near->index, near->count, wide.normal, coplanar, nearest);
+        if (!surface || place_of(nearest).on_line) /* a wire: its points are 2 reach / n apart */
+            return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
+        memcpy(normal, wide.normal, sizeof wide.normal);
+    }
+    eighths(p, i, near->index, near->count, normal, coplanar, nearest);
+    place = place_of(nearest);
+    return fmax(radius * sqrt(fmax(place.filled, 0.25)), fmin(0.55 * place.gap, 2 * radius));
 }
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
-static bool estimate(const struct surface *s, size_t i, struct spl_nearest *near, struct spl_nearest *wide,
-                     float *limit)
+static bool estimate(const struct surface *s, struct scratch *w, size_t begin, size_t end, size_t i,
+                     struct spl_nearest *near)
 {
     struct spl_points *p = s->points;
     double least[3], round, side = 1;
-    p->radius[i] = fmaxf((float)radius_of(s, i, near, wide, least, &round), smallest_radius);
-    *limit = flat_limit + (float)round * (round_limit - flat_limit);
+    double reach = w->limit[i - begin];
+    p->radius[i] = fmaxf((float)radius_of(s, w, begin, end, i, reach, near, least, &round), smallest_radius);
+    w->limit[i - begin] = flat_limit + (float)round * (round_limit - flat_limit);
 
     float *normal = p->normal[i];
     if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0)
@@ -323,18 +395,21 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     for (size_t b = begin_block; b < end_block; b++) {
         size_t begin = b * block_points;
         size_t end = begin + block_points < s->points->count ? begin + block_points : s->points->count;
-        struct spl_nearest near, wide;
+        struct spl_nearest near;
         spl_nearest_init(&near);
-        spl_nearest_init(&wide);
         for (size_t i = begin; i < end; i++) {
             spl_neighbours_find(s->neighbours, i, s->k, &near);
             uint32_t *list = w->neighbours + (i - begin) * s->k;
             for (unsigned a = 0; a < s->k; a++)
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
-            w->orient.anchored[i - begin] = estimate(s, i, &near, &wide, &w->limit[i - begin]);
+            w->moments[i - begin] = moments_of(s->points, i, &near);
+            w->limit[i - begin] = (float)near.farthest;
             if ((i & 4095) == 4095)
                 spl_stage_add(s->stage, 4096, worker);
         }
+        spl_nearest_init(&near);
+        for (size_t i = begin; i < end; i++)
+            w->orient.anchored[i - begin] = estimate(s, w, begin, end, i, &near);
         limit_runs(s->points, begin, end, w->limit);
         if (!keep_deferred(s, &s->blocks[b], begin, end, w) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
@@ -427,7 +502,9 @@ static int allocate(struct surface *s, struct spl_error *err)
     for (unsigned t = 0; t < s->stage->threads; t++) {
         s->scratch[t].neighbours = spl_alloc_raw(capacity, s->k * sizeof(uint32_t), err);
         s->scratch[t].limit = spl_alloc_raw(capacity, sizeof(float), err);
-        if (!s->scratch[t].neighbours || !s->scratch[t].limit || spl_orient_init(&s->scratch[t].orient, capacity, err))
+        s->scratch[t].moments = spl_alloc_raw(capacity, sizeof *s->scratch[t].moments, err);
+        if (!s->scratch[t].neighbours || !s->scratch[t].limit || !s->scratch[t].moments ||
+            spl_orient_init(&s->scratch[t].orient, capacity, err))
             return SPL_E_NOMEM;
     }
     if (!all_sides_known(p)) {
@@ -449,6 +526,7 @@ static void finish(struct surface *s)
     for (unsigned t = 0; s->scratch && t < s->stage->threads; t++) {
         free(s->scratch[t].neighbours);
         free(s->scratch[t].limit);
+        free(s->scratch[t].moments);
         spl_orient_finish(&s->scratch[t].orient);
     }
     free(s->blocks);
