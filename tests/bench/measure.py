@@ -207,17 +207,22 @@ def pack():
     source, out = scan(), CACHE / "pack-bench.spld"
     points = int(re.search(rb"element vertex (\d+)", source.open("rb").read(2000))[1])
     begin = time.monotonic()
-    process = subprocess.Popen([SPLATD, "pack", source, "-o", out], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([SPLATD, "pack", source, "-o", out], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                               text=True)
+    said = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
     seconds = time.monotonic() - begin
     out.unlink(missing_ok=True)
     if status:
-        sys.exit("pack failed")
+        sys.exit("pack failed: " + said)
     peak = usage.ru_maxrss * 1024
     print(f"{points} points in {seconds:.1f} s = {points / seconds:.0f} points/s "
           f"({usage.ru_utime + usage.ru_stime:.1f} s of CPU)")
     bound("pack, seconds for 700,000 points", 7e5 * seconds / points, 1, "s")
     bound("pack, peak memory", peak / 2**20, (80 * points + 512e6) / 2**20, "MiB")
+    errors = re.search(r"mean errors: position ([\d.]+) % of the radius, normal ([\d.]+) degrees", said)
+    bound("mean position error", float(errors[1]), 1.6, "% of the splat radius")
+    bound("mean normal error", float(errors[2]), 1, "degrees")
 
 
 def size():
@@ -227,6 +232,7 @@ def size():
     print(json.dumps(per_splat))
     bound("position, normal, radius, colour", sum(per_splat[a] for a in ("position", "normal", "radius", "color")), 8,
           "bytes a splat")
+    bound("levels of detail add", 100 * (info["splats"] / info["leaf_splats"] - 1), 40, "%")
 
 
 if __name__ == "__main__":
