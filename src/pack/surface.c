@@ -232,7 +232,8 @@ static double radius_of(const struct surface *s, const struct scratch *w, size_t
             *round = wide_round;
         }
     }
-    radius *= 1 - 0.5 * *round;
+    double volume = *round * *round; /* squared twice: a rough surface is not to open up */
+    radius *= 1 - 0.5 * volume * volume;
     eighths(p, i, w->neighbours + (i - begin) * s->k, s->k, normal, 1, nearest);
     struct place place = place_of(nearest);
     if (*round > 0.1 || !(linear || place.on_line || place.one_sided))
