@@ -3,7 +3,7 @@
  * Front to back from the root: a node outside the frustum is dropped; one whose splats are at most `lod` samples apart,
  * or that has no children, is drawn; else its children are. Inside a drawn node every chunk is culled on its own and
  * drawn with the fraction (spacing / lod)^2 of its splats, 1/4 at least, radii scaled by 1/sqrt(fraction): continuous
- * detail (prune and scale of papers/textured-splats-panoramas). Pure but for the residency callback; the renderer's
+ * detail (prune and scale of the textured-splats-panoramas paper). Pure but for the residency callback; the renderer's
  * thread. */
 #ifndef SPL_RENDER_SELECT_H
 #define SPL_RENDER_SELECT_H
