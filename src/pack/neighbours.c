@@ -136,54 +136,55 @@ INLINE unsigned count_within(const double *values, unsigned n, double limit)
     return (unsigned)(sum[0] + sum[1] + sum[2] + sum[3]);
 }
 
+/* The least of `n` values above `limit`. */
+INLINE double next_above(const double *values, unsigned n, double limit)
+{
+    double least = INFINITY;
+    for (unsigned i = 0; i < n; i++)
+        least = values[i] > limit && values[i] < least ? values[i] : least;
+    return least;
+}
+
 /* Keeps the `wanted` nearest candidates and tightens the bound to the farthest of them. The threshold that counts just
- * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. */
+ * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. Where several are
+ * equally far (points on a grid), the first of them are kept. */
 INLINE void reduce(struct candidates *c)
 {
-    unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted;
+    unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted, ties = 0;
     if (n <= wanted)
         return;
     for (unsigned i = n; i % lanes; i++)
         c->squared[i] = INFINITY;
-    double low = 0, high = c->bound, threshold = -1;
-    for (int step = 0; step < 10 && threshold < 0; step++) {
-        double t = low + (high - low) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
+    double low = -1, high = c->bound, at_tie = INFINITY;
+    for (int step = 0; low_count < wanted && ties == 0; step++) {
+        bool by_value = step >= 4;
+        double from = low > 0 ? low : 0;
+        double t = by_value ? next_above(c->squared, n, low)
+                            : from + (high - from) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
         unsigned count = count_within(c->squared, n, t);
-        if (count == wanted) {
-            threshold = t;
-        } else if (count < wanted) {
+        if (count <= wanted) {
             low = t;
             low_count = count;
+        } else if (by_value) { /* all between low and t are at t */
+            at_tie = t;
+            ties = wanted - low_count;
         } else {
             high = t;
             high_count = count;
         }
     }
-    double farthest = 0;
-    if (threshold >= 0) {
-        unsigned kept = 0;
-        for (unsigned i = 0; i < n; i++) {
-            double d = c->squared[i];
-            c->squared[kept] = d;
-            c->index[kept] = c->index[i];
-            kept += d <= threshold;
-        }
-        for (unsigned i = 0; i < wanted; i++)
-            farthest = c->squared[i] > farthest ? c->squared[i] : farthest;
-    } else { /* ties, as on a grid */
-        for (unsigned i = 1; i < n; i++) {
-            double d = c->squared[i];
-            uint32_t index = c->index[i];
-            unsigned k = i;
-            for (; k > 0 && c->squared[k - 1] > d; k--) {
-                c->squared[k] = c->squared[k - 1];
-                c->index[k] = c->index[k - 1];
-            }
-            c->squared[k] = d;
-            c->index[k] = index;
-        }
-        farthest = c->squared[wanted - 1];
+    unsigned kept = 0;
+    for (unsigned i = 0; i < n; i++) {
+        double d = c->squared[i];
+        c->squared[kept] = d;
+        c->index[kept] = c->index[i];
+        unsigned tie = ties > 0 && d == at_tie;
+        ties -= tie;
+        kept += (d <= low) | tie;
     }
+    double farthest = 0;
+    for (unsigned i = 0; i < wanted; i++)
+        farthest = c->squared[i] > farthest ? c->squared[i] : farthest;
     c->count = wanted;
     c->bound = farthest;
 }
