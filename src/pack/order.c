@@ -81,7 +81,7 @@ static void key_piece(void *context, size_t begin, size_t end, unsigned worker)
         o->key[i] = spl_points_key(o->points, i, o->points->bounds_min, o->points->cube_size);
         o->index[i] = (uint32_t)i;
     }
-    spl_stage_add(o->stage, end - begin, worker);
+    spl_stage_add(o->stage, (end - begin) / 8, worker);
 }
 
 static void count_piece(void *context, size_t begin, size_t end, unsigned worker)
@@ -124,6 +124,7 @@ static void radix_sort(struct order *o)
         if (trivial)
             continue;
         spl_parallel_for(o->stage->threads, o->count, o->piece, scatter_piece, o);
+        spl_stage_add(o->stage, o->count / 16, 0);
         uint64_t *key = o->key;
         uint32_t *index = o->index;
         o->key = o->key_to;
@@ -199,7 +200,7 @@ static void runs_piece(void *context, size_t begin, size_t end, unsigned worker)
         if (next - i > 1)
             order_run(o, o->index + i, next - i);
     }
-    spl_stage_add(o->stage, end - begin, worker);
+    spl_stage_add(o->stage, (end - begin) / 8, worker);
 }
 
 struct permutation {
@@ -234,7 +235,7 @@ static int permute(struct order *o, void **array, size_t size, struct spl_error 
     memset(p.to + o->count * size, 0, SPL_POINTS_PAD * size);
     free(*array);
     *array = p.to;
-    spl_stage_add(o->stage, o->count / 4, 0);
+    spl_stage_add(o->stage, o->count / 32, 0);
     return 0;
 }
 
@@ -254,7 +255,7 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     int rc = SPL_E_NOMEM;
     o.pieces = stage->threads;
     o.piece = (o.count + o.pieces - 1) / o.pieces;
-    spl_stage_begin(stage, "ordering", 3 * o.count);
+    spl_stage_begin(stage, "ordering", o.count);
     o.key = spl_alloc_raw(o.count, sizeof *o.key, err);
     o.key_to = spl_alloc_raw(o.count, sizeof *o.key, err);
     o.index = spl_alloc_raw(o.count, sizeof *o.index, err);
@@ -285,8 +286,8 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
         rc = permute(&o, (void **)&points->station, sizeof *points->station, err);
     if (!rc)
         rc = permute(&o, (void **)&points->normal, sizeof *points->normal, err);
+    spl_stage_finish(stage);
     points->count = points->capacity = o.count;
-    spl_stage_end(stage);
 done:
     free(o.key);
     free(o.key_to);

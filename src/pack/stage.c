@@ -37,3 +37,9 @@ void spl_stage_end(struct spl_stage *stage)
 {
     report(stage, spl_now_ns());
 }
+
+void spl_stage_finish(struct spl_stage *stage)
+{
+    atomic_store(&stage->done, stage->total);
+    spl_stage_end(stage);
+}

@@ -21,7 +21,10 @@ void spl_stage_begin(struct spl_stage *stage, const char *name, uint64_t total);
 /* Adds `items` done; reports at most every 100 ms, and only from worker 0, which is the caller's thread. */
 void spl_stage_add(struct spl_stage *stage, uint64_t items, unsigned worker);
 
-/* Reports the stage's end. */
+/* Reports the stage's end with what was counted. */
 void spl_stage_end(struct spl_stage *stage);
+
+/* The same with everything done, for stages whose steps only estimate their share. */
+void spl_stage_finish(struct spl_stage *stage);
 
 #endif

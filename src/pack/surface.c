@@ -574,7 +574,7 @@ int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage
             points->radius[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].radius;
             points->uncertainty[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].uncertainty;
         }
-    spl_stage_end(stage);
+    spl_stage_finish(stage);
 done:
     finish(&s);
     return rc;

@@ -19,6 +19,39 @@ static size_t sample_of(const struct spl_points *p)
     return p->count < sample_max ? p->count : sample_max;
 }
 
+/* A station whose points all lie around its z axis is a camera: x right, y down, z forward. A scanner stands upright, and
+ * sees around itself. */
+static bool view_from_camera(const struct spl_points *p, struct spl_default_view *view)
+{
+    const double *pose = p->stations[0];
+    double depth = 0;
+    size_t sample = sample_of(p), seen = 0, ahead = 0;
+    for (size_t s = 0; s < sample; s++) {
+        size_t i = s * p->count / sample;
+        double along = 0, squared = 0;
+        if (p->station[i] != 0)
+            continue;
+        for (int c = 0; c < 3; c++) {
+            double d = p->axis[c][i] - pose[4 * c + 3];
+            along += pose[4 * c + 2] * d;
+            squared += d * d;
+        }
+        seen++;
+        ahead += along > 0.6 * sqrt(squared);
+        depth += along;
+    }
+    if (!seen || (double)ahead < 0.95 * (double)seen)
+        return false;
+    depth /= (double)seen;
+    for (int c = 0; c < 3; c++) {
+        view->eye[c] = pose[4 * c + 3];
+        view->target[c] = view->eye[c] + depth * pose[4 * c + 2];
+        view->up[c] = -pose[4 * c + 1];
+    }
+    view->fov = 60;
+    return true;
+}
+
 static void view_from_station(const struct spl_points *p, struct spl_default_view *view)
 {
     const double *pose = p->stations[0];
@@ -64,7 +97,8 @@ static void view_from_station(const struct spl_points *p, struct spl_default_vie
 int spl_default_view_find(const struct spl_points *p, struct spl_default_view *view, struct spl_error *err)
 {
     if (p->station_count && p->station[0] != SPL_NO_STATION) {
-        view_from_station(p, view);
+        if (!view_from_camera(p, view))
+            view_from_station(p, view);
         return 0;
     }
     size_t sample = sample_of(p);
@@ -88,7 +122,7 @@ int spl_default_view_find(const struct spl_points *p, struct spl_default_view *v
     view->fov = 45;
     for (int c = 0; c < 3; c++) {
         double along = direction[turned && c < 2 ? 1 - c : c];
-        view->eye[c] = view->target[c] + 2.2 * reach * along;
+        view->eye[c] = view->target[c] + 1.8 * reach * along;
         view->up[c] = c == 2;
     }
     return 0;

@@ -148,6 +148,38 @@ static void test_every_point_is_there(void **state)
     }
 }
 
+/* Strays aside, the default view shows the cloud, and not as a dot. */
+static void test_default_view(void **state)
+{
+    (void)state;
+    static const enum shape shapes[] = {SHAPE_CUBE, SHAPE_SPHERE, SHAPE_PLANE, SHAPE_GRID, SHAPE_UTM};
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++) {
+        size_t count = 5000, inside = 0;
+        double(*position)[3] = shape_points(shapes[s], count, 71), low = INFINITY, high = -INFINITY;
+        position[0][2] += 1e4;
+        struct spl_error err = {0};
+        struct spl_dataset *dataset;
+        struct spl_camera camera;
+        write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+        assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, NULL, &err), 0);
+        assert_int_equal(spl_dataset_open(path_of("out.spld"), false, &dataset, &err), 0);
+        assert_int_equal(spl_dataset_get_default_camera(dataset, 1280, 720, &camera, &err), 0);
+        for (size_t i = 1; i < count; i++) {
+            double pixel[2], depth;
+            if (!spl_camera_project(&camera, position[i], pixel, &depth))
+                continue;
+            inside += pixel[0] >= 0 && pixel[0] < 1280 && pixel[1] >= 0 && pixel[1] < 720;
+            low = fmin(low, pixel[0]);
+            high = fmax(high, pixel[0]);
+        }
+        assert_true(inside > 0.95 * (double)count);
+        assert_true(high - low > 300);
+        spl_dataset_close(dataset);
+        free(position);
+    }
+    unlink(path_of("out.spld"));
+}
+
 static void expect_same_files(const char *a, const char *b)
 {
     struct stat sa, sb;
@@ -302,6 +334,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_point_is_there),
+        cmocka_unit_test(test_default_view),
         cmocka_unit_test(test_threads_do_not_matter),
         cmocka_unit_test(test_degenerate_clouds),
         cmocka_unit_test(test_refusals),
