@@ -1,0 +1,57 @@
+"""splatd bench: a row for each combination, in the order that the options name them; what cannot be measured is refused."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+SPLATD = os.environ["SPLATD_BINARY"]
+
+
+def run(*arguments):
+    return subprocess.run([SPLATD, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def must(*arguments):
+    done = run(*arguments)
+    assert done.returncode == 0, f"splatd {arguments}: exit {done.returncode}: {done.stderr}"
+    return done.stdout
+
+
+listed = json.loads(run("devices", "--json").stdout)
+backends = list(dict.fromkeys(d["backend"] for d in listed if d["usable"]))
+if not backends:
+    print("no usable device")
+    sys.exit(77)
+
+with tempfile.TemporaryDirectory() as folder:
+    folder = pathlib.Path(folder)
+    must("synth", "courtyard", "--points", 5000, "--format", "ply", "-o", folder)
+    for name in "ab":
+        must("pack", folder / "courtyard.ply", "-o", folder / f"{name}.spld")
+    view = {"eye": [9, 7, 5], "target": [0, 0, 2], "up": [0, 0, 1], "vfov_deg": 50, "near": 0.1, "far": 100}
+    (folder / "views.json").write_text(json.dumps({"yard": {"overview": view, "close": {**view, "eye": [5, 4, 3]}}}))
+    common = ["--frames", 3, "--size", "160x120"]
+
+    report = json.loads(must("bench", folder / "a.spld", folder / "b.spld", *common, "--device", ",".join(backends),
+                             "--method", "points,splat", "--lod", "2,1", "--views", folder / "views.json", "--json"))
+    assert (report["width"], report["height"], report["frames"]) == (160, 120, 3), report
+    got = [(r["dataset"], r["backend"], r["method"], r["lod"]) for r in report["rows"]]
+    assert got == [(d, b, m, l) for d in "ab" for b in backends for m in ("points", "splat") for l in (2, 1)], got
+    for r in report["rows"]:
+        for times in (r["frame_ms"], r["units"], report["calibrator_ms"]):
+            assert 0 < times["min"] <= times["q1"] <= times["median"] <= times["q3"] <= times["max"], r
+        assert r["splats_drawn"] > 0 and r["incomplete_frames"] == 0 and r["floor_ms"] > 0, r
+    drawn = {got[i]: r["splats_drawn"] for i, r in enumerate(report["rows"])}
+    for d, b, m, lod in got:
+        assert drawn[d, b, m, lod] == drawn["a", backends[0], "splat", lod], drawn
+
+    table = must("bench", folder / "a.spld", *common)
+    assert "1 unit =" in table and sum(line.startswith("a ") for line in table.splitlines()) == 1, table
+
+    for wrong in (["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],
+                  ["--views", folder / "no.json"], ["--method", "lines"], ["--lod", "-1"], ["--size", "160"]):
+        done = run("bench", folder / "a.spld", *wrong)
+        assert done.returncode == 2 and done.stderr and not done.stdout, (wrong, done)
+    assert run("bench", folder / "a.spld", "--device", "no such device").returncode == 1
