@@ -4,18 +4,9 @@
  * neighbour lists live as long as their block; only points with a neighbour in another block keep theirs, a few percent,
  * until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does the result.
  *
- * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K): right amid a surface.
- * Elsewhere it would make blobs, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the normal's PCA) and the
- * surroundings limit it:
- * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
- * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows round.
- *   A noisy surface looks like one too: the neighbours' neighbours tell, and give the normal where they show a surface;
- * - no radius exceeds a small multiple of the median of its neighbours' radii (a stray point beside a surface), nor of the
- *   median of the few thousand points around it (a flock of strays): a smaller multiple where there is no surface.
- * Scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all on one
- * side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest point in each
- * direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much closer.
- */
+ * The radius that a point's own neighbours give (radius.c) still makes blobs of stray points. So none exceeds a small
+ * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand points
+ * around it (a flock of strays): a smaller multiple where there is no surface. */
 #include "pack/points.h"
 
 #include <math.h>
@@ -24,9 +15,8 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "geom/eigen.h"
-#include "pack/neighbours.h"
 #include "pack/orient.h"
+#include "pack/radius.h"
 
 enum { block_points = 1 << 16 };
 static const float lone_radius = 0.01f;       /* of a point without any other, metres */
@@ -34,9 +24,6 @@ static const float smallest_radius = 1e-9f;   /* keeps squares and quotients of 
 static const float stray_limit = 2.5f;        /* times the median radius of the neighbours */
 static const float flat_limit = 4, round_limit = 2; /* times the median radius of the run of points around */
 enum { run_points = 4096, run_sample = 256, wide_factor = 3 };
-static const double linear_below = 0.15;      /* sigma_1 / sigma_2 */
-static const double coplanar = 0.25;          /* slope within which a far point continues a surface */
-static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
 
 struct deferred {            /* a point with a neighbour in another block */
     uint32_t point;
@@ -52,13 +39,8 @@ struct block {
     uint32_t component_count, first_component;
 };
 
-/* What a point's neighbours sum up to, relative to the point. */
-struct moments {
-    float count, sum[3], square[6]; /* xx xy xz yy yz zz; the point itself counts and adds nothing */
-};
-
 struct scratch {             /* of one worker */
-    struct moments *moments; /* of each point of the block */
+    struct spl_moments *moments; /* of each point of the block */
     uint32_t *neighbours;    /* k a point, unused ones UINT32_MAX */
     float *limit;            /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
                                 radius, that times the median, its settled radius */
@@ -78,191 +60,14 @@ struct surface {
     atomic_bool failed;
 };
 
-static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
-
-static struct moments moments_of(const struct spl_points *p, size_t i, const struct spl_nearest *near)
-{
-    double sum[3] = {0}, m[6] = {0};
-    for (unsigned a = 0; a < near->count; a++) {
-        uint32_t j = near->index[a];
-        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
-        for (int c = 0; c < 3; c++)
-            sum[c] += d[c];
-        m[0] += d[0] * d[0];
-        m[1] += d[0] * d[1];
-        m[2] += d[0] * d[2];
-        m[3] += d[1] * d[1];
-        m[4] += d[1] * d[2];
-        m[5] += d[2] * d[2];
-    }
-    struct moments moments = {.count = (float)near->count + 1};
-    for (int c = 0; c < 3; c++)
-        moments.sum[c] = (float)sum[c];
-    for (int e = 0; e < 6; e++)
-        moments.square[e] = (float)m[e];
-    return moments;
-}
-
-/* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost. */
-static struct moments widen(const struct surface *s, const struct scratch *w, size_t begin, size_t end, size_t i)
-{
-    const struct spl_points *p = s->points;
-    const uint32_t *list = w->neighbours + (i - begin) * s->k;
-    struct moments wide = w->moments[i - begin];
-    for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++) {
-        size_t j = list[a];
-        if (j < begin || j >= end)
-            continue;
-        const struct moments *m = &w->moments[j - begin];
-        float d[3];
-        for (int c = 0; c < 3; c++) {
-            d[c] = (float)(p->axis[c][j] - p->axis[c][i]);
-            wide.sum[c] += m->sum[c] + m->count * d[c];
-        }
-        for (int e = 0; e < 6; e++)
-            wide.square[e] += m->square[e] + d[row[e]] * m->sum[column[e]] + m->sum[row[e]] * d[column[e]] +
-                              m->count * d[row[e]] * d[column[e]];
-        wide.count += m->count;
-    }
-    return wide;
-}
-
-/* How the points around one are spread. */
-struct spread {
-    double sigma[3];         /* ascending */
-    double normal[3], along[3]; /* of the least and of the largest sigma */
-};
-
-static struct spread spread_of(const struct moments *moments)
-{
-    double m[6], n = moments->count;
-    struct spread spread;
-    for (int e = 0; e < 6; e++)
-        m[e] = moments->square[e] / n - (double)moments->sum[row[e]] * moments->sum[column[e]] / (n * n);
-    spl_eigen_symmetric(m, spread.sigma, spread.normal, spread.along);
-    for (int c = 0; c < 3; c++)
-        spread.sigma[c] = sqrt(fmax(0, spread.sigma[c]));
-    return spread;
-}
-
-/* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none is.
- * Points that stand out of the plane by more than `slope` of their distance do not count. */
-static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count,
-                    const double normal[3], double slope, double nearest[8])
-{
-    /* any two axes across the normal, of equal length */
-    int least = fabs(normal[0]) < fabs(normal[1]) ? 0 : 1;
-    least = fabs(normal[2]) < fabs(normal[least]) ? 2 : least;
-    int b = (least + 1) % 3, c = (least + 2) % 3;
-    double x[3], y[3];
-    x[least] = 0, x[b] = normal[c], x[c] = -normal[b];
-    y[least] = normal[b] * x[c] - normal[c] * x[b], y[b] = normal[c] * x[least] - normal[least] * x[c];
-    y[c] = normal[least] * x[b] - normal[b] * x[least];
-    for (int e = 0; e < 8; e++)
-        nearest[e] = INFINITY;
-    for (unsigned a = 0; a < count && neighbours[a] != UINT32_MAX; a++) {
-        uint32_t j = neighbours[a];
-        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
-        double u = d[0] * x[0] + d[1] * x[1] + d[2] * x[2], v = d[0] * y[0] + d[1] * y[1] + d[2] * y[2];
-        double h = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2];
-        double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        if (h * h > slope * slope * squared)
-            continue;
-        static const uint8_t turn[8] = {4, 5, 3, 2, 7, 6, 0, 1}; /* counted around */
-        uint8_t e = turn[(u > 0) * 4 + (v > 0) * 2 + (fabs(v) > fabs(u))];
-        nearest[e] = squared < nearest[e] ? squared : nearest[e];
-    }
-}
-
-/* What the eighths say of a point's place. */
-struct place {
-    double gap;    /* largest distance to the nearest point in a quarter of the plane, of quarters that hold any */
-    double filled; /* share of the eighths that hold any */
-    bool on_line;  /* two opposite quarters are empty */
-    bool one_sided; /* three eighths in a row are empty */
-};
-
-static struct place place_of(const double nearest[8])
-{
-    struct place place = {0};
-    double quarter[8];
-    unsigned empty = 0;
-    for (int e = 0; e < 8; e++) {
-        quarter[e] = fmin(nearest[e], nearest[(e + 1) % 8]);
-        if (quarter[e] < INFINITY)
-            place.gap = fmax(place.gap, quarter[e]);
-        place.filled += nearest[e] < INFINITY ? 0.125 : 0;
-        empty |= (unsigned)!(nearest[e] < INFINITY) << e;
-    }
-    empty |= empty << 8;
-    place.one_sided = empty & empty >> 1 & empty >> 2;
-    for (int e = 0; e < 4; e++)
-        place.on_line |= !(quarter[e] < INFINITY) && !(quarter[e + 4] < INFINITY);
-    place.gap = sqrt(place.gap);
-    return place;
-}
-
-/* 0 on a surface or a line, 1 in a volume. */
-static double roundness(const struct spread *spread)
-{
-    if (spread->sigma[1] < linear_below * spread->sigma[2])
-        return 0;
-    double t = (spread->sigma[0] / spread->sigma[1] - round_from) / (round_to - round_from);
-    t = fmin(1, fmax(0, t));
-    return t * t * (3 - 2 * t);
-}
-
-/* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
-static double radius_of(const struct surface *s, const struct scratch *w, size_t begin, size_t end, size_t i,
-                        double reach, struct spl_nearest *near, double normal[3], double *round)
-{
-    const struct spl_points *p = s->points;
-    const struct moments *moments = &w->moments[i - begin];
-    struct spread spread = spread_of(moments);
-    double n = moments->count - 1, radius = 2 * reach / sqrt(n), nearest[8];
-    bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
-    memcpy(normal, spread.normal, sizeof spread.normal);
-    *round = roundness(&spread);
-    if (*round > 0) {
-        struct moments around = widen(s, w, begin, end, i);
-        struct spread wide = spread_of(&around);
-        double wide_round = roundness(&wide);
-        if (wide_round < *round) {
-            memcpy(normal, wide.normal, sizeof wide.normal);
-            *round = wide_round;
-        }
-    }
-    double volume = *round * *round; /* squared twice: a rough surface is not to open up */
-    radius *= 1 - 0.5 * volume * volume;
-    eighths(p, i, w->neighbours + (i - begin) * s->k, s->k, normal, 1, nearest);
-    struct place place = place_of(nearest);
-    if (*round > 0.1 || !(linear || place.on_line || place.one_sided))
-        return radius;
-
-    spl_neighbours_find(s->neighbours, i, s->wide, near);
-    if (linear) {
-        struct moments around = moments_of(p, i, near);
-        struct spread wide = spread_of(&around);
-        bool surface = wide.sigma[1] >= linear_below * wide.sigma[2] && roundness(&wide) == 0;
-        eighths(p, i, near->index, near->count, wide.normal, coplanar, nearest);
-        if (!surface || place_of(nearest).on_line) /* a wire: its points are 2 reach / n apart */
-            return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
-        memcpy(normal, wide.normal, sizeof wide.normal);
-    }
-    eighths(p, i, near->index, near->count, normal, coplanar, nearest);
-    place = place_of(nearest);
-    return fmax(radius * sqrt(fmax(place.filled, 0.25)), fmin(0.55 * place.gap, 2 * radius));
-}
-
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
-static bool estimate(const struct surface *s, struct scratch *w, size_t begin, size_t end, size_t i,
-                     struct spl_nearest *near)
+static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near,
+                     float *limit)
 {
-    struct spl_points *p = s->points;
     double least[3], round, side = 1;
-    double reach = w->limit[i - begin];
-    p->radius[i] = fmaxf((float)radius_of(s, w, begin, end, i, reach, near, least, &round), smallest_radius);
-    w->limit[i - begin] = flat_limit + (float)round * (round_limit - flat_limit);
+    double radius = spl_radius_estimate(vicinity, i, *limit, near, least, &round);
+    p->radius[i] = fmaxf((float)radius, smallest_radius);
+    *limit = flat_limit + (float)round * (round_limit - flat_limit);
 
     float *normal = p->normal[i];
     if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0)
@@ -403,14 +208,15 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             uint32_t *list = w->neighbours + (i - begin) * s->k;
             for (unsigned a = 0; a < s->k; a++)
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
-            w->moments[i - begin] = moments_of(s->points, i, &near);
+            w->moments[i - begin] = spl_moments_of(s->points, i, &near);
             w->limit[i - begin] = (float)near.farthest;
             if ((i & 4095) == 4095)
                 spl_stage_add(s->stage, 4096, worker);
         }
+        const struct spl_vicinity vicinity = {s->points, s->neighbours, begin, end, w->moments, w->neighbours, s->k, s->wide};
         spl_nearest_init(&near);
         for (size_t i = begin; i < end; i++)
-            w->orient.anchored[i - begin] = estimate(s, w, begin, end, i, &near);
+            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &near, &w->limit[i - begin]);
         limit_runs(s->points, begin, end, w->limit);
         if (!keep_deferred(s, &s->blocks[b], begin, end, w) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {

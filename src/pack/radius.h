@@ -1,0 +1,29 @@
+/* Normal and radius of one point from its neighbours. */
+#ifndef SPL_PACK_RADIUS_H
+#define SPL_PACK_RADIUS_H
+
+#include "pack/neighbours.h"
+
+/* What a point's neighbours sum up to, relative to the point. */
+struct spl_moments {
+    float count, sum[3], square[6]; /* xx xy xz yy yz zz; the point itself counts and adds nothing */
+};
+
+struct spl_moments spl_moments_of(const struct spl_points *points, size_t i, const struct spl_nearest *near);
+
+/* What is known of a run of points [begin, end) before their radii are made. */
+struct spl_vicinity {
+    const struct spl_points *points;
+    const struct spl_neighbours *neighbours;
+    size_t begin, end;
+    const struct spl_moments *moments; /* one a point of the run */
+    const uint32_t *lists;             /* k neighbours a point of the run, unused ones UINT32_MAX */
+    unsigned k, wide;                  /* neighbours that are listed, and that are asked for where those do not tell */
+};
+
+/* Radius of point i of the run, which has `reach` to its farthest listed neighbour; its normal, of either sign; and how round
+ * its surroundings are, from 0 (a surface or a line) to 1 (a volume). `near` is scratch for searches in order. */
+double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, double reach, struct spl_nearest *near,
+                           double normal[3], double *round);
+
+#endif
