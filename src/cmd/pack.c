@@ -1,5 +1,5 @@
-/* splatd pack: scans in, a dataset out. On SIGINT and SIGTERM the temporary file is removed in the handler; the target is
- * never touched before the library's last rename. */
+/* splatd pack: scans in, a dataset out. On SIGINT and SIGTERM the temporary file is removed in the handler; the target
+ * is never touched before the library's last rename. */
 #include "cmd/cmd.h"
 
 #include <getopt.h>
@@ -19,7 +19,8 @@ static void usage(FILE *out)
             "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
             "                   [--normal-error DEG] [--threads N]\n\n"
             "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
-            "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept once.\n\n"
+            "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
+            "once.\n\n"
             "One scan, and what came of it:\n"
             "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
             "Several scans of one place, in the same coordinates, into one dataset:\n"
@@ -61,11 +62,12 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
 {
     uint64_t total = 0;
     double splats = (double)r->splats;
-    fprintf(stderr, "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %u nodes, %u pages\n",
+    fprintf(stderr,
+            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %u nodes, %u pages\n",
             output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
             (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels, r->nodes, r->pages);
-    fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n",
-            100 * (splats / (double)r->leaf_splats - 1), (unsigned long long)r->leaf_splats);
+    fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
+            (unsigned long long)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++) {
         total += r->attribute_bits[a];

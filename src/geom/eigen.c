@@ -2,8 +2,8 @@
  *
  * The matrix is scaled to a largest element of 1 first, so that neither products nor the tests for a double eigenvalue
  * depend on the unit. An eigenvalue is taken as double when the cross products vanish to rounding; then any vector
- * across the other end's eigenvector is right, and the one nearest to +z is taken: wires and vertical poles get the same
- * normal at every point. */
+ * across the other end's eigenvector is right, and the one nearest to +z is taken: wires and vertical poles get the
+ * same normal at every point. */
 #include "geom/eigen.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* Morton (Z) order of 21 bits an axis: x in bit 0, y in bit 1, z in bit 2 of each triple, so the top triple is the root's
- * octant. Pure functions; any thread. */
+/* Morton (Z) order of 21 bits an axis: x in bit 0, y in bit 1, z in bit 2 of each triple, so the top triple is the
+ * root's octant. Pure functions; any thread. */
 #ifndef SPL_GEOM_MORTON_H
 #define SPL_GEOM_MORTON_H
 

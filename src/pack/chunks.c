@@ -1,4 +1,5 @@
-/* Recursive median split along the longest axis (sparse-coding paper, section 3.5.1), at multiples of 128 down to chunks.
+/* Recursive median split along the longest axis (sparse-coding paper, section 3.5.1), at multiples of 128 down to
+ * chunks.
  *
  * Inside a chunk the splitting goes on down to single splats, and the two halves of each split are interleaved: so the
  * first 2^k splats of a chunk are one of each of its 2^k parts, and any prefix is as even as the splits are. */
@@ -28,8 +29,8 @@ static void swap(struct spl_cut *a, struct spl_cut *b)
     *b = t;
 }
 
-/* Puts the `nth` smallest along `axis` in its place, smaller ones before it. Stops at equal values, so runs of them split
- * evenly. */
+/* Puts the `nth` smallest along `axis` in its place, smaller ones before it. Stops at equal values, so runs of them
+ * split evenly. */
 static void select_nth(struct spl_cut *items, size_t count, size_t nth, unsigned axis)
 {
     size_t begin = 0, end = count;

@@ -7,7 +7,7 @@
 
 struct spl_cut {
     float position[3];
-    uint32_t index;       /* of the caller */
+    uint32_t index; /* of the caller */
 };
 
 /* Reorders `items` so that each run of SPL_CHUNK_SPLATS (the last one shorter) is a chunk: compact in space, and every

@@ -1,5 +1,6 @@
-/* Nodes are cut, ordered and encoded in parallel, a batch at a time, and written in order by the calling thread: the file
- * is the same for any number of threads. Nodes go out breadth first, so the coarse levels share the first pages. */
+/* Nodes are cut, ordered and encoded in parallel, a batch at a time, and written in order by the calling thread: the
+ * file is the same for any number of threads. Nodes go out breadth first, so the coarse levels share the first pages.
+ */
 #include "pack/emit.h"
 
 #include <math.h>
@@ -11,7 +12,7 @@
 #include "pack/chunks.h"
 
 enum { batch_nodes = 256 };
-struct encoded {                 /* one node of the batch; owned by the batch */
+struct encoded { /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
     size_t word_count;
@@ -19,7 +20,7 @@ struct encoded {                 /* one node of the batch; owned by the batch */
     struct spl_chunk_error error;
 };
 
-struct scratch {                 /* of one worker, for the largest node */
+struct scratch { /* of one worker, for the largest node */
     struct spl_cut *items;
     uint32_t *words;
     float *radii;
@@ -33,7 +34,7 @@ struct emit {
     struct scratch *scratch;
     struct encoded *batch;
     struct spl_node *nodes;
-    size_t first;                /* node of the batch's first element */
+    size_t first; /* node of the batch's first element */
     atomic_bool failed;
 };
 
@@ -175,8 +176,8 @@ static void count_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUT
     bits[SPL_ATTRIBUTE_CLASS] += classification;
     bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
     /* Streams end on whole words: what that wastes belongs to the chunk. */
-    bits[SPL_ATTRIBUTE_CHUNK] += sizeof *chunk * 8 + streams - position - normal - radius - color - classification -
-                                 uncertainty;
+    bits[SPL_ATTRIBUTE_CHUNK] +=
+        sizeof *chunk * 8 + streams - position - normal - radius - color - classification - uncertainty;
 }
 
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
@@ -268,8 +269,7 @@ static void clear_batch(struct encoded *batch)
 }
 
 int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
-             struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out,
-             struct spl_error *err)
+             struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out, struct spl_error *err)
 {
     struct emit e = {.tree = tree, .points = points, .options = options, .stage = stage};
     size_t chunk_capacity = 0, splats = 0;

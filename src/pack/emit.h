@@ -7,7 +7,7 @@
 #include "pack/tree.h"
 
 struct spl_emitted {
-    struct spl_node *nodes;      /* as many as the tree has */
+    struct spl_node *nodes; /* as many as the tree has */
     struct spl_chunk *chunks;
     uint32_t chunk_count;
     uint32_t pages;

@@ -57,8 +57,8 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
     return 0;
 }
 
-static int append(struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes, uint32_t first_station,
-                  const char *path, struct spl_error *err)
+static int append(struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
+                  uint32_t first_station, const char *path, struct spl_error *err)
 {
     int rc = reserve(p, batch->count, attributes, err);
     if (rc)
@@ -68,9 +68,10 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, uin
         for (int c = 0; c < 3; c++) {
             double v = batch->position[i][c];
             if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(err, SPL_E_INPUT, "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
-                                "file's scale and columns", path, (unsigned long long)(p->points_read + i), "xyz"[c], v,
-                                SPL_COORDINATE_MAX);
+                return spl_fail(err, SPL_E_INPUT,
+                                "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
+                                "file's scale and columns",
+                                path, (unsigned long long)(p->points_read + i), "xyz"[c], v, SPL_COORDINATE_MAX);
             p->axis[c][at] = fabs(v) < nothing ? 0 : v;
         }
         uint32_t color = grey;

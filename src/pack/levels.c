@@ -1,9 +1,9 @@
 /* Inner nodes: their children's splats, clustered on a grid.
  *
- * A cell gives one splat, or two where normals oppose, so that a thin wall keeps both its faces. The cell is as large as it
- * must be for the node to hold about a quarter of its children's splats, which is what doubling the spacing of a surface
- * means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts, reaches over
- * them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
+ * A cell gives one splat, or two where normals oppose, so that a thin wall keeps both its faces. The cell is as large
+ * as it must be for the node to hold about a quarter of its children's splats, which is what doubling the spacing of a
+ * surface means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts,
+ * reaches over them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
  * Nodes of one depth are done in parallel; each is done by one worker in the order of its children, so the result does
  * not depend on the number of threads. */
 #include "pack/tree.h"
@@ -15,23 +15,24 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-/* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level. */
+/* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
+ */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
 enum { attempts = 6, inner_most = 12288 };
 
 struct cluster {
     uint64_t cell;
-    uint32_t other;              /* the cell's second cluster, 0 = none */
-    uint32_t votes;              /* of `classification`, majority by pairing off */
+    uint32_t other; /* the cell's second cluster, 0 = none */
+    uint32_t votes; /* of `classification`, majority by pairing off */
     uint8_t classification;
     float largest;
     double weight, position[3], squared, normal[3], color[3], uncertainty;
 };
 
-struct scratch {                 /* of one worker */
+struct scratch { /* of one worker */
     struct spl_inner_splat *input;
     struct cluster *clusters;
-    uint32_t *table;             /* cell -> cluster + 1 */
+    uint32_t *table; /* cell -> cluster + 1 */
     float *radii;
     size_t input_capacity, table_size;
 };
@@ -41,7 +42,7 @@ struct levels {
     const struct spl_points *points;
     struct spl_stage *stage;
     struct scratch *scratch;
-    const uint32_t *order;       /* inner nodes of the depth at work */
+    const uint32_t *order; /* inner nodes of the depth at work */
     atomic_bool failed;
 };
 

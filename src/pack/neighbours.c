@@ -1,9 +1,9 @@
-/* Nearest neighbours over Morton order: every 16 points in a row are a leaf with a box, every 8 boxes a group with a box
- * of its own, up to one group. A search starts from a proven bound, given by the points beside it in order; the 16 searches
- * of a leaf share one walk over the boxes, which lists the leaves that any of their bounds reaches. Where these are too many
- * (a stray point in the leaf, or two far ends of the order), each search walks alone, nearest boxes first. What lies within
- * the bound is collected, and the bound tightened whenever the buffer is full; so neither a stray point nor a dense
- * cluster makes a search look at more than its surroundings.
+/* Nearest neighbours over Morton order: every 16 points in a row are a leaf with a box, every 8 boxes a group with a
+ * box of its own, up to one group. A search starts from a proven bound, given by the points beside it in order; the 16
+ * searches of a leaf share one walk over the boxes, which lists the leaves that any of their bounds reaches. Where
+ * these are too many (a stray point in the leaf, or two far ends of the order), each search walks alone, nearest boxes
+ * first. What lies within the bound is collected, and the bound tightened whenever the buffer is full; so neither a
+ * stray point nor a dense cluster makes a search look at more than its surroundings.
  *
  * Everything is doubles: a cloud of 10^9 metres with millimetre detail needs no special case. Loops over 16 points or
  * 8 boxes are written to vectorise, and compiled twice, for AVX2 and for the base architecture; contraction is off, so
@@ -16,9 +16,15 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { lanes = 4, leaf = SPL_NEAR_LEAF, fan = 8, levels_max = 12, stack_max = levels_max * fan,
-    spare = 40,                       /* candidates beyond the wanted ones that wait for a reduction */
-    buffer_max = (SPL_NEIGHBOURS_MAX + 1 + spare + leaf + lanes - 1) / lanes * lanes };
+enum {
+    lanes = 4,
+    leaf = SPL_NEAR_LEAF,
+    fan = 8,
+    levels_max = 12,
+    stack_max = levels_max * fan,
+    spare = 40, /* candidates beyond the wanted ones that wait for a reduction */
+    buffer_max = (SPL_NEIGHBOURS_MAX + 1 + spare + leaf + lanes - 1) / lanes * lanes
+};
 _Static_assert((int)leaf <= (int)SPL_POINTS_PAD, "the last leaf is read whole");
 
 struct group {
@@ -27,15 +33,15 @@ struct group {
 
 struct spl_neighbours {
     const struct spl_points *points;
-    struct group *groups;             /* all levels, leaves' first */
-    size_t first[levels_max];         /* of each level in groups */
-    size_t boxes[levels_max];         /* used ones of each level */
+    struct group *groups;     /* all levels, leaves' first */
+    size_t first[levels_max]; /* of each level in groups */
+    size_t boxes[levels_max]; /* used ones of each level */
     unsigned levels;
 };
 
 struct candidates {
     unsigned count, wanted;
-    double bound;                     /* squared; `wanted` points lie within it */
+    double bound; /* squared; `wanted` points lie within it */
     double squared[buffer_max];
     uint32_t index[buffer_max];
 };
@@ -43,7 +49,7 @@ struct candidates {
 struct entry {
     double squared;
     uint32_t box;
-    unsigned level;                   /* whose groups the box names: `box` is a group of that level */
+    unsigned level; /* whose groups the box names: `box` is a group of that level */
 };
 
 static void leaf_boxes(void *context, size_t begin, size_t end, unsigned worker)
@@ -146,8 +152,8 @@ INLINE double next_above(const double *values, unsigned n, double limit)
 }
 
 /* Keeps the `wanted` nearest candidates and tightens the bound to the farthest of them. The threshold that counts just
- * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. Where several are
- * equally far (points on a grid), the first of them are kept. */
+ * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. Where several
+ * are equally far (points on a grid), the first of them are kept. */
 INLINE void reduce(struct candidates *c)
 {
     unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted, ties = 0;
@@ -159,8 +165,9 @@ INLINE void reduce(struct candidates *c)
     for (int step = 0; low_count < wanted && ties == 0; step++) {
         bool by_value = step >= 4;
         double from = low > 0 ? low : 0;
-        double t = by_value ? next_above(c->squared, n, low)
-                            : from + (high - from) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
+        double t = by_value
+                       ? next_above(c->squared, n, low)
+                       : from + (high - from) * ((double)(wanted - low_count) + 0.4) / (double)(high_count - low_count);
         unsigned count = count_within(c->squared, n, t);
         if (count <= wanted) {
             low = t;

@@ -8,13 +8,13 @@ struct spl_neighbours;
 
 enum { SPL_NEAR_LEAF = 16, SPL_NEAR_LEAVES = 64 };
 
-/* What a search found, unsorted, and what the searches for the points beside it in order share: spl_nearest_init() it, then
- * reuse it. */
+/* What a search found, unsorted, and what the searches for the points beside it in order share: spl_nearest_init() it,
+ * then reuse it. */
 struct spl_nearest {
     unsigned count;
     uint32_t index[SPL_NEIGHBOURS_MAX + 1];
-    double squared[SPL_NEIGHBOURS_MAX + 1];  /* distances, squared */
-    double farthest;                         /* distance of the farthest one */
+    double squared[SPL_NEIGHBOURS_MAX + 1]; /* distances, squared */
+    double farthest;                        /* distance of the farthest one */
     /* Private: the leaf of the last point, bounds for its points, and the leaves around it where they are few. */
     size_t leaf;
     unsigned leaves;

@@ -1,7 +1,7 @@
 /* Morton order over the cubic bounds, and exact duplicates out.
  *
- * A stable parallel radix sort of (key, index) pairs: each pass counts per piece, one prefix sum, each piece scatters, so
- * the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
+ * A stable parallel radix sort of (key, index) pairs: each pass counts per piece, one prefix sum, each piece scatters,
+ * so the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
  * their own bounds, recursively, so that a dense cluster in a wide cloud is as well ordered as any other; equal
  * coordinates can only lie in one such run. */
 #include "pack/points.h"
@@ -147,8 +147,8 @@ static int compare_pairs(const void *a, const void *b)
     return p->index < q->index ? -1 : p->index > q->index;
 }
 
-/* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and so
- * is each run of equal keys. */
+/* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and
+ * so is each run of equal keys. */
 static void order_run(struct order *o, uint32_t *index, size_t n)
 {
     const struct spl_points *p = o->points;

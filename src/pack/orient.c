@@ -1,8 +1,8 @@
 /* Signs of normals by growing a forest over the neighbour graph, most certain edges first.
  *
  * Two neighbouring normals agree in sign when one, mirrored in the plane between the points, resembles the other: that
- * is right on a plane and around a corner alike, where the plain scalar product is a coin toss. Edges are taken in a few
- * passes of falling certainty, in index order, so the result depends on nothing but the points. Blocks are done in
+ * is right on a plane and around a corner alike, where the plain scalar product is a coin toss. Edges are taken in a
+ * few passes of falling certainty, in index order, so the result depends on nothing but the points. Blocks are done in
  * parallel; their components are then joined over the edges between blocks in the same way. */
 #include "pack/orient.h"
 
@@ -62,8 +62,8 @@ static uint32_t find_root(uint32_t *parent, uint8_t *flip, uint32_t i, uint8_t *
     return i;
 }
 
-/* Joins the trees of a and b; the smaller root stays, so that roots precede their trees. Anchored trees keep their sign, so
- * two of them never join. */
+/* Joins the trees of a and b; the smaller root stays, so that roots precede their trees. Anchored trees keep their
+ * sign, so two of them never join. */
 static void join(uint32_t *parent, uint8_t *flip, uint8_t *anchored, uint32_t a, uint32_t b, bool opposed)
 {
     uint8_t sa, sb;

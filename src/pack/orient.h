@@ -6,24 +6,24 @@
 
 /* A set of points whose normals have settled signs relative to each other: all within one block. */
 struct spl_component {
-    double up;             /* sum of the normals' z */
-    bool anchored;         /* holds a point whose normal was given or faces its station: the set is never turned */
-    uint8_t flip;          /* result of spl_orient_components(): 1 = turn the set's normals */
+    double up;     /* sum of the normals' z */
+    bool anchored; /* holds a point whose normal was given or faces its station: the set is never turned */
+    uint8_t flip;  /* result of spl_orient_components(): 1 = turn the set's normals */
 };
 
 /* Scratch of one worker for a block of up to `capacity` points. */
 struct spl_orient {
-    uint32_t *parent;      /* forest over the block's points */
-    uint8_t *flip;         /* sign relative to the parent */
-    uint32_t *label;       /* out: component of each point, numbered from 0 in the block */
-    uint8_t *anchored;     /* in: 1 where the normal's side is known */
+    uint32_t *parent;  /* forest over the block's points */
+    uint8_t *flip;     /* sign relative to the parent */
+    uint32_t *label;   /* out: component of each point, numbered from 0 in the block */
+    uint8_t *anchored; /* in: 1 where the normal's side is known */
 };
 
 int spl_orient_init(struct spl_orient *orient, size_t capacity, struct spl_error *err);
 void spl_orient_finish(struct spl_orient *orient);
 
-/* Signs within the block [begin, end): `neighbours` holds `k` indices a point (unused ones UINT32_MAX). Turns normals so
- * that each component agrees with itself; returns the number of components. */
+/* Signs within the block [begin, end): `neighbours` holds `k` indices a point (unused ones UINT32_MAX). Turns normals
+ * so that each component agrees with itself; returns the number of components. */
 uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, size_t begin, size_t end,
                           const uint32_t *neighbours, unsigned k);
 

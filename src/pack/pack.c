@@ -1,9 +1,9 @@
 /* spl_pack(): the stages in a row, and what the file says about itself.
  *
- * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 58 while neighbours are found,
- * and the inner levels' 12 on top of 50 while encoding. The output's temporary file is made first, so that an unwritable
- * place is known before hours of work, and is gone unless the last rename succeeded. Runs on the caller's thread; parallel
- * loops end before it goes on. */
+ * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 58 while neighbours are
+ * found, and the inner levels' 12 on top of 50 while encoding. The output's temporary file is made first, so that an
+ * unwritable place is known before hours of work, and is gone unless the last rename succeeded. Runs on the caller's
+ * thread; parallel loops end before it goes on. */
 #include <splatd/pack.h>
 
 #include <math.h>
@@ -42,13 +42,15 @@ static int check_options(struct pack *p, struct spl_error *err)
     double position = o->position_error != 0 ? o->position_error : 0.016;
     double normal = o->normal_error != 0 ? o->normal_error : 1;
     if (!(position >= 1e-6 && position <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "position-error", "%g; the mean error is a share of the splat radius, "
-                              "1e-6 to 1", position);
+        return spl_fail_field(err, SPL_E_USAGE, "position-error",
+                              "%g; the mean error is a share of the splat radius, "
+                              "1e-6 to 1",
+                              position);
     if (!(normal >= 0.01 && normal <= 30))
         return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
                               normal);
-    p->chunk = (struct spl_chunk_options){.position_error = position, .normal_error = normal * M_PI / 180,
-                                          .radius_error = 0.05, .has_uncertainty = true};
+    p->chunk = (struct spl_chunk_options){
+        .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05, .has_uncertainty = true};
     struct stat output, input;
     if (stat(o->output, &output) == 0) {
         for (size_t i = 0; i < o->input_count; i++)
@@ -101,21 +103,18 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
             json_array_append_new(pose, json_real(points->stations[s][i]));
         json_array_append_new(stations, pose);
     }
-    return json_pack(
-        "{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b}, s:o, s:o, s:o,"
-        " s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
-        "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count,
-        "levels", (int)p->tree.levels, "splat_radius", radius,
-        "bounds", "min", json_vector(points->bounds_min), "max", json_vector(points->bounds_max),
-        "default_view", "eye", json_vector(view->eye), "target", json_vector(view->target), "up",
-        json_vector(view->up), "fov", view->fov,
-        "attributes", "color", (int)points->has_color, "class", (int)points->has_class, "uncertainty", 1,
-        "bits", bits, "sources", sources, "stations", stations,
-        "pack", "neighbours", (int)p->neighbours, "position_error_bound", p->chunk.position_error,
-        "normal_error_bound", p->chunk.normal_error * 180 / M_PI, "points_skipped",
-        (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates, "position_error",
-        p->emitted.error.position_over_radius / (double)p->emitted.splats, "normal_error",
-        p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
+    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b}, s:o, s:o, s:o,"
+                     " s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
+                     "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
+                     (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
+                     "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
+                     json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
+                     (int)points->has_color, "class", (int)points->has_class, "uncertainty", 1, "bits", bits, "sources",
+                     sources, "stations", stations, "pack", "neighbours", (int)p->neighbours, "position_error_bound",
+                     p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
+                     "points_skipped", (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates,
+                     "position_error", p->emitted.error.position_over_radius / (double)p->emitted.splats,
+                     "normal_error", p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
 }
 
 static int write_dataset(struct pack *p, struct spl_error *err)

@@ -10,17 +10,17 @@
 #include "pack/stage.h"
 
 #define SPL_NO_STATION UINT16_MAX
-#define SPL_COORDINATE_MAX 1e12   /* as far as a camera can be */
-enum { SPL_POINTS_PAD = 16 };     /* elements behind the last one that vector loops may read */
+#define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
+enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 struct spl_points {
-    size_t count, capacity;       /* arrays have room for capacity + SPL_POINTS_PAD elements */
-    double *axis[3];              /* x, y, z; sorted in Morton order by spl_points_order() */
-    uint32_t *color_class;        /* r | g << 8 | b << 16 | class << 24 */
-    uint16_t *station;            /* index into stations or SPL_NO_STATION; NULL when no input has any */
-    float (*normal)[3];           /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
-    float *radius, *uncertainty;  /* made by spl_surface() */
-    double (*stations)[16];       /* row-major station-to-world */
+    size_t count, capacity;      /* arrays have room for capacity + SPL_POINTS_PAD elements */
+    double *axis[3];             /* x, y, z; sorted in Morton order by spl_points_order() */
+    uint32_t *color_class;       /* r | g << 8 | b << 16 | class << 24 */
+    uint16_t *station;           /* index into stations or SPL_NO_STATION; NULL when no input has any */
+    float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
+    float *radius, *uncertainty; /* made by spl_surface() */
+    double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
     bool has_color, has_class;
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */

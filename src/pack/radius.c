@@ -1,14 +1,17 @@
 /* Normal and radius of one point from its neighbours (soft-transparency paper, eq. 20).
  *
  * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K): right amid a surface.
- * Elsewhere it would make blobs or leave gaps, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the normal's
- * PCA) changes it:
+ * Elsewhere it would make blobs or leave gaps, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the
+ * normal's PCA) changes it:
  * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
- * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows round.
- *   A noisy surface looks like one too: the neighbours' neighbours tell, and give the normal where they show a surface;
- * - scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all on one
- *   side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest point in
- *   each direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much closer.
+ * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows
+ * round. A noisy surface looks like one too: the neighbours' neighbours tell, and give the normal where they show a
+ * surface;
+ * - scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all
+ * on one side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest
+ * point in each direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much
+ * closer.
+ *
  * Pure functions of the points; any thread. */
 #include "pack/radius.h"
 
@@ -17,8 +20,8 @@
 
 #include "geom/eigen.h"
 
-static const double linear_below = 0.15;      /* sigma_1 / sigma_2 */
-static const double coplanar = 0.25;          /* slope within which a far point continues a surface */
+static const double linear_below = 0.15;                /* sigma_1 / sigma_2 */
+static const double coplanar = 0.25;                    /* slope within which a far point continues a surface */
 static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
 static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
@@ -45,7 +48,8 @@ struct spl_moments spl_moments_of(const struct spl_points *p, size_t i, const st
     return moments;
 }
 
-/* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost. */
+/* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost.
+ */
 static struct spl_moments widen(const struct spl_vicinity *v, size_t i)
 {
     const struct spl_points *p = v->points;
@@ -71,7 +75,7 @@ static struct spl_moments widen(const struct spl_vicinity *v, size_t i)
 
 /* How the points around one are spread. */
 struct spread {
-    double sigma[3];         /* ascending */
+    double sigma[3];            /* ascending */
     double normal[3], along[3]; /* of the least and of the largest sigma */
 };
 
@@ -87,8 +91,8 @@ static struct spread spread_of(const struct spl_moments *moments)
     return spread;
 }
 
-/* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none is.
- * Points that stand out of the plane by more than `slope` of their distance do not count. */
+/* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none
+ * is. Points that stand out of the plane by more than `slope` of their distance do not count. */
 static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count,
                     const double normal[3], double slope, double nearest[8])
 {
@@ -118,9 +122,9 @@ static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighb
 
 /* What the eighths say of a point's place. */
 struct place {
-    double gap;    /* largest distance to the nearest point in a quarter of the plane, of quarters that hold any */
-    double filled; /* share of the eighths that hold any */
-    bool on_line;  /* two opposite quarters are empty */
+    double gap;     /* largest distance to the nearest point in a quarter of the plane, of quarters that hold any */
+    double filled;  /* share of the eighths that hold any */
+    bool on_line;   /* two opposite quarters are empty */
     bool one_sided; /* three eighths in a row are empty */
 };
 

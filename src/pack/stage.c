@@ -1,5 +1,5 @@
-/* A counter and a clock. Worker 0 of every parallel loop is the thread that called spl_pack(), so reporting from it alone
- * keeps the callback on the caller's thread without a lock. */
+/* A counter and a clock. Worker 0 of every parallel loop is the thread that called spl_pack(), so reporting from it
+ * alone keeps the callback on the caller's thread without a lock. */
 #include "pack/stage.h"
 
 #include "base/clock.h"

@@ -10,7 +10,7 @@
 struct spl_stage {
     void (*callback)(void *context, const struct spl_progress *progress); /* may be NULL */
     void *context;
-    unsigned threads;             /* of all parallel loops of this run, >= 1 */
+    unsigned threads; /* of all parallel loops of this run, >= 1 */
     const char *name;
     uint64_t total, begin_ns, reported_ns;
     atomic_uint_fast64_t done;

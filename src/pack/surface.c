@@ -1,12 +1,13 @@
 /* What each point's surroundings say: normal, radius (soft-transparency paper, eq. 20), uncertainty (eq. 21).
  *
  * Blocks of sorted points are done in parallel, each in one go: neighbours, normals, radii, signs within the block. The
- * neighbour lists live as long as their block; only points with a neighbour in another block keep theirs, a few percent,
- * until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does the result.
+ * neighbour lists live as long as their block; only points with a neighbour in another block keep theirs, a few
+ * percent, until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does
+ * the result.
  *
  * The radius that a point's own neighbours give (radius.c) still makes blobs of stray points. So none exceeds a small
- * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand points
- * around it (a flock of strays): a smaller multiple where there is no surface. */
+ * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand
+ * points around it (a flock of strays): a smaller multiple where there is no surface. */
 #include "pack/points.h"
 
 #include <math.h>
@@ -19,31 +20,31 @@
 #include "pack/radius.h"
 
 enum { block_points = 1 << 16 };
-static const float lone_radius = 0.01f;       /* of a point without any other, metres */
-static const float smallest_radius = 1e-9f;   /* keeps squares and quotients of floats in range */
-static const float stray_limit = 2.5f;        /* times the median radius of the neighbours */
+static const float lone_radius = 0.01f;             /* of a point without any other, metres */
+static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
+static const float stray_limit = 2.5f;              /* times the median radius of the neighbours */
 static const float flat_limit = 4, round_limit = 2; /* times the median radius of the run of points around */
 enum { run_points = 4096, run_sample = 256, wide_factor = 3 };
 
-struct deferred {            /* a point with a neighbour in another block */
+struct deferred { /* a point with a neighbour in another block */
     uint32_t point;
-    float limit;             /* of its radius */
+    float limit; /* of its radius */
     float radius, uncertainty;
 };
 
 struct block {
     struct deferred *deferred;
-    uint32_t *neighbours;    /* k a deferred point */
+    uint32_t *neighbours; /* k a deferred point */
     size_t deferred_count;
     struct spl_component *components;
     uint32_t component_count, first_component;
 };
 
-struct scratch {             /* of one worker */
+struct scratch {                 /* of one worker */
     struct spl_moments *moments; /* of each point of the block */
-    uint32_t *neighbours;    /* k a point, unused ones UINT32_MAX */
-    float *limit;            /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
-                                radius, that times the median, its settled radius */
+    uint32_t *neighbours;        /* k a point, unused ones UINT32_MAX */
+    float *limit; /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
+                     radius, that times the median, its settled radius */
     struct spl_orient orient;
 };
 
@@ -54,7 +55,7 @@ struct surface {
     struct scratch *scratch;
     struct block *blocks;
     size_t block_count;
-    uint32_t *label;         /* component of each point within its block; NULL when every side is known */
+    uint32_t *label; /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
     unsigned k, wide;
     atomic_bool failed;
@@ -213,7 +214,8 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             if ((i & 4095) == 4095)
                 spl_stage_add(s->stage, 4096, worker);
         }
-        const struct spl_vicinity vicinity = {s->points, s->neighbours, begin, end, w->moments, w->neighbours, s->k, s->wide};
+        const struct spl_vicinity vicinity = {s->points,  s->neighbours, begin, end,
+                                              w->moments, w->neighbours, s->k,  s->wide};
         spl_nearest_init(&near);
         for (size_t i = begin; i < end; i++)
             w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &near, &w->limit[i - begin]);
@@ -247,10 +249,10 @@ static int join_blocks(struct surface *s, struct spl_error *err)
             const uint32_t *list = block->neighbours + d * s->k;
             for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
                 if (list[a] / block_points != b)
-                    edge[count++] = (struct spl_orient_edge){
-                        block->first_component + s->label[i],
-                        s->blocks[list[a] / block_points].first_component + s->label[list[a]],
-                        spl_orient_agreement(s->points, i, list[a])};
+                    edge[count++] =
+                        (struct spl_orient_edge){block->first_component + s->label[i],
+                                                 s->blocks[list[a] / block_points].first_component + s->label[list[a]],
+                                                 spl_orient_agreement(s->points, i, list[a])};
         }
     }
     if (!rc)

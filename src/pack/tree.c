@@ -1,7 +1,7 @@
 /* Octree by binary search over Morton order: a node is a range of points, its children are the eight ranges of the next
- * three key bits. A cube whose points all lie in one octant is replaced by that octant, so a dense cluster in a wide cloud
- * costs no chain of nodes. Points of equal keys go on in the cube around themselves that spl_points_order() ordered them
- * in. One thread; milliseconds. */
+ * three key bits. A cube whose points all lie in one octant is replaced by that octant, so a dense cluster in a wide
+ * cloud costs no chain of nodes. Points of equal keys go on in the cube around themselves that spl_points_order()
+ * ordered them in. One thread; milliseconds. */
 #include "pack/tree.h"
 
 #include <math.h>
@@ -73,7 +73,8 @@ static unsigned shrink_cube(struct spl_tree_node *node, const struct spl_tree_no
     return level < SPL_MORTON_BITS ? 3 * (SPL_MORTON_BITS - 1 - level) : 0;
 }
 
-/* Whether floats relative to the cube are too coarse for its smallest splat: positions are kept to 2^-25 of the cube. */
+/* Whether floats relative to the cube are too coarse for its smallest splat: positions are kept to 2^-25 of the cube.
+ */
 static bool too_wide(const struct spl_tree_node *node, const struct spl_points *points)
 {
     float smallest = points->radius[node->begin];

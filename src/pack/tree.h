@@ -10,19 +10,19 @@ enum { SPL_LEAF_POINTS = 8192 };
 struct spl_inner_splat {
     float position[3], normal[3];
     float radius, uncertainty;
-    uint32_t color_class;     /* as in struct spl_points */
+    uint32_t color_class; /* as in struct spl_points */
 };
 
 struct spl_tree_node {
-    double origin[3];         /* least corner of its cube */
+    double origin[3]; /* least corner of its cube */
     double size;
-    double frame_low[3], frame_size; /* the cube that its points' keys are counted in, see pack/order.h */
-    size_t begin, end;        /* points below it, in Morton order */
+    double frame_low[3], frame_size;   /* the cube that its points' keys are counted in, see pack/order.h */
+    size_t begin, end;                 /* points below it, in Morton order */
     uint32_t first_child, child_count; /* 0 children: a leaf */
     uint32_t parent;
-    uint32_t depth;           /* of the tree: cubes that hold all points of their parent are skipped */
+    uint32_t depth;                 /* of the tree: cubes that hold all points of their parent are skipped */
     struct spl_inner_splat *splats; /* of an inner node, made by spl_levels_build() */
-    uint32_t splat_count;     /* leaf: end - begin */
+    uint32_t splat_count;           /* leaf: end - begin */
 };
 
 struct spl_tree {
@@ -30,7 +30,8 @@ struct spl_tree {
     uint32_t count, levels;
 };
 
-/* Splits until no leaf has more than SPL_LEAF_POINTS points or is too wide for floats. `points` are sorted, with radii. */
+/* Splits until no leaf has more than SPL_LEAF_POINTS points or is too wide for floats. `points` are sorted, with radii.
+ */
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err);
 
 /* Fills the inner nodes, deepest first: clusters of their children's splats, at most about 28 % as many. */

@@ -19,8 +19,8 @@ static size_t sample_of(const struct spl_points *p)
     return p->count < sample_max ? p->count : sample_max;
 }
 
-/* A station whose points all lie around its z axis is a camera: x right, y down, z forward. A scanner stands upright, and
- * sees around itself. */
+/* A station whose points all lie around its z axis is a camera: x right, y down, z forward. A scanner stands upright,
+ * and sees around itself. */
 static bool view_from_camera(const struct spl_points *p, struct spl_default_view *view)
 {
     const double *pose = p->stations[0];
@@ -87,11 +87,11 @@ static void view_from_station(const struct spl_points *p, struct spl_default_vie
         }
     }
     double angle = (direction + 0.5) / sectors * 2 * M_PI - M_PI;
-    *view = (struct spl_default_view){{eye[0], eye[1], eye[2]},
-                                      {eye[0] + distance * cos(angle), eye[1] + distance * sin(angle),
-                                       eye[2] + distance * slope},
-                                      {0, 0, 1},
-                                      75};
+    *view = (struct spl_default_view){
+        {eye[0], eye[1], eye[2]},
+        {eye[0] + distance * cos(angle), eye[1] + distance * sin(angle), eye[2] + distance * slope},
+        {0, 0, 1},
+        75};
 }
 
 int spl_default_view_find(const struct spl_points *p, struct spl_default_view *view, struct spl_error *err)

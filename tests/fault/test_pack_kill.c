@@ -1,4 +1,5 @@
-/* A pack that is killed leaves the old dataset or none, never half a one; one that is asked to stop cleans up as well. */
+/* A pack that is killed leaves the old dataset or none, never half a one; one that is asked to stop cleans up as well.
+ */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>

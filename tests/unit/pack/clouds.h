@@ -71,7 +71,8 @@ static inline double (*shape_points(enum shape shape, size_t count, uint64_t see
             p[0] = 0.1 * (double)(i % side), p[1] = 0.1 * (double)(i / side), p[2] = 0;
             break;
         case SHAPE_UTM:
-            p[0] = 406000 + 0.001 * floor(1e5 * u), p[1] = 7405000 + 0.001 * floor(1e5 * v), p[2] = 0.001 * floor(1e3 * w);
+            p[0] = 406000 + 0.001 * floor(1e5 * u), p[1] = 7405000 + 0.001 * floor(1e5 * v),
+            p[2] = 0.001 * floor(1e3 * w);
             break;
         default:
             p[0] = u, p[1] = v, p[2] = w;

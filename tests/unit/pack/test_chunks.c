@@ -89,7 +89,8 @@ static double nearest(const struct spl_cut *items, size_t count, const float at[
     return sqrt(best);
 }
 
-/* A prefix of n leaves holes no larger than an even subsample of n has, within a factor; a random one has far larger ones. */
+/* A prefix of n leaves holes no larger than an even subsample of n has, within a factor; a random one has far larger
+ * ones. */
 static void test_prefixes_are_even(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Whole packs of small clouds: what went in is in the dataset, within the stated errors, whatever the cloud and the threads;
- * what cannot be packed leaves nothing behind. */
+/* Whole packs of small clouds: what went in is in the dataset, within the stated errors, whatever the cloud and the
+ * threads; what cannot be packed leaves nothing behind. */
 #include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -33,8 +33,10 @@ static void write_ply(const char *path, const double (*position)[3], size_t coun
 {
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
-    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty double x\nproperty double y\n"
-            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n", count);
+    fprintf(f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty double x\nproperty double y\n"
+            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            count);
     for (size_t i = 0; i < count; i++) {
         uint8_t color[3] = {(uint8_t)i, (uint8_t)(i >> 8), (uint8_t)(i >> 16)};
         fwrite(position[i], sizeof(double), 3, f);
@@ -60,8 +62,8 @@ static int files_in_folder(void)
     return count;
 }
 
-/* Walks the whole dataset: each leaf splat is an input point, within `bound` radii; every point once; children and boxes
- * nest. Returns the mean position error in radii. */
+/* Walks the whole dataset: each leaf splat is an input point, within `bound` radii; every point once; children and
+ * boxes nest. Returns the mean position error in radii. */
 static double check_dataset(const char *path, const double (*position)[3], size_t count, bool distinct)
 {
     struct spl_dataset *dataset;
@@ -86,7 +88,8 @@ static double check_dataset(const char *path, const double (*position)[3], size_
             for (int a = 0; a < 3; a++) {
                 double shift = child->origin[a] - node->origin[a];
                 assert_true(shift >= -1e-6 * node->size && shift + child->size <= node->size * (1 + 1e-6));
-                assert_true(shift + child->box_min[a] >= node->box_min[a] && shift + child->box_max[a] <= node->box_max[a]);
+                assert_true(shift + child->box_min[a] >= node->box_min[a] &&
+                            shift + child->box_max[a] <= node->box_max[a]);
             }
         }
         for (uint32_t c = 0; c < node->chunk_count; c++) {
@@ -289,7 +292,8 @@ static void test_refusals(void **state)
     assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
 }
 
-/* Each of the first allocations in turn is refused, then every fifth: an error, no file, no leak (the sanitizers look). */
+/* Each of the first allocations in turn is refused, then every fifth: an error, no file, no leak (the sanitizers look).
+ */
 static void test_refused_memory(void **state)
 {
     (void)state;
