@@ -148,6 +148,45 @@ static void random_splats_match(void **state)
     done(dataset);
 }
 
+/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most of what follows. */
+static void a_wall_that_hides_the_rest_changes_nothing(void **state)
+{
+    (void)state;
+    enum { blocks = 24, behind = 48 * 128, count = blocks * blocks * 128 + behind };
+    double flock[3] = {0};
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++) {
+        struct make_splat *s = &splats[i];
+        size_t block = i / 128, in = i % 128;
+        if (block < blocks * blocks) {
+            s->position[0] = ((double)(block % blocks) * 16 + in % 16 + uniform()) * 0.005 - 0.96;
+            s->position[2] = ((double)(block / blocks) * 8 + in / 16 + uniform()) * 0.01 - 0.96;
+            s->position[1] = -1 + 0.01 * uniform();
+            s->radius = 0.012f;
+        } else {
+            for (int c = 0; c < 3; c++) { /* small flocks, so that whole chunks hide */
+                flock[c] = in == 0 ? 1.2 * uniform() - 0.6 + (c == 1 ? 0.5 : 0) : flock[c];
+                s->position[c] = flock[c] + 0.1 * uniform();
+            }
+            s->radius = 0.03f;
+        }
+        s->normal[1] = -1;
+        for (int c = 0; c < 3; c++)
+            s->color[c] = (uint8_t)(uniform() * 256);
+    }
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 3, 320, 240);
+    same_images(dataset, &view, "from the side");
+    const double eye[3] = {0.1, -4, 0.2}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, origin, up, NULL), SPL_OK);
+    same_images(dataset, &view, "from the front");
+    view.supersample = 2;
+    same_images(dataset, &view, "from the front, supersampled");
+    done(dataset);
+}
+
 static void inside_the_cloud_matches(void **state)
 {
     (void)state;
@@ -322,6 +361,7 @@ int main(int argc, char **argv)
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_splats_match),
+        cmocka_unit_test(a_wall_that_hides_the_rest_changes_nothing),
         cmocka_unit_test(inside_the_cloud_matches),
         cmocka_unit_test(far_coordinates_match_near_ones),
         cmocka_unit_test(a_million_splats_on_one_pixel_do_not_wrap),
