@@ -57,8 +57,8 @@
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
 
-/* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane as long as that lies
- * within this many sample sizes of the centre's depth (a slant of 76 degrees), else the centre's. */
+/* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many sample
+ * sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f
 
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */

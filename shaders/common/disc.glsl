@@ -2,7 +2,9 @@
  *
  * The sample's ray meets the disc's plane at z = n.p / n.d (d.z = 1), exact under perspective. A splat that is smaller
  * than a sample still covers the sample that its centre falls on: within `low_pass` samples of the centre it counts as
- * covered, with its plane's depth there as long as that is near the centre's (SPL_LOW_PASS_REACH). */
+ * covered. Its depth there is the plane's, clamped to what the disc spans, r sqrt(1 - n.z^2) around its centre, or to
+ * SPL_LOW_PASS_REACH if that is more. Written without comparisons: software drivers pay more for a select than for a
+ * product. */
 #ifndef SPL_DISC_GLSL
 #define SPL_DISC_GLSL
 
@@ -13,12 +15,12 @@ struct disc {
     vec2 center;       /* samples */
     float depth;       /* of the centre */
     float margin;      /* metres that the disc is pushed back for blending */
-    /* With (u, v) = sample - centre: z = depth * k, k = facing / (facing + slope.u u + slope.v v); the hit is off the
-     * centre by depth * (ray.x (k - 1) + u k / fx, ray.y (k - 1) + v k / fy, k - 1). */
-    float facing;
+    /* With uv = sample - centre: the plane is hit at depth k, k = 1 / (1 + slope . uv) (never behind the eye: there the
+     * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth / radius. */
     vec2 slope;
-    vec2 ray;          /* the centre's */
-    float inverse_radius_squared; /* (depth / radius)^2 */
+    float reach;
+    vec2 ray, pitch;   /* the centre's ray, one over the focal lengths; both times scale */
+    float scale;
 };
 
 /* Extent of the disc along one image axis: the tangents s of (p - s q)^2 = r^2 (1 + s^2 - (n_p - s n_q)^2), where p is
@@ -55,16 +57,19 @@ disc make_disc(splat s)
         d.last.y = d.first.y - 1;
     d.center = center;
     d.depth = p.z;
-    d.ray = ray;
     precise float facing = n.x * ray.x + n.y * ray.y + n.z;
-    precise vec2 slope = vec2(n.x / frame.fx, n.y / frame.fy);
+    precise float tilt = 1.0 / (abs(facing) < 1e-6 ? 1e-6 : facing);
+    precise vec2 slope = vec2(n.x * frame.inverse_fx * tilt, n.y * frame.inverse_fy * tilt);
     precise float scale = p.z / s.radius;
-    precise float margin = frame.margin * max(s.radius, frame.low_pass * p.z / frame.fx);
-    precise float inverse_radius_squared = scale * scale;
-    d.facing = facing;
+    precise float spans = sqrt(max(1.0 - n.z * n.z, 0.0)) / scale;
+    precise vec2 scaled_ray = ray * scale, pitch = vec2(frame.inverse_fx * scale, frame.inverse_fy * scale);
+    precise float margin = frame.margin * max(s.radius, frame.low_pass * p.z * frame.inverse_fx);
     d.slope = slope;
+    d.reach = max(spans, SPL_LOW_PASS_REACH * frame.inverse_fx);
+    d.ray = scaled_ray;
+    d.pitch = pitch;
+    d.scale = scale;
     d.margin = margin;
-    d.inverse_radius_squared = inverse_radius_squared;
     return d;
 }
 
@@ -82,15 +87,14 @@ float disc_sample(disc d, ivec2 at, out float z)
 {
     precise vec2 uv = vec2(at) + (0.5 - d.center);
     precise float near_center = (uv.x * uv.x + uv.y * uv.y) * frame.inverse_low_pass_squared;
-    precise float k = d.facing / (d.facing + (d.slope.x * uv.x + d.slope.y * uv.y));
+    precise float k = 1.0 / max(1.0 + (d.slope.x * uv.x + d.slope.y * uv.y), 1e-6);
     precise float w = k - 1.0;
-    precise vec2 q = d.ray * w + vec2(uv.x * frame.inverse_fx, uv.y * frame.inverse_fy) * k;
-    precise float distance = (q.x * q.x + q.y * q.y + w * w) * d.inverse_radius_squared;
-    bool on_disc = distance < 1.0 && k > 0.0;
-    bool on_plane = on_disc || abs(w) <= SPL_LOW_PASS_REACH * frame.inverse_fx;
-    precise float along = d.depth * (on_plane ? k : 1.0);
+    precise vec2 q = d.ray * w + d.pitch * uv * k;
+    precise float fall = d.scale * w;
+    precise float distance = q.x * q.x + q.y * q.y + fall * fall;
+    precise float along = d.depth * (1.0 + clamp(w, -d.reach, d.reach));
     z = along;
-    return on_disc ? min(distance, near_center) : near_center;
+    return min(distance, near_center);
 }
 
 #endif

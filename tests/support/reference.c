@@ -94,15 +94,17 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float ox = (float)x + (0.5f - center[0]), oy = (float)y + (0.5f - center[1]);
     float near_center = (ox * ox + oy * oy) * 2.0f;
     const float *p = d->p, *n = d->n;
-    float inverse = 1.0f / p[2], rx = p[0] * inverse, ry = p[1] * inverse;
-    float facing = n[0] * rx + n[1] * ry + n[2];
-    float k = facing / (facing + (n[0] / (float)s->camera.fx * ox + n[1] / (float)s->camera.fy * oy)), w = k - 1;
-    float qx = rx * w + ox * (1 / (float)s->camera.fx) * k, qy = ry * w + oy * (1 / (float)s->camera.fy) * k;
-    float scale = p[2] / d->radius, distance = (qx * qx + qy * qy + w * w) * (scale * scale);
-    bool on_disc = distance < 1 && k > 0;
-    bool on_plane = on_disc || fabsf(w) <= SPL_LOW_PASS_REACH * (1 / (float)s->camera.fx);
-    *z = on_plane ? p[2] * k : p[2];
-    return on_disc && distance < near_center ? distance : near_center;
+    float ifx = 1 / (float)s->camera.fx, ify = 1 / (float)s->camera.fy, inverse = 1.0f / p[2];
+    float rx = p[0] * inverse, ry = p[1] * inverse, facing = n[0] * rx + n[1] * ry + n[2];
+    float tilt = 1.0f / (fabsf(facing) < 1e-6f ? 1e-6f : facing), scale = p[2] / d->radius;
+    float spans = sqrtf(fmaxf(1 - n[2] * n[2], 0)) / scale, low = SPL_LOW_PASS_REACH * ifx;
+    float reach = spans > low ? spans : low;
+    float divisor = 1.0f + (n[0] * ifx * tilt * ox + n[1] * ify * tilt * oy);
+    float k = 1.0f / (divisor > 1e-6f ? divisor : 1e-6f), w = k - 1, fall = scale * w;
+    float qx = rx * scale * w + ifx * scale * ox * k, qy = ry * scale * w + ify * scale * oy * k;
+    float distance = qx * qx + qy * qy + fall * fall;
+    *z = p[2] * (1 + (w < -reach ? -reach : w > reach ? reach : w));
+    return distance < near_center ? distance : near_center;
 }
 
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
