@@ -160,26 +160,6 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
     }
 }
 
-static void count_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
-{
-    uint32_t g = chunk->geometry_bits, c = chunk->color_bits, e = chunk->extra_bits;
-    uint64_t n = chunk->count, streams = (uint64_t)spl_chunk_words(chunk) * 32;
-    uint64_t position = n * ((g >> SPL_GEOMETRY_X & 31) + (g >> SPL_GEOMETRY_Y & 31) + (g >> SPL_GEOMETRY_Z & 31));
-    uint64_t normal = n * ((g >> SPL_GEOMETRY_U & 15) + (g >> SPL_GEOMETRY_V & 15));
-    uint64_t radius = n * (g >> SPL_GEOMETRY_RADIUS & 15);
-    uint64_t color = n * ((c >> SPL_COLOR_Y & 15) + (c >> SPL_COLOR_U & 15) + (c >> SPL_COLOR_V & 15));
-    uint64_t classification = n * (e >> SPL_EXTRA_CLASS & 15), uncertainty = n * (e >> SPL_EXTRA_UNCERTAINTY & 15);
-    bits[SPL_ATTRIBUTE_POSITION] += position;
-    bits[SPL_ATTRIBUTE_NORMAL] += normal;
-    bits[SPL_ATTRIBUTE_RADIUS] += radius;
-    bits[SPL_ATTRIBUTE_COLOR] += color;
-    bits[SPL_ATTRIBUTE_CLASS] += classification;
-    bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
-    /* Streams end on whole words: what that wastes belongs to the chunk. */
-    bits[SPL_ATTRIBUTE_CHUNK] +=
-        sizeof *chunk * 8 + streams - position - normal - radius - color - classification - uncertainty;
-}
-
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
                       size_t *chunk_capacity, struct spl_emitted *out, struct spl_error *err)
 {
@@ -188,7 +168,7 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     for (uint32_t c = 0; c < encoded->chunk_count; c++) {
         encoded->chunks[c].first_id = (uint32_t)out->splats;
         out->splats += encoded->chunks[c].count;
-        count_bits(&encoded->chunks[c], out->bits);
+        spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
     if (out->splats > UINT32_MAX - 1)
         return spl_fail(err, SPL_E_LIMIT, "more than %u splats; pack the scans as several datasets", UINT32_MAX - 1);
