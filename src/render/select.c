@@ -102,8 +102,11 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     return spl_draw_list_add(w->list, page, &out, &bounds, err);
 }
 
-static int draw_node(struct walk *w, const struct spl_node *node, const double node_to_eye[3], struct spl_error *err)
+static int draw_node(struct walk *w, const struct spl_node *node, struct spl_error *err)
 {
+    double node_to_eye[3];
+    for (int i = 0; i < 3; i++)
+        node_to_eye[i] = node->origin[i] - w->params->camera->eye[i];
     w->list->nodes++;
     double radius_share = node->child_count ? cluster_radius_share : 1;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
@@ -115,41 +118,43 @@ static int draw_node(struct walk *w, const struct spl_node *node, const double n
     return SPL_OK;
 }
 
-/* Are the pages of all children there? All of them, so that a refused one leaves the node itself to be drawn. */
-static bool children_resident(struct walk *w, const struct spl_node *node)
+/* Everything that the node and its descendants draw, in view space. */
+static struct spl_view_box node_box(const struct walk *w, const struct spl_node *node)
 {
-    for (uint32_t i = 0; i < node->child_count; i++)
-        if (!w->params->resident(w->params->context, w->nodes[node->first_child + i].page))
-            return false;
-    return true;
-}
-
-static double view_depth(const struct spl_camera *camera, const struct spl_node *node)
-{
-    double depth = 0;
+    double least[3], size[3];
+    for (int i = 0; i < 3; i++) {
+        least[i] = node->origin[i] - w->params->camera->eye[i] + node->box_min[i];
+        size[i] = (double)node->box_max[i] - node->box_min[i];
+    }
+    struct spl_view_box box = spl_view_box(w->params->camera, least, size);
     for (int i = 0; i < 3; i++)
-        depth += camera->rotation[6 + i] *
-                 (node->origin[i] + (node->box_min[i] + node->box_max[i]) / 2.0 - camera->eye[i]);
-    return depth;
+        box.half[i] += 2 * node->spacing; /* pruned splats grow by up to their radius */
+    return box;
 }
 
-/* Pushes the children so that the nearest is on top. */
-static void push_children(struct walk *w, const struct spl_node *node, uint32_t *stack, size_t *depth)
+/* Pushes the children that are in view, the nearest on top. False, and nothing pushed, when the page of one of them cannot
+ * be had: then the node itself is drawn. */
+static bool push_children(struct walk *w, const struct spl_node *node, uint32_t *stack, size_t *depth)
 {
-    uint32_t order[8];
+    uint32_t order[8], count = 0;
     double depths[8];
-    for (uint32_t i = 0; i < node->child_count; i++) {
-        double d = view_depth(w->params->camera, &w->nodes[node->first_child + i]);
-        uint32_t at = i;
-        for (; at > 0 && depths[at - 1] < d; at--) {
+    for (uint32_t child = node->first_child; child < node->first_child + node->child_count; child++) {
+        struct spl_view_box box = node_box(w, &w->nodes[child]);
+        if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
+            continue;
+        if (!w->params->resident(w->params->context, w->nodes[child].page))
+            return false;
+        uint32_t at = count++;
+        for (; at > 0 && depths[at - 1] < box.center[2]; at--) {
             depths[at] = depths[at - 1];
             order[at] = order[at - 1];
         }
-        depths[at] = d;
-        order[at] = node->first_child + i;
+        depths[at] = box.center[2];
+        order[at] = child;
     }
-    memcpy(stack + *depth, order, node->child_count * sizeof *order);
-    *depth += node->child_count;
+    memcpy(stack + *depth, order, count * sizeof *order);
+    *depth += count;
+    return true;
 }
 
 static int walk_tree(struct walk *w, struct spl_error *err)
@@ -162,27 +167,17 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     stack[depth++] = 0;
     while (depth > 0) {
         const struct spl_node *node = &w->nodes[stack[--depth]];
-        double node_to_eye[3], least[3], size[3];
-        for (int i = 0; i < 3; i++) {
-            node_to_eye[i] = node->origin[i] - camera->eye[i];
-            least[i] = node_to_eye[i] + node->box_min[i];
-            size[i] = (double)node->box_max[i] - node->box_min[i];
-        }
-        struct spl_view_box box = spl_view_box(camera, least, size);
-        for (int i = 0; i < 3; i++)
-            box.half[i] += 2 * node->spacing; /* pruned splats grow by up to their radius */
+        struct spl_view_box box = node_box(w, node);
         if (!spl_view_box_visible(camera, &box, w->params->low_pass))
             continue;
         double near = fmax(box.center[2] - box.half[2], camera->near);
         bool fine = w->params->lod > 0 && node->spacing * w->focal <= w->params->lod * near;
         if (!fine && node->child_count && depth + 8 <= stack_max) {
-            if (children_resident(w, node)) {
-                push_children(w, node, stack, &depth);
+            if (push_children(w, node, stack, &depth))
                 continue;
-            }
             w->list->complete = false;
         }
-        int rc = draw_node(w, node, node_to_eye, err);
+        int rc = draw_node(w, node, err);
         if (rc)
             return rc;
     }

@@ -13,6 +13,7 @@
 #include <splatd/render.h>
 
 #include "base/error.h"
+#include "gpu/gpu.h"
 #include "support/make_dataset.h"
 #include "support/reference.h"
 
@@ -372,5 +373,7 @@ int main(int argc, char **argv)
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     spl_renderer_destroy(renderer);
-    return failed;
+    if (spl_gpu_count_complaints())
+        fprintf(stderr, "%llu messages of the validation layers\n", (unsigned long long)spl_gpu_count_complaints());
+    return failed || spl_gpu_count_complaints();
 }

@@ -1,0 +1,140 @@
+/* Datasets larger than the device memory limit: coarser nodes stand in, pages come and go, and what fits is exact. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include <splatd/render.h>
+
+#include "support/make_dataset.h"
+
+enum { splats = 4000000, width = 96, height = 64 };
+
+static const char *device;
+static struct spl_dataset *dataset;
+
+static double uniform(void)
+{
+    static uint64_t state = 3;
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(state >> 11) / 9007199254740992.0;
+}
+
+static struct spl_renderer *open_renderer(uint64_t memory_limit, struct spl_error *err)
+{
+    struct spl_renderer *renderer = NULL;
+    struct spl_renderer_options options = {.device = device, .memory_limit = memory_limit, .scratch_samples = 1 << 16};
+    return spl_renderer_create(&options, &renderer, err) ? NULL : renderer;
+}
+
+/* A view into one of the eight octants. */
+static struct spl_view looking(int octant, double lod)
+{
+    struct spl_view view;
+    spl_view_init(&view);
+    view.lod = lod;
+    view.camera.near = 0.01;
+    view.camera.far = 100;
+    double eye[3], target[3];
+    for (int c = 0; c < 3; c++) {
+        target[c] = octant >> c & 1 ? 1 : -1;
+        eye[c] = 0.8 * target[c]; /* only this octant lies before the eye */
+    }
+    const double up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 20, width, height, NULL), SPL_OK);
+    return view;
+}
+
+static void pages_come_and_go_within_the_limit(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    uint64_t pages = spl_dataset_get_info(dataset)->page_bytes;
+    assert_true(spl_dataset_get_info(dataset)->pages >= 3);
+
+    struct spl_renderer *roomy = open_renderer(1ull << 30, &err), *tight;
+    assert_non_null(roomy);
+    assert_int_equal(spl_renderer_add(roomy, dataset, &err), SPL_OK);
+    uint64_t scratch = spl_renderer_get_memory(roomy);
+    assert_int_equal(spl_renderer_preload(roomy, dataset, &err), SPL_OK);
+    assert_true(spl_renderer_get_memory(roomy) >= scratch + pages);
+
+    uint64_t limit = scratch + pages - (1ull << 20); /* all pages but one */
+    tight = open_renderer(limit, &err);
+    assert_non_null(tight);
+    assert_int_equal(spl_renderer_add(tight, dataset, &err), SPL_OK);
+    bool stood_in = false;
+    uint64_t loaded = 0;
+    for (int i = 0; i < 16; i++) {
+        struct spl_view view = looking(5 * i % 8, i < 8 ? 1 : 0);
+        struct spl_frame exact, frame;
+        assert_int_equal(spl_renderer_render(roomy, dataset, &view, &exact, &err), SPL_OK);
+        assert_true(exact.stats.complete);
+        int rc = spl_renderer_render(tight, dataset, &view, &frame, &err);
+        if (rc)
+            fail_msg("view %d: %s", i, err.message);
+        assert_true(spl_renderer_get_memory(tight) <= limit);
+        loaded += frame.stats.pages_loaded;
+        stood_in |= !frame.stats.complete;
+        if (frame.stats.complete)
+            assert_memory_equal(frame.images[SPL_LAYER_COLOR].pixels, exact.images[SPL_LAYER_COLOR].pixels,
+                                (size_t)width * height * 4);
+        spl_frame_finish(&exact);
+        spl_frame_finish(&frame);
+    }
+    struct spl_view everything = looking(0, 0);
+    const double eye[3] = {-5, -6, 4}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&everything.camera, eye, middle, up, NULL), SPL_OK);
+    struct spl_frame frame;
+    assert_int_equal(spl_renderer_render(tight, dataset, &everything, &frame, &err), SPL_OK);
+    stood_in |= !frame.stats.complete;
+    spl_frame_finish(&frame);
+    assert_true(stood_in);
+    assert_true(loaded > spl_dataset_get_info(dataset)->pages);
+    spl_renderer_destroy(tight);
+    spl_renderer_destroy(roomy);
+}
+
+static void a_limit_below_the_scratch_is_refused_with_numbers(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    assert_null(open_renderer(1 << 16, &err));
+    assert_int_equal(err.code, SPL_E_LIMIT);
+    assert_non_null(strpbrk(err.message, "0123456789"));
+}
+
+int main(void)
+{
+    struct spl_error err = {0};
+    device = getenv("SPLATD_TEST_DEVICE");
+    struct spl_renderer *probe = open_renderer(0, &err);
+    if (!probe) {
+        fprintf(stderr, "skipped: %s\n", err.message);
+        return 77;
+    }
+    spl_renderer_destroy(probe);
+    struct make_splat *all = calloc(splats, sizeof *all);
+    for (size_t i = 0; i < splats; i++) {
+        for (int c = 0; c < 3; c++) {
+            all[i].position[c] = 2 * uniform() - 1;
+            all[i].color[c] = (uint8_t)(uniform() * 256);
+        }
+        all[i].normal[2] = 1;
+        all[i].radius = 0.01f;
+    }
+    dataset = make_dataset_levels(all, splats, 2);
+    free(all);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pages_come_and_go_within_the_limit),
+        cmocka_unit_test(a_limit_below_the_scratch_is_refused_with_numbers),
+    };
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_dataset_close(dataset);
+    return failed;
+}
