@@ -197,5 +197,5 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
-    return fmax(radius * sqrt(fmax(place.filled, 0.25)), fmin(0.55 * place.gap, 2 * radius));
+    return fmax(radius * sqrt(fmax(place.filled, 0.25)), fmin(0.75 * place.gap, 3 * radius));
 }
