@@ -32,22 +32,24 @@ uint funnel(uint low, uint high, uint shift)
     return low >> shift | (high << 1) << (31u - shift);
 }
 
-/* The `length` (0..97) bits that start `bit` bits after word `word`. A page ends in two words of zeros, so that reading a
+/* The `length` (0..108) bits that start `bit` bits after word `word`. A page ends in two words of zeros, so that reading a
  * word too far is harmless. */
 bit_run load_run(uint word, uint bit, uint length)
 {
     uint at = word + (bit >> 5), shift = bit & 31u;
-    uint w0 = page_words[at], w1 = page_words[at + 1u], w2 = 0u, w3 = 0u;
+    uint w0 = page_words[at], w1 = page_words[at + 1u], w2 = 0u, w3 = 0u, w4 = 0u;
     if (length > 33u) {
         w2 = page_words[at + 2u];
         if (length > 65u)
             w3 = page_words[at + 3u];
+        if (length > 97u)
+            w4 = page_words[at + 4u];
     }
     bit_run run;
     run.a = funnel(w0, w1, shift);
     run.b = funnel(w1, w2, shift);
     run.c = funnel(w2, w3, shift);
-    run.d = w3 >> shift;
+    run.d = funnel(w3, w4, shift);
     return run;
 }
 

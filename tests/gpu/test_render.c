@@ -13,6 +13,8 @@
 #include <splatd/render.h>
 
 #include "base/error.h"
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
 #include "gpu/gpu.h"
 #include "support/make_dataset.h"
 #include "support/reference.h"
@@ -185,6 +187,40 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     same_images(dataset, &view, "from the front");
     view.supersample = 2;
     same_images(dataset, &view, "from the front, supersampled");
+    done(dataset);
+}
+
+/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more. */
+static void the_widest_codes_match(void **state)
+{
+    (void)state;
+    enum { count = 2048 };
+    random_state = 11;
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++) {
+        double length = 0, n[3];
+        for (int c = 0; c < 3; c++) {
+            splats[i].position[c] = 2 * uniform() - 1;
+            n[c] = uniform() - 0.5;
+            length += n[c] * n[c];
+            splats[i].color[c] = (uint8_t)(uniform() * 256);
+        }
+        for (int c = 0; c < 3; c++)
+            splats[i].normal[c] = (float)(n[c] / sqrt(length));
+        splats[i].radius = i % 5 ? 1e-6f : (float)(0.01 + 0.1 * uniform());
+    }
+    make_dataset_normal_error = 3e-4;
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    make_dataset_normal_error = M_PI / 180;
+    free(splats);
+    uint32_t chunks, widest = 0;
+    const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
+    for (uint32_t i = 0; i < chunks; i++)
+        widest = spl_chunk_geometry_width(&chunk[i]) > widest ? spl_chunk_geometry_width(&chunk[i]) : widest;
+    assert_true(widest > 104); /* more than four words hold at most offsets */
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 3, 160, 120);
+    same_images(dataset, &view, "widest codes");
     done(dataset);
 }
 
@@ -370,6 +406,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_same_request_gives_the_same_bytes),
         cmocka_unit_test_prestate(a_lost_device_is_reported_and_replaced, device),
         cmocka_unit_test(views_out_of_range_name_their_field),
+        cmocka_unit_test(the_widest_codes_match),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     spl_renderer_destroy(renderer);

@@ -39,14 +39,16 @@ static void *must_have(void *p)
     return p;
 }
 
+double make_dataset_normal_error = M_PI / 180;
+
 /* Writes `count` splats as the node's chunks and sets what follows from them. */
 static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count)
 {
-    static const struct spl_chunk_options options = {.position_error = 0.016,
-                                                     .normal_error = M_PI / 180,
-                                                     .radius_error = 0.05,
-                                                     .has_class = true,
-                                                     .has_uncertainty = true};
+    const struct spl_chunk_options options = {.position_error = 0.016,
+                                              .normal_error = make_dataset_normal_error,
+                                              .radius_error = 0.05,
+                                              .has_class = true,
+                                              .has_uncertainty = true};
     size_t chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS, used = 0;
     spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity);
     uint32_t *words = must_have(malloc(chunk_count * SPL_CHUNK_WORDS_MAX * sizeof *words));

@@ -23,6 +23,9 @@ struct make_splat {
  * splats in the order given), of at most 524,288 splats each. */
 void make_dataset_file(const char *path, const struct make_splat *splats, size_t count, int levels);
 
+/* Mean error of the normals that follow, radians; default 1 degree. */
+extern double make_dataset_normal_error;
+
 /* The same as an open dataset of id "made" whose file is gone already; one level where that holds all splats. */
 struct spl_dataset *make_dataset(const struct make_splat *splats, size_t count);
 struct spl_dataset *make_dataset_levels(const struct make_splat *splats, size_t count, int levels);
