@@ -27,4 +27,9 @@ int spl_synth(const struct spl_synth_options *options, uint64_t *points_written,
 const char *spl_synth_scene_name(size_t i);
 const char *spl_synth_scene_help(size_t i);
 
+/* The scene's sample cameras at that size, as the JSON of named views in world coordinates:
+ * {"views": [{"name": ..., "width": ..., "height": ..., "camera": {"eye": ..., "target": ..., "fov": ...}}, ...]}.
+ * *json is a text that the caller frees with free(). SPL_E_USAGE names "scene" or "size". */
+int spl_synth_print_views(const char *scene, uint32_t width, uint32_t height, char **json, struct spl_error *err);
+
 #endif

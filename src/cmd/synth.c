@@ -4,6 +4,7 @@
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <splatd/synth.h>
@@ -15,6 +16,7 @@ static void usage(FILE *out)
 {
     fprintf(out,
             "usage: splatd synth SCENE [--points N] [--seed S] [--noise SIGMA] [--format LIST] [--threads N] -o DIR\n"
+            "       splatd synth SCENE --print-views [--size WxH]\n"
             "       splatd synth --list\n\n"
             "Scans an analytic scene from its stations and writes DIR/SCENE.ptx (structured, one pose a station) and\n"
             "DIR/SCENE.ply (all stations, world coordinates). Equal arguments give equal files on any number of\n"
@@ -31,6 +33,8 @@ static void usage(FILE *out)
             "      --format LIST   ptx, ply or ptx,ply (default)\n"
             "      --threads N     default: all cores\n"
             "  -o, --output DIR    made when missing\n"
+            "      --print-views   the scene's sample cameras as JSON, for bench and render\n"
+            "      --size WxH      of those, pixels (default 1280x720)\n"
             "      --list          the scenes, a line each\n\n"
             "The files' paths go to stdout, messages to stderr.\n");
 }
@@ -55,9 +59,20 @@ static void print_paths(const struct spl_synth_options *o)
             printf("%s/%s.%s\n", o->directory, o->scene, formats[i]);
 }
 
+static int print_views(const char *scene, const uint32_t size[2])
+{
+    struct spl_error err = {0};
+    char *json;
+    if (spl_synth_print_views(scene, size[0], size[1], &json, &err))
+        return spl_cmd_fail(&err);
+    fputs(json, stdout);
+    free(json);
+    return 0;
+}
+
 int spl_cmd_synth(int argc, char **argv)
 {
-    enum { opt_noise = 256, opt_format, opt_threads, opt_list };
+    enum { opt_noise = 256, opt_format, opt_threads, opt_list, opt_print_views, opt_size };
     static const struct option options[] = {
         {"points", required_argument, NULL, 'n'},
         {"seed", required_argument, NULL, 's'},
@@ -66,6 +81,8 @@ int spl_cmd_synth(int argc, char **argv)
         {"threads", required_argument, NULL, opt_threads},
         {"output", required_argument, NULL, 'o'},
         {"list", no_argument, NULL, opt_list},
+        {"print-views", no_argument, NULL, opt_print_views},
+        {"size", required_argument, NULL, opt_size},
         {"help", no_argument, NULL, 'h'},
         {0},
     };
@@ -73,6 +90,8 @@ int spl_cmd_synth(int argc, char **argv)
     struct spl_synth_options o = {
         .points = 1000000, .seed = 1, .noise = -1, .progress = spl_cmd_progress, .progress_context = &progress};
     uint64_t threads = 0, written = 0;
+    uint32_t size[2] = {1280, 720};
+    bool want_views = false;
     struct spl_error err = {0};
     int result = 0;
     for (int c; (c = getopt_long(argc, argv, "n:s:o:h", options, NULL)) >= 0;) {
@@ -95,6 +114,12 @@ int spl_cmd_synth(int argc, char **argv)
         case 'o':
             o.directory = optarg;
             break;
+        case opt_print_views:
+            want_views = true;
+            break;
+        case opt_size:
+            result = spl_cmd_parse_size("--size", optarg, &size[0], &size[1], &err);
+            break;
         case opt_list:
             for (size_t i = 0; spl_synth_scene_name(i); i++)
                 printf("%-12s %s\n", spl_synth_scene_name(i), spl_synth_scene_help(i));
@@ -113,6 +138,8 @@ int spl_cmd_synth(int argc, char **argv)
         fprintf(stderr, "splatd: synth takes one SCENE; 'splatd synth --list' names them\n");
         return 2;
     }
+    if (want_views)
+        return print_views(argv[optind], size);
     if (!o.directory) {
         fprintf(stderr, "splatd: synth needs a directory to write to: -o DIR\n");
         return 2;

@@ -33,7 +33,7 @@ void spl_build_wire(struct spl_scene *scene, struct spl_skin skin, const double 
 void spl_build_tree(struct spl_scene *scene, struct spl_skin bark, struct spl_skin leaf, const double foot[3],
                     double height, uint64_t seed);
 
-/* The scenes; one file each. They set materials and noise as well. */
+/* The scenes; one file each in scenes/. They set materials, scanner, cameras and offset as well. */
 void spl_build_courtyard(struct spl_scene *scene);
 
 #endif

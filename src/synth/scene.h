@@ -1,5 +1,7 @@
-/* An analytic scene: primitives with materials, the stations it is scanned from, and exact answers to rays.
+/* An analytic scene: primitives with materials, the scanner that samples it, sample cameras, and exact answers to rays.
  *
+ * A scene is modelled near the origin, in metres, z up. What is written for others to read (points, poses, views) lies at
+ * world = scene + spl_scene.offset.
  * Built once, then read-only: every call but create and destroy may run on any thread at once. */
 #ifndef SPL_SYNTH_SCENE_H
 #define SPL_SYNTH_SCENE_H
@@ -13,9 +15,42 @@
 #include "synth/primitive.h"
 #include "synth/texture.h"
 
+enum spl_scanner_kind {
+    SPL_SCANNER_TERRESTRIAL, /* each station is a tripod: a spherical grid of rays around it, -60 to +90 degrees */
+    SPL_SCANNER_MOBILE,      /* each station is a head on a vehicle (x forward, y left, z up, origin on the track), which
+                                turns around its z axis while the vehicle follows the track at constant speed */
+    SPL_SCANNER_AIRBORNE,    /* each station is the start of a flight line of `length` along its x axis, scanned in lines
+                                across: from -half_angle to +half_angle around -z */
+    SPL_SCANNER_SWEEP,       /* each station is the corner of a rectangle, `length` along its x axis by `width` along y,
+                                from which parallel beams leave along -z, their number per square metre growing
+                                `growth`-fold from x = 0 to the end, exponentially */
+};
+
 struct spl_station {
     double position[3];
-    double rotation[9];           /* station to world, row-major */
+    double rotation[9];           /* station to scene (a mobile head: to vehicle), row-major */
+};
+
+struct spl_scanner {
+    enum spl_scanner_kind kind;
+    double noise;                 /* range noise that suits the scene, sigma in metres */
+    double aperture;              /* the beam's diameter where it leaves, metres */
+    double divergence;            /* the beam's full angle, radians */
+    double range;                 /* metres, at which a dropout share is as asked for */
+    unsigned returns;             /* of one pulse, at most, 1 .. SPL_SCANNER_RETURNS_MAX */
+    const double (*track)[3];     /* mobile: the trajectory, static */
+    size_t track_count;
+    double length;                /* airborne, sweep */
+    double half_angle;            /* airborne, degrees */
+    bool zigzag;                  /* airborne: every other line runs back, else all run the same way */
+    double width, growth;         /* sweep */
+};
+
+/* Where somebody would stand, or hover, and look; scene coordinates, z up. */
+struct spl_named_camera {
+    const char *name;
+    double eye[3], target[3];
+    double fov;                   /* vertical, degrees */
 };
 
 struct spl_scene {
@@ -26,11 +61,16 @@ struct spl_scene {
     const struct spl_material *materials; /* static */
     const char **objects;         /* names, static; an object's id is its index */
     size_t object_count;
-    struct spl_station *stations;
+    struct spl_scanner scanner;
+    struct spl_station *stations; /* what they are is the scanner's kind */
     size_t station_count;
-    double noise;                 /* range noise that suits the scene, sigma in metres */
+    double offset[3];             /* world = scene + offset; whole metres */
+    const struct spl_named_camera *cameras; /* static */
+    size_t camera_count;
     struct spl_error error;       /* the first failure while it was built */
 };
+
+enum { SPL_SCANNER_RETURNS_MAX = 4 };
 
 struct spl_hit {
     double t;                     /* position = origin + t direction */

@@ -174,7 +174,7 @@ int spl_synth(const struct spl_synth_options *options, uint64_t *points_written,
         goto done;
 
     s.scene = scene;
-    s.sigma = options->noise < 0 ? scene->noise : options->noise;
+    s.sigma = options->noise < 0 ? scene->scanner.noise : options->noise;
     s.grid = spl_scanner_fit(scene, options->points, options->threads);
     uint64_t batch = s.grid.rows < batch_cells ? batch_cells / s.grid.rows : 1;
     if (batch > s.grid.columns)

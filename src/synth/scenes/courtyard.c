@@ -183,9 +183,22 @@ static void panels(struct spl_scene *scene)
     spl_build_box(scene, panel, (double[3]){-9.97, 3.5, 1.7}, north, (double[3]){0.75, 0.03, 0.5});
 }
 
+static const struct spl_named_camera cameras[] = {
+    {"overview", {-9.3, -7.3, 1.7}, {3, 2, 1.9}, 70},
+    {"high", {6.3, 7.4, 5.6}, {-4, -3, 0.8}, 65},
+    {"wall", {4.6, 6.8, 1.6}, {2.9, 8, 1.7}, 60},
+    {"wires", {0.4, -4.6, 1.6}, {-0.6, 1.5, 6.2}, 60},
+    {"tree", {-1, 0.1, 1.6}, {-4, 2.6, 3.3}, 55},
+    {"ground", {-2, -6.2, 0.25}, {3, 1.5, 0.4}, 60},
+    {"arcade", {8.9, -6.6, 1.6}, {6.4, 2, 1.8}, 65},
+    {"plaque", {-7.7, -3.1, 1.6}, {-9.95, -3.5, 1.7}, 45},
+};
+
 void spl_build_courtyard(struct spl_scene *scene)
 {
     scene->materials = materials;
+    scene->cameras = cameras;
+    scene->camera_count = sizeof cameras / sizeof *cameras;
     spl_build_rectangle(scene, (struct spl_skin){paving, spl_build_object(scene, "ground")}, (double[3]){0}, east,
                         north, (double[2]){width / 2, depth / 2}, NULL);
     facades(scene);
@@ -212,5 +225,10 @@ void spl_build_courtyard(struct spl_scene *scene)
     spl_build_station(scene, (double[3]){4.9, -5.4, 1.7}, -121, -2);
     spl_build_station(scene, (double[3]){4.1, 4.7, 1.7}, 64, 0.8);
     spl_build_station(scene, (double[3]){-7.4, 5.6, 1.7}, 203, -1.1);
-    scene->noise = 0.0015;
+    scene->scanner = (struct spl_scanner){.kind = SPL_SCANNER_TERRESTRIAL,
+                                          .noise = 0.0015,
+                                          .aperture = 0.004,
+                                          .divergence = 0.0003,
+                                          .range = 10,
+                                          .returns = 1};
 }
