@@ -1,0 +1,90 @@
+/* Profiles in memory: making one, the time model's fit, the front, where the file lies. Reading and writing are in
+ * profile_json.c.
+ *
+ * Invariant: a profile that came from spl_profile_load() or went through spl_profile_save() has only numbers in the
+ * ranges that profile.h states, so that the planner computes with them unchecked. Pure but for allocation; any thread.
+ */
+#include "measure/profile.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "measure/front.h"
+
+char *spl_profile_path(const char *dataset_path, struct spl_error *err)
+{
+    static const char ending[] = ".spld";
+    size_t length = strlen(dataset_path), cut = sizeof ending - 1;
+    bool ends = length > cut && !strcmp(dataset_path + length - cut, ending);
+    char *path = NULL;
+    if (asprintf(&path, "%.*s.profile.json", (int)(ends ? length - cut : length), dataset_path) < 0) {
+        spl_fail(err, SPL_E_NOMEM, "out of memory for the profile's path of '%s'", dataset_path);
+        return NULL;
+    }
+    return path;
+}
+
+int spl_profile_init(struct spl_profile *profile, const struct spl_dataset_info *dataset,
+                     const struct spl_device_info *device, size_t count, struct spl_error *err)
+{
+    *profile = (struct spl_profile){.dataset_version = dataset->version, .software = device->software};
+    snprintf(profile->splatd, sizeof profile->splatd, "%s", SPLATD_VERSION);
+    snprintf(profile->dataset_id, sizeof profile->dataset_id, "%s", dataset->id);
+    snprintf(profile->backend, sizeof profile->backend, "%s", device->backend);
+    snprintf(profile->device, sizeof profile->device, "%s", device->name);
+    snprintf(profile->driver, sizeof profile->driver, "%s", device->driver);
+    snprintf(profile->reference, sizeof profile->reference, "self");
+    if (!(profile->points = spl_alloc(count, sizeof *profile->points, err)))
+        return SPL_E_NOMEM;
+    profile->count = count;
+    return 0;
+}
+
+void spl_profile_finish(struct spl_profile *profile)
+{
+    free(profile->points);
+    *profile = (struct spl_profile){0};
+}
+
+void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, double *fixed_ms, double *ms_per_mpx)
+{
+    spl_assert(count);
+    /* Minimises the sum of ((f + s x - y) / y)², that is of (f u + s v - 1)² with u = 1 / y, v = x / y. */
+    double uu = 0, uv = 0, vv = 0, su = 0, sv = 0;
+    for (size_t i = 0; i < count; i++) {
+        double u = 1 / ms[i], v = mpx[i] / ms[i];
+        uu += u * u, uv += u * v, vv += v * v, su += u, sv += v;
+    }
+    double determinant = uu * vv - uv * uv;
+    if (determinant <= 1e-9 * uu * vv) { // one size only
+        *fixed_ms = 0.5 * su / uu;
+        *ms_per_mpx = 0.5 * sv / vv;
+        return;
+    }
+    *fixed_ms = (su * vv - sv * uv) / determinant;
+    *ms_per_mpx = (sv * uu - su * uv) / determinant;
+    if (*ms_per_mpx < 0) {
+        *ms_per_mpx = 0;
+        *fixed_ms = su / uu;
+    } else if (*fixed_ms < 0) {
+        *fixed_ms = 0;
+        *ms_per_mpx = sv / vv;
+    }
+}
+
+void spl_profile_mark_front(struct spl_profile *profile)
+{
+    double cost[SPL_PROFILE_POINTS_MAX], error[SPL_PROFILE_POINTS_MAX];
+    bool front[SPL_PROFILE_POINTS_MAX];
+    spl_assert(profile->count <= SPL_PROFILE_POINTS_MAX);
+    for (size_t i = 0; i < profile->count; i++) {
+        cost[i] = profile->points[i].ms;
+        error[i] = -profile->points[i].psnr;
+    }
+    spl_front_mark(cost, error, profile->count, front);
+    for (size_t i = 0; i < profile->count; i++)
+        profile->points[i].front = front[i];
+}

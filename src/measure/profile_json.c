@@ -1,0 +1,377 @@
+/* Profiles as files. One table says what numbers a setting has, in which range, and whether they may be missing;
+ * parsing, checking and writing all come from it.
+ *
+ * Nothing of a file is trusted: sizes are bounded before they are allocated, every number is checked, and a profile of
+ * another dataset version or another device is refused, because its promises would be about something else. Unknown
+ * members are ignored, so that later versions can add some. Any thread; blocks on disk. */
+#include "measure/profile.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/memory.h"
+
+#define FORMAT "splatd-profile"
+
+enum { file_max = 1 << 20, side_max = 1 << 16, views_max = 1000000 };
+
+static const struct number {
+    const char *name;
+    size_t offset;
+    double least, most;
+    bool optional;
+} numbers[] = {
+#define NUMBER(name, least, most, optional)                                                                            \
+    {                                                                                                                  \
+#name, offsetof(struct spl_profile_point, name), least, most, optional                                         \
+    }
+    NUMBER(ms, 1e-6, 1e9, false),      NUMBER(ms_q90, 1e-6, 1e9, false),
+    NUMBER(fixed_ms, 0, 1e9, false),   NUMBER(ms_per_mpx, 0, 1e9, false),
+    NUMBER(splats, 0, 1e15, true),     NUMBER(psnr, -SPL_PROFILE_PSNR_MAX, SPL_PROFILE_PSNR_MAX, true),
+    NUMBER(psnr_sd, 0, 200, true),     NUMBER(psnr_q05, -SPL_PROFILE_PSNR_MAX, SPL_PROFILE_PSNR_MAX, true),
+    NUMBER(ssim, -1, 1, true),         NUMBER(depth_rmse, 0, 1e12, true),
+    NUMBER(depth_beyond, 0, 1, true),  NUMBER(holes, 0, 1, true),
+    NUMBER(see_through, 0, 1, true),   NUMBER(halo, 0, 1, true),
+    NUMBER(normal_mean, 0, 180, true),
+#undef NUMBER
+};
+enum { number_count = sizeof numbers / sizeof *numbers };
+
+static double *number_of(struct spl_profile_point *point, const struct number *number)
+{
+    return (double *)((char *)point + number->offset);
+}
+
+/* Everything that parsing does not settle by itself; `name` is for messages. */
+static int check_point(struct spl_profile_point *point, const char *name, size_t index, struct spl_error *err)
+{
+    const struct spl_setting *s = &point->setting;
+    if (!(s->lod >= 0 && s->lod <= 64))
+        return spl_fail_field(err, SPL_E_INPUT, "lod", "%s: point %zu: lod %g is outside 0 to 64", name, index, s->lod);
+    if (s->supersample != 0.25 && s->supersample != 0.5 && s->supersample != 1 && s->supersample != 2 &&
+        s->supersample != 4)
+        return spl_fail_field(err, SPL_E_INPUT, "supersample",
+                              "%s: point %zu: supersample %g is none of 0.25, 0.5, 1, 2, 4", name, index,
+                              s->supersample);
+    for (const struct number *n = numbers; n < numbers + number_count; n++) {
+        double value = *number_of(point, n);
+        if (isnan(value) && n->optional)
+            continue;
+        if (!(value >= n->least && value <= n->most))
+            return spl_fail_field(err, SPL_E_INPUT, n->name, "%s: point %zu: %s %g is outside %g to %g", name, index,
+                                  n->name, value, n->least, n->most);
+    }
+    if (!(point->fixed_ms + point->ms_per_mpx > 0))
+        return spl_fail_field(err, SPL_E_INPUT, "fixed_ms", "%s: point %zu: fixed_ms and ms_per_mpx are both 0", name,
+                              index);
+    if (point->ms_q90 < point->ms)
+        return spl_fail_field(err, SPL_E_INPUT, "ms_q90", "%s: point %zu: ms_q90 %g is below ms %g", name, index,
+                              point->ms_q90, point->ms);
+    return 0;
+}
+
+static int check(struct spl_profile *profile, const char *name, struct spl_error *err)
+{
+    int rc = 0;
+    for (size_t i = 0; !rc && i < profile->count; i++) {
+        rc = check_point(&profile->points[i], name, i, err);
+        const struct spl_setting *s = &profile->points[i].setting;
+        for (size_t j = 0; !rc && j < i; j++) {
+            const struct spl_setting *other = &profile->points[j].setting;
+            if (s->method == other->method && s->lod == other->lod && s->supersample == other->supersample)
+                rc = spl_fail_field(err, SPL_E_INPUT, "points", "%s: points %zu and %zu are the same setting", name, j,
+                                    i);
+        }
+    }
+    return rc;
+}
+
+/* ------------------------------------------------------------------------------------------------------- reading */
+
+static int read_text(const json_t *object, const char *key, char *out, size_t capacity, const char *name,
+                     struct spl_error *err)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    if (!text || strlen(text) >= capacity)
+        return spl_fail_field(err, SPL_E_INPUT, key, "%s: '%s' must be text of at most %zu bytes", name, key,
+                              capacity - 1);
+    memcpy(out, text, strlen(text) + 1);
+    return 0;
+}
+
+static int read_count(const json_t *object, const char *key, json_int_t most, uint32_t *out, const char *name,
+                      struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, key);
+    json_int_t value = json_integer_value(json);
+    if (!json_is_integer(json) || value < 1 || value > most)
+        return spl_fail_field(err, SPL_E_INPUT, key, "%s: '%s' must be a whole number from 1 to %lld", name, key,
+                              (long long)most);
+    *out = (uint32_t)value;
+    return 0;
+}
+
+static int read_number(const json_t *object, const char *key, bool optional, const char *name, size_t index,
+                       double *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, key);
+    *out = NAN;
+    if (optional && (!json || json_is_null(json)))
+        return 0;
+    if (!json_is_number(json))
+        return spl_fail_field(err, SPL_E_INPUT, key, "%s: point %zu needs a number '%s'", name, index, key);
+    *out = json_number_value(json);
+    return 0;
+}
+
+static int read_point(const json_t *object, const char *name, size_t index, struct spl_profile_point *point,
+                      struct spl_error *err)
+{
+    char method[32];
+    int rc;
+    if (!json_is_object(object))
+        return spl_fail_field(err, SPL_E_INPUT, "points", "%s: point %zu is no object", name, index);
+    if ((rc = read_text(object, "method", method, sizeof method, name, err)) ||
+        (rc = read_number(object, "lod", false, name, index, &point->setting.lod, err)) ||
+        (rc = read_number(object, "supersample", false, name, index, &point->setting.supersample, err)))
+        return rc;
+    int found = spl_method_from_name(method);
+    if (found < 0)
+        return spl_fail_field(err, SPL_E_INPUT, "method", "%s: point %zu: unknown method '%s'", name, index, method);
+    point->setting.method = (enum spl_method)found;
+    for (const struct number *n = numbers; !rc && n < numbers + number_count; n++)
+        rc = read_number(object, n->name, n->optional, name, index, number_of(point, n), err);
+    return rc;
+}
+
+static int read_version(const json_t *dataset, const char *name, uint64_t *out, struct spl_error *err)
+{
+    char text[17] = "", *end = text;
+    int rc = read_text(dataset, "version", text, sizeof text, name, err);
+    if (rc)
+        return rc;
+    if (strspn(text, "0123456789abcdef") == 16)
+        *out = strtoull(text, &end, 16);
+    if (end != text + 16)
+        return spl_fail_field(err, SPL_E_INPUT, "version", "%s: dataset version '%s' is not 16 hex digits", name, text);
+    return 0;
+}
+
+static int read_header(const json_t *root, const char *name, struct spl_profile *profile, struct spl_error *err)
+{
+    const char *format = json_string_value(json_object_get(root, "format"));
+    if (!format || strcmp(format, FORMAT))
+        return spl_fail_field(err, SPL_E_INPUT, "format", "%s: 'format' is not \"" FORMAT "\"", name);
+    uint32_t version;
+    const json_t *dataset = json_object_get(root, "dataset"), *device = json_object_get(root, "device");
+    const json_t *software = json_object_get(device, "software");
+    int rc;
+    if ((rc = read_count(root, "format_version", SPL_PROFILE_VERSION, &version, name, err)) ||
+        (rc = read_text(root, "splatd", profile->splatd, sizeof profile->splatd, name, err)) ||
+        (rc = read_text(dataset, "id", profile->dataset_id, sizeof profile->dataset_id, name, err)) ||
+        (rc = read_version(dataset, name, &profile->dataset_version, err)) ||
+        (rc = read_text(device, "backend", profile->backend, sizeof profile->backend, name, err)) ||
+        (rc = read_text(device, "name", profile->device, sizeof profile->device, name, err)) ||
+        (rc = read_text(device, "driver", profile->driver, sizeof profile->driver, name, err)) ||
+        (rc = read_text(root, "reference", profile->reference, sizeof profile->reference, name, err)) ||
+        (rc = read_count(root, "views", views_max, &profile->views, name, err)) ||
+        (rc = read_count(root, "width", side_max, &profile->width, name, err)) ||
+        (rc = read_count(root, "height", side_max, &profile->height, name, err)))
+        return rc;
+    if (!json_is_boolean(software))
+        return spl_fail_field(err, SPL_E_INPUT, "software", "%s: 'software' must be true or false", name);
+    profile->software = json_is_true(software);
+    return 0;
+}
+
+static int read_points(const json_t *root, const char *name, struct spl_profile *profile, struct spl_error *err)
+{
+    const json_t *points = json_object_get(root, "points");
+    size_t count = json_array_size(points);
+    if (!count || count > SPL_PROFILE_POINTS_MAX)
+        return spl_fail_field(err, SPL_E_INPUT, "points", "%s: 'points' must be an array of 1 to %d settings", name,
+                              (int)SPL_PROFILE_POINTS_MAX);
+    if (!(profile->points = spl_alloc(count, sizeof *profile->points, err)))
+        return SPL_E_NOMEM;
+    profile->count = count;
+    int rc = 0;
+    for (size_t i = 0; !rc && i < count; i++)
+        rc = read_point(json_array_get(points, i), name, i, &profile->points[i], err);
+    return rc ? rc : check(profile, name, err);
+}
+
+int spl_profile_parse(const char *bytes, size_t length, const char *name, struct spl_profile *profile,
+                      struct spl_error *err)
+{
+    *profile = (struct spl_profile){0};
+    json_error_t where;
+    json_t *root = json_loadb(bytes, length, JSON_REJECT_DUPLICATES, &where);
+    if (!root)
+        return spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", name, where.line, where.column,
+                        where.text);
+    int rc = read_header(root, name, profile, err);
+    if (!rc)
+        rc = read_points(root, name, profile, err);
+    json_decref(root);
+    if (rc)
+        spl_profile_finish(profile);
+    else
+        spl_profile_mark_front(profile);
+    return rc;
+}
+
+static int compare(const struct spl_profile *profile, const struct spl_dataset_info *dataset,
+                   const struct spl_device_info *device, const char *path, struct spl_error *err)
+{
+    if (dataset && profile->dataset_version != dataset->version)
+        return spl_fail_field(err, SPL_E_INPUT, "version",
+                              "%s is about version %016" PRIx64 " of dataset '%s', which is now %016" PRIx64
+                              "; 'splatd bench' measures it anew",
+                              path, profile->dataset_version, dataset->id, dataset->version);
+    if (device && (strcmp(profile->backend, device->backend) || strcmp(profile->device, device->name) ||
+                   strcmp(profile->driver, device->driver)))
+        return spl_fail_field(err, SPL_E_INPUT, "device",
+                              "%.150s is about %s: %.60s (%.60s), not %s: %.60s (%.60s); 'splatd bench' measures anew",
+                              path, profile->backend, profile->device, profile->driver, device->backend, device->name,
+                              device->driver);
+    return 0;
+}
+
+/* The file's bytes, malloc'd; NULL on failure. */
+static char *read_file(const char *path, size_t *length, struct spl_error *err)
+{
+    char *bytes = NULL;
+    struct stat status;
+    FILE *file = fopen(path, "re");
+    if (!file && errno == ENOENT) {
+        spl_fail(err, SPL_E_NOT_FOUND, "there is no profile '%s'; 'splatd bench' makes one", path);
+        return NULL;
+    }
+    if (!file || fstat(fileno(file), &status))
+        spl_fail_errno(err, errno, "cannot read '%s'", path);
+    else if (!S_ISREG(status.st_mode) || status.st_size > file_max)
+        spl_fail(err, SPL_E_INPUT, "'%s' is no profile: no plain file, or larger than %d bytes", path, (int)file_max);
+    else if ((bytes = spl_alloc_raw((size_t)status.st_size + 1, 1, err)))
+        *length = fread(bytes, 1, (size_t)status.st_size, file);
+    if (bytes && ferror(file)) {
+        spl_fail_errno(err, errno, "cannot read '%s'", path);
+        free(bytes);
+        bytes = NULL;
+    }
+    if (file)
+        fclose(file);
+    return bytes;
+}
+
+int spl_profile_load(const char *path, const struct spl_dataset_info *dataset, const struct spl_device_info *device,
+                     struct spl_profile *profile, struct spl_error *err)
+{
+    struct spl_error own = {0};
+    size_t length = 0;
+    *profile = (struct spl_profile){0};
+    if (!err)
+        err = &own; // the code is read back below
+    char *bytes = read_file(path, &length, err);
+    if (!bytes)
+        return err->code;
+    int rc = spl_profile_parse(bytes, length, path, profile, err);
+    free(bytes);
+    if (!rc && (rc = compare(profile, dataset, device, path, err)))
+        spl_profile_finish(profile);
+    return rc;
+}
+
+/* ------------------------------------------------------------------------------------------------------- writing */
+
+static json_t *point_to_json(const struct spl_profile_point *point)
+{
+    struct spl_profile_point copy = *point;
+    json_t *json = json_pack("{s:s, s:f, s:f, s:b}", "method", spl_method_name(point->setting.method), "lod",
+                             point->setting.lod, "supersample", point->setting.supersample, "front", point->front);
+    for (const struct number *n = numbers; n < numbers + number_count; n++) {
+        double value = *number_of(&copy, n);
+        json_object_set_new(json, n->name, isfinite(value) ? json_real(value) : json_null());
+    }
+    return json;
+}
+
+json_t *spl_profile_to_json(const struct spl_profile *profile)
+{
+    json_t *points = json_array();
+    for (size_t i = 0; i < profile->count; i++)
+        json_array_append_new(points, point_to_json(&profile->points[i]));
+    return json_pack("{s:s, s:i, s:s, s:{s:s, s:o}, s:{s:s, s:s, s:s, s:b}, s:s, s:i, s:i, s:i, s:o}", "format", FORMAT,
+                     "format_version", SPL_PROFILE_VERSION, "splatd", profile->splatd, "dataset", "id",
+                     profile->dataset_id, "version", json_sprintf("%016" PRIx64, profile->dataset_version), "device",
+                     "backend", profile->backend, "name", profile->device, "driver", profile->driver, "software",
+                     profile->software, "reference", profile->reference, "views", (int)profile->views, "width",
+                     (int)profile->width, "height", (int)profile->height, "points", points);
+}
+
+static int write_bytes(const char *path, const char *bytes, size_t length, struct spl_error *err)
+{
+    char *part = NULL;
+    if (asprintf(&part, "%s.XXXXXX", path) < 0)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of '%s'", path);
+    int rc = 0, fd = mkostemp(part, O_CLOEXEC);
+    mode_t mask = umask(0);
+    umask(mask);
+    if (fd < 0) {
+        rc = spl_fail_errno(err, errno, "cannot make a file beside '%s'", path);
+        goto done;
+    }
+    FILE *file = fdopen(fd, "w");
+    bool written =
+        file && fwrite(bytes, 1, length, file) == length && !fflush(file) && !fsync(fd) && !fchmod(fd, 0666 & ~mask);
+    if (!written || rename(part, path)) {
+        rc = spl_fail_errno(err, errno, "cannot write '%s'", path);
+        unlink(part);
+    }
+    if (file)
+        fclose(file);
+    else
+        close(fd);
+done:
+    free(part);
+    return rc;
+}
+
+int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)
+{
+    struct spl_profile copy = *profile, again = {0};
+    json_t *json = NULL;
+    char *text = NULL;
+    int rc = SPL_E_NOMEM;
+    if (!profile->count || profile->count > SPL_PROFILE_POINTS_MAX)
+        return spl_fail_field(err, SPL_E_USAGE, "points", "a profile holds 1 to %d settings, not %zu",
+                              (int)SPL_PROFILE_POINTS_MAX, profile->count);
+    if (!(copy.points = spl_alloc_raw(copy.count, sizeof *copy.points, err)))
+        return SPL_E_NOMEM;
+    memcpy(copy.points, profile->points, copy.count * sizeof *copy.points);
+    for (size_t i = 0; i < copy.count; i++) {
+        copy.points[i].psnr = fmin(copy.points[i].psnr, SPL_PROFILE_PSNR_MAX); // NAN would become the maximum
+        copy.points[i].psnr_q05 = fmin(copy.points[i].psnr_q05, SPL_PROFILE_PSNR_MAX);
+        if (isnan(profile->points[i].psnr))
+            copy.points[i].psnr = NAN;
+        if (isnan(profile->points[i].psnr_q05))
+            copy.points[i].psnr_q05 = NAN;
+    }
+    json = spl_profile_to_json(&copy);
+    text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    if (!text)
+        spl_fail(err, SPL_E_NOMEM, "out of memory for the profile '%s'", path);
+    else if (!(rc = check(&copy, path, err)) && !(rc = spl_profile_parse(text, strlen(text), path, &again, err)))
+        rc = write_bytes(path, text, strlen(text), err);
+    spl_profile_finish(&again);
+    json_decref(json);
+    free(text);
+    free(copy.points);
+    return rc;
+}
