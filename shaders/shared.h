@@ -75,7 +75,7 @@ struct spl_draw_chunk {
     SPL_U32 color_base;                   /* int16 base of u (low half) and v (high half) */
     SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
     SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
-    SPL_U32 count;                        /* splats of the chunk that are drawn, 1..SPL_CHUNK_SPLATS */
+    SPL_U32 count;                        /* SPL_COUNT_*: splats of the chunk that are drawn, and the window of the tile */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -97,8 +97,18 @@ struct spl_draw_chunk {
 #define SPL_COLOR_V 8
 #define SPL_COLOR_BASE_Y 16
 
-/* Occlusion: the image in tiles of this many samples a side. */
+/* count: splats 0..7 (1..SPL_CHUNK_SPLATS; 0 = hidden), window 8..31: 0 = the whole tile, else column + 1 (12 bits) and row
+ * (12 bits) in a grid of SPL_WINDOW samples a side. A chunk whose discs may be larger than a window is listed once a window:
+ * a loop of a software driver's kernel ends after 65535 rounds, whether it is done or not, and one invocation draws
+ * SPL_RUN_SPLATS / SPL_LANES discs. */
+#define SPL_COUNT_BITS 8
+#define SPL_WINDOW_BITS 12
+#define SPL_WINDOW 112
+
+/* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many (the
+ * same 65535 rounds). */
 #define SPL_OCCLUSION_TILE 8
+#define SPL_OCCLUSION_TILES_MAX 32768
 
 /* Where a drawn chunk can reach, made by the CPU. */
 struct spl_chunk_bounds {
@@ -125,6 +135,7 @@ struct spl_frame_params {
 
 #ifndef SPL_GLSL
 _Static_assert(sizeof(struct spl_draw_chunk) == 64, "spl_draw_chunk is 64 bytes on both sides");
+_Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
 _Static_assert(sizeof(struct spl_frame_params) == 124, "spl_frame_params is 124 bytes on both sides");
 #endif
 

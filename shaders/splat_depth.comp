@@ -7,11 +7,11 @@ layout(local_size_x = SPL_WORKGROUP) in;
 
 layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
 
-void draw(splat s)
+void draw(splat_run run, splat s)
 {
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
-    disc d = make_disc(s);
+    disc d = make_disc(s, run.low, run.high);
     ivec2 at = d.first;
     while (at.y <= d.last.y) {
         float z;
@@ -27,5 +27,5 @@ void main()
 {
     splat_run run = load_splat_run();
     for (uint i = run.first; i < run.end; i += SPL_LANES)
-        draw(load_splat(run.chunk, i, false));
+        draw(run, load_splat(run.chunk, i, false));
 }

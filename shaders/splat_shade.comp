@@ -57,16 +57,16 @@ void shade(uint at, float first, float z, float distance, float pushed, uvec3 va
     }
 }
 
-void draw(spl_draw_chunk chunk, splat s)
+void draw(splat_run run, splat s)
 {
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
     uvec3 value = uvec3(0u);
     if (GROUP == SPL_SUMS_COLOR)
-        value = load_color(chunk, s.index);
+        value = load_color(run.chunk, s.index);
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
-    disc d = make_disc(s);
+    disc d = make_disc(s, run.low, run.high);
     ivec2 sample_at = d.first;
     while (sample_at.y <= d.last.y) {
         float z;
@@ -75,7 +75,7 @@ void draw(spl_draw_chunk chunk, splat s)
         if (distance < 1.0) {
             float first = uintBitsToFloat(depth[at]);
             if (z <= first)
-                shade(at, first, z, distance, z + d.margin, value, chunk.first_id + s.index);
+                shade(at, first, z, distance, z + d.margin, value, run.chunk.first_id + s.index);
         }
         next_sample(d, sample_at);
     }
@@ -85,5 +85,5 @@ void main()
 {
     splat_run run = load_splat_run();
     for (uint i = run.first; i < run.end; i += SPL_LANES)
-        draw(run.chunk, load_splat(run.chunk, i, false));
+        draw(run, load_splat(run.chunk, i, false));
 }

@@ -38,7 +38,8 @@ vec2 disc_extent(float p, float q, float n_p, float n_q, float n_other, float ra
     return result;
 }
 
-disc make_disc(splat s)
+/* The part of the disc that lies on the samples window_low to window_high, inclusive. */
+disc make_disc(splat s, vec2 window_low, vec2 window_high)
 {
     disc d;
     vec3 p = s.position, n = s.normal;
@@ -50,9 +51,8 @@ disc make_disc(splat s)
     precise vec2 half_size = vec2(frame.fx * ex.y, frame.fy * ey.y);
     vec2 low = min(middle - half_size, center - frame.low_pass);
     vec2 high = max(middle + half_size, center + frame.low_pass);
-    vec2 limit = vec2(float(frame.width), float(frame.height));
-    d.first = ivec2(ceil(clamp(low - 0.5, vec2(0.0), limit)));
-    d.last = ivec2(floor(clamp(high - 0.5, vec2(-1.0), limit - 1.0)));
+    d.first = ivec2(ceil(clamp(low - 0.5, window_low, window_high + 1.0)));
+    d.last = ivec2(floor(clamp(high - 0.5, window_low - 1.0, window_high)));
     if (d.last.x < d.first.x)
         d.last.y = d.first.y - 1;
     d.center = center;

@@ -19,6 +19,7 @@ struct splat {
 struct splat_run {
     spl_draw_chunk chunk;
     uint first, end;
+    vec2 low, high; /* samples that it draws to, inclusive */
 };
 
 /* A run of codes in registers: a load from memory costs more than the shifts that take a code off the low end. */
@@ -90,13 +91,20 @@ splat_run load_splat_run()
     splat_run r;
     r.first = 0u;
     r.end = 0u;
+    r.low = vec2(0.0);
+    r.high = vec2(0.0);
     uint entry = gl_GlobalInvocationID.x / SPL_LANES;
     if (entry < frame.entries) {
         uint packed_entry = draw_entries[frame.first_entry + entry];
         r.chunk = draw_chunks[packed_entry >> SPL_RUN_BITS];
         uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_SPLATS;
         r.first = first + gl_GlobalInvocationID.x % SPL_LANES;
-        r.end = min(first + SPL_RUN_SPLATS, r.chunk.count);
+        r.end = min(first + SPL_RUN_SPLATS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
+        uint column = bitfieldExtract(r.chunk.count, SPL_COUNT_BITS, SPL_WINDOW_BITS);
+        uint row = r.chunk.count >> (SPL_COUNT_BITS + SPL_WINDOW_BITS);
+        vec2 size = vec2(float(frame.width), float(frame.height));
+        r.low = column == 0u ? vec2(0.0) : vec2(float(column - 1u), float(row)) * float(SPL_WINDOW);
+        r.high = (column == 0u ? size : min(r.low + float(SPL_WINDOW), size)) - 1.0;
     }
     return r;
 }

@@ -1,5 +1,5 @@
-/* The draw list; see draw_list.h. Chunks come roughly front to back; entries are laid out phase by phase and page by page
- * in that order. */
+/* The draw list; see draw_list.h. Chunks come roughly front to back; entries are laid out phase by phase and page by
+ * page in that order. */
 #include "render/draw_list.h"
 
 #include <stdlib.h>
@@ -22,15 +22,20 @@ static int grow(void **array, size_t *capacity, size_t wanted, size_t size, stru
     return SPL_OK;
 }
 
+static uint32_t splats(const struct spl_draw_chunk *chunk)
+{
+    return chunk->count & ((1u << SPL_COUNT_BITS) - 1);
+}
+
 static uint32_t runs(const struct spl_draw_chunk *chunk)
 {
-    return (chunk->count + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
+    return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = 0;
-    list->splats = list->sample_splats = 0;
+    list->splats = list->listed_splats = list->sample_splats = 0;
     list->nodes = 0;
     list->complete = true;
 }
@@ -53,19 +58,19 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct sp
     list->bounds[list->chunk_count] = *bounds;
     list->page_of_chunk[list->chunk_count++] = page;
     list->entry_count += runs(chunk);
-    list->splats += chunk->count;
+    list->listed_splats += splats(chunk);
     return SPL_OK;
 }
 
 /* The batch of every chunk, counted; batches keep the order in which they are met. */
 static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, uint32_t pages, struct spl_error *err)
 {
-    uint64_t splats = 0;
+    uint64_t before = 0;
     list->first_back_chunk = list->chunk_count;
     for (size_t i = 0; i < list->chunk_count; i++) {
-        if (2 * splats >= list->splats && list->first_back_chunk == list->chunk_count)
+        if (2 * before >= list->listed_splats && list->first_back_chunk == list->chunk_count)
             list->first_back_chunk = i;
-        splats += list->chunks[i].count;
+        before += splats(&list->chunks[i]);
         bool back = i >= list->first_back_chunk;
         uint32_t *batch = &batch_of_page[(back ? pages : 0) + list->page_of_chunk[i]];
         if (*batch == UINT32_MAX) {
@@ -82,9 +87,9 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
 int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err)
 {
     uint32_t *batch_of_page = spl_alloc_raw((size_t)pages * 2, sizeof *batch_of_page, err);
-    int rc = batch_of_page ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count,
-                                  sizeof *list->entries, err)
-                           : SPL_E_NOMEM;
+    int rc = batch_of_page
+                 ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)
+                 : SPL_E_NOMEM;
     if (!rc) {
         memset(batch_of_page, 0xff, (size_t)pages * 2 * sizeof *batch_of_page);
         rc = count_batches(list, batch_of_page, pages, err);

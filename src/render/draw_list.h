@@ -27,7 +27,8 @@ struct spl_draw_list {
     size_t chunk_count, entry_count, batch_count;
     size_t chunk_capacity, entry_capacity, batch_capacity;
     uint32_t *page_of_chunk;          /* chunk_count, scratch */
-    uint64_t splats;
+    uint64_t splats;                  /* that are drawn */
+    uint64_t listed_splats;           /* the same, once for every window that they are drawn in */
     uint32_t nodes;                   /* that the chunks came from */
     uint64_t sample_splats;           /* upper bound of the splats that reach any one sample */
     bool complete;                    /* false: a coarser node stood in for pages that are not resident */

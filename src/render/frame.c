@@ -78,6 +78,7 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         .camera = &tile->camera,
         .lod = job->view->lod,
         .low_pass = tile->params.low_pass,
+        .points = job->view->method == SPL_METHOD_POINTS,
         .resident = ask_page,
         .context = job,
     };

@@ -23,6 +23,7 @@ struct spl_select_params {
     const struct spl_camera *camera;  /* of the tile, in samples */
     double lod;                       /* samples; 0 = leaves in full */
     double low_pass;                  /* samples */
+    bool points;                      /* splats have no extent: chunks are never drawn by windows */
     bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
     void *context;
 };

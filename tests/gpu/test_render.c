@@ -224,16 +224,45 @@ static void the_widest_codes_match(void **state)
     done(dataset);
 }
 
+/* The eye among discs that span the image; a software driver's loop ends after 65535 rounds, done or not. */
 static void inside_the_cloud_matches(void **state)
 {
     (void)state;
-    struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
     struct spl_view view = looking(origin, 0.3, 160, 120);
-    same_images(dataset, &view, "eye within the cloud");
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        random_state = seed;
+        struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
+        same_images(dataset, &view, "eye within the cloud");
+        done(dataset);
+    }
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
     view.camera.cx += 31.7;
     view.camera.fy *= 1.3;
     view.margin = 0;
     same_images(dataset, &view, "shifted principal point, no margin");
+    done(dataset);
+}
+
+/* 230,400 samples a disc, 128 discs. */
+static void discs_that_fill_a_large_image_match(void **state)
+{
+    (void)state;
+    enum { count = 128 };
+    struct make_splat splats[count] = {0};
+    for (int i = 0; i < count; i++) {
+        splats[i].position[1] = 0.4 * uniform();
+        splats[i].normal[0] = (float)(0.4 * uniform() - 0.2);
+        splats[i].normal[1] = -1;
+        splats[i].radius = (float)(3 + uniform());
+        for (int c = 0; c < 3; c++)
+            splats[i].color[c] = (uint8_t)(uniform() * 256);
+    }
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 3, 640, 360);
+    const double eye[3] = {0, -1, 0}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, origin, up, NULL), SPL_OK);
+    same_images(dataset, &view, "discs that fill the image");
     done(dataset);
 }
 
@@ -400,6 +429,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(random_splats_match),
         cmocka_unit_test(a_wall_that_hides_the_rest_changes_nothing),
         cmocka_unit_test(inside_the_cloud_matches),
+        cmocka_unit_test(discs_that_fill_a_large_image_match),
         cmocka_unit_test(far_coordinates_match_near_ones),
         cmocka_unit_test(a_million_splats_on_one_pixel_do_not_wrap),
         cmocka_unit_test_prestate(small_tiles_give_the_same_image, device),

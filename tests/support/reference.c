@@ -36,6 +36,7 @@ struct disc {
     float p[3], n[3], radius;
     uint32_t id;
     uint8_t color[3];
+    uint32_t window;      /* of the tile that it is drawn to; 0 = all of it */
 };
 
 static bool always(void *context, uint32_t page)
@@ -86,6 +87,11 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
         high = fmax(high, center[i] + 1);
         first[i] = low < 0 ? 0 : low > size[i] ? size[i] : (int)low;
         last[i] = high >= size[i] ? size[i] - 1 : high < 0 ? -1 : (int)high;
+        if (d->window) {
+            int cell = i ? (int)(d->window >> SPL_WINDOW_BITS) : (int)(d->window & ((1u << SPL_WINDOW_BITS) - 1)) - 1;
+            first[i] = first[i] < cell * SPL_WINDOW ? cell * SPL_WINDOW : first[i];
+            last[i] = last[i] >= (cell + 1) * SPL_WINDOW ? (cell + 1) * SPL_WINDOW - 1 : last[i];
+        }
     }
 }
 
@@ -174,7 +180,7 @@ static void for_each_disc(struct scene *s, bool shade)
             uint32_t entry = s->list.entries[batch->first_entry + e / SPL_RUN_SPLATS];
             const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_RUN_BITS];
             uint32_t index = (entry & 3) * SPL_RUN_SPLATS + e % SPL_RUN_SPLATS;
-            if (index >= draw->count)
+            if (index >= (draw->count & ((1u << SPL_COUNT_BITS) - 1)))
                 continue;
             const struct spl_chunk *chunk = find_chunk(chunks, chunk_count, draw->first_id);
             struct spl_chunk local = *chunk;
@@ -183,7 +189,7 @@ static void for_each_disc(struct scene *s, bool shade)
             local.radius_step = draw->radius_step;
             struct spl_splat splat;
             spl_chunk_decode(&local, page, index, &splat);
-            struct disc d = {.radius = splat.radius, .id = draw->first_id + index};
+            struct disc d = {.radius = splat.radius, .id = draw->first_id + index, .window = draw->count >> SPL_COUNT_BITS};
             memcpy(d.color, splat.color, sizeof d.color);
             to_view(&s->camera, splat.position, d.p);
             to_view(&s->camera, splat.normal, d.n);
@@ -293,7 +299,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cy *= view->supersample;
     s.margin = view->margin < 0 ? 1 : (float)view->margin;
     struct spl_select_params params = {
-        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = 0.70710678f, .resident = always};
+        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = 0.70710678f, .resident = always,
+        .points = view->method == SPL_METHOD_POINTS};
     int rc = spl_select(&params, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
