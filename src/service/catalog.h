@@ -11,7 +11,7 @@ struct spl_catalog_entry {
     char *path;
     struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
-    struct spl_view_defaults defaults;
+    struct spl_camera_defaults defaults;
     char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
 };
 

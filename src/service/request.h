@@ -8,16 +8,7 @@
 #include <splatd/image.h>
 #include <splatd/render.h>
 
-/* The dataset's default view: what stands in for parameters that were left out. */
-struct spl_view_defaults {
-    double eye[3], target[3], up[3], fov, near, far;
-};
-
-/* The server's caps; no request can lift them. */
-struct spl_view_limits {
-    uint32_t side_px;
-    uint64_t pixels;
-};
+#include "geom/camera_json.h"
 
 struct spl_view_request {
     struct spl_view view; /* deadline_ns is left at "none" */
@@ -26,13 +17,13 @@ struct spl_view_request {
 };
 
 /* `query` is what stands behind '?', still percent-encoded; it need not end in NUL. */
-int spl_view_request_from_query(const char *query, size_t length, const struct spl_view_defaults *defaults,
-                                const struct spl_view_limits *limits, struct spl_view_request *out,
+int spl_view_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err);
 
 /* An empty body is the default view. */
-int spl_view_request_from_json(const char *body, size_t length, const struct spl_view_defaults *defaults,
-                               const struct spl_view_limits *limits, struct spl_view_request *out,
+int spl_view_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                               const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
 
 /* Decodes %XX of `text[0..length)` into `out` with a closing NUL. Refuses stray '%', control characters and more than

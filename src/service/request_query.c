@@ -56,12 +56,12 @@ static int parse_number(const char *text, size_t length, const char *name, doubl
     return 0;
 }
 
-static int parse_numbers(struct value *value, const char *text, const char *name, struct spl_error *err)
+static int parse_numbers(struct spl_value *value, const char *text, const char *name, struct spl_error *err)
 {
     for (const char *p = text;;) {
         size_t length = strcspn(p, ",");
         double ignored;
-        bool room = value->count < VALUE_NUMBERS_MAX;
+        bool room = value->count < SPL_VALUE_NUMBERS;
         int rc = parse_number(p, length, name, room ? &value->n[value->count] : &ignored, err);
         if (rc)
             return rc;
@@ -80,28 +80,28 @@ static int parse_pair(struct values *values, const char *pair, size_t length, st
     int rc = spl_percent_decode(pair, name_length, name, sizeof name, "a parameter's name", err);
     if (rc)
         return rc;
-    enum param param = spl_param_find(name, QUERY, err);
+    enum param param = spl_param_find(name, SPL_QUERY, err);
     if (param == PARAM_COUNT)
         return SPL_E_INPUT;
     if (!equals)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s has no value; write %s=…", name, name);
-    struct value *value = &values->v[param];
+    struct spl_value *value = &values->v[param];
     if ((rc = spl_values_claim(values, param, name, err)))
         return rc;
     if ((rc = spl_percent_decode(equals + 1, length - name_length - 1, text, sizeof text, name, err)))
         return rc;
-    enum value_kind kind = spl_params[param].kind;
+    int kind = spl_params[param].kind;
     unsigned least, most;
-    spl_kind_get_count(kind, &least, &most);
+    spl_kind_get_count((enum spl_value_kind)kind, &least, &most);
     if (!most)
         return spl_value_from_text(value, kind, name, text, err);
     if ((rc = parse_numbers(value, text, name, err)))
         return rc;
-    return spl_value_check(value, kind, name, err);
+    return spl_value_check(value, (enum spl_value_kind)kind, name, err);
 }
 
-int spl_view_request_from_query(const char *query, size_t length, const struct spl_view_defaults *defaults,
-                                const struct spl_view_limits *limits, struct spl_view_request *out,
+int spl_view_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err)
 {
     struct values values = {0};

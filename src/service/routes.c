@@ -50,7 +50,7 @@ static void show_status(struct request *request, const struct spl_catalog_entry 
 static int parse_view(struct request *request, const struct spl_catalog_entry *entry, bool post,
                       struct spl_view_request *view, struct spl_error *err)
 {
-    struct spl_view_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = request->service->options->pixels_max};
+    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = request->service->options->pixels_max};
     int rc =
         post
             ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)

@@ -10,9 +10,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const struct spl_view_defaults defaults = {
+    static const struct spl_camera_defaults defaults = {
         .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};
-    static const struct spl_view_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
     struct spl_view_request request;
     struct spl_error err = {0};
     if (!size)

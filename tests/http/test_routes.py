@@ -191,8 +191,8 @@ def test_openapi_knows_every_parameter_and_route():
     listed = set(re.findall(r"^        - name: (\w+)$", text, re.M))
     schemas = {name: set(re.findall(r"^        (\w+):", body, re.M)) for name, body in
                re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
-    table = (ROOT / "src/service/view_params.def").read_text()
-    rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z| ]+),', table, re.M)
+    table = "".join((ROOT / name).read_text() for name in ("src/geom/camera_params.def", "src/service/view_params.def"))
+    rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z_| ]+),', table, re.M)
     assert len(rows) > 20
     assert listed == {name for name, _, places in rows if "QUERY" in places}
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}

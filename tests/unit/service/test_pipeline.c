@@ -35,9 +35,9 @@ static struct spl_pipeline *start(size_t queue)
 
 static struct spl_job *make_job(unsigned deadline_ms)
 {
-    static const struct spl_view_defaults defaults = {
+    static const struct spl_camera_defaults defaults = {
         .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
-    static const struct spl_view_limits limits = {.side_px = 64, .pixels = 4096};
+    static const struct spl_camera_limits limits = {.side_px = 64, .pixels = 4096};
     struct spl_job *job = calloc(1, sizeof *job);
     const char *query = "width=8&height=4&format=raw";
     assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);

@@ -11,9 +11,9 @@
 #include "service/request.h"
 #include "service/values.h"
 
-static const struct spl_view_defaults defaults = {
+static const struct spl_camera_defaults defaults = {
     .eye = {10, 0, 0}, .target = {0, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};
-static const struct spl_view_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
 
 static int query(const char *text, struct spl_view_request *out, struct spl_error *err)
 {

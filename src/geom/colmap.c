@@ -2,7 +2,7 @@
  * and refused otherwise, rather than drawn wrong. Pure functions, any thread. */
 #include <string.h>
 
-#include "service/values.h"
+#include "geom/camera_json.h"
 
 static const struct {
     const char *name;
@@ -19,7 +19,7 @@ int spl_colmap_model_from_name(const char *name)
     return -1;
 }
 
-int spl_colmap_apply(int model, const struct value *params, struct spl_camera *camera, struct spl_error *err)
+int spl_colmap_apply(int model, const struct spl_value *params, struct spl_camera *camera, struct spl_error *err)
 {
     unsigned focals = models[model].focals, count = models[model].count;
     if (params->count != count)

@@ -1,0 +1,91 @@
+/* A camera as people write it: named parameters (camera_params.def) with numbers, from JSON or from anything else that
+ * fills struct spl_value, to a checked struct spl_camera. The service's queries and bodies and the lists of views share
+ * this one meaning. Pure functions, any thread. Errors are SPL_E_INPUT and carry the parameter's name. */
+#ifndef SPL_GEOM_CAMERA_JSON_H
+#define SPL_GEOM_CAMERA_JSON_H
+
+#include <jansson.h>
+#include <stddef.h>
+
+#include <splatd/camera.h>
+
+#include "base/error.h"
+
+enum spl_value_kind {
+    SPL_KIND_NUMBER,
+    SPL_KIND_COUNT, /* a whole number */
+    SPL_KIND_VECTOR,
+    SPL_KIND_QUATERNION,
+    SPL_KIND_MATRIX,
+    SPL_KIND_NUMBERS,
+    SPL_KIND_AXES,
+    SPL_KIND_MODEL,
+    SPL_KIND_END, /* the service's own kinds go on from here */
+};
+
+enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4 };
+
+enum spl_camera_param {
+#define PARAM(name, alias, kind, places, help) SPL_CAMERA_##name,
+#include "geom/camera_params.def"
+#undef PARAM
+    SPL_CAMERA_PARAMS
+};
+
+enum { SPL_VALUE_NUMBERS = 16 };
+
+struct spl_value {
+    bool given;
+    unsigned count;
+    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0] */
+};
+
+/* What stands in for parameters that were left out: the default view of a dataset. */
+struct spl_camera_defaults {
+    double eye[3], target[3], up[3], fov, near, far;
+};
+
+/* Caps on an image's size; no camera can lift them. */
+struct spl_camera_limits {
+    uint32_t side_px;
+    uint64_t pixels;
+};
+
+/* How many numbers a value of `kind` has: [*least, *most]; 0, 0 for kinds given as text. */
+void spl_kind_get_count(enum spl_value_kind kind, unsigned *least, unsigned *most);
+
+/* Checks count, finiteness and wholeness of what was filled in. */
+int spl_value_check(const struct spl_value *value, enum spl_value_kind kind, const char *name, struct spl_error *err);
+
+/* The number of a choice of kind AXES or MODEL. */
+int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, const char *name, const char *text,
+                          struct spl_error *err);
+
+/* One JSON value of a kind below SPL_KIND_END, checked. */
+int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const json_t *json, const char *name,
+                        struct spl_error *err);
+
+/* "an object", "text", …: for messages. */
+const char *spl_json_type_name(const json_t *json);
+
+/* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
+ * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up
+ * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left out. The outcome lies within
+ * `limits` and has passed spl_camera_check(). */
+int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
+                           const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
+
+#define SPL_CAMERA_NEAR_DEFAULT 0.01
+
+/* One view of a list: an object with "camera" (parameters of place SPL_CAMERA) and beside it parameters of place
+ * SPL_BODY, as in the body of POST /v1/datasets/{id}/view. Keys named in `others` (ends in NULL) are the caller's; all
+ * other keys are refused by name. `defaults` as above. Borrows `view`. */
+int spl_camera_from_json(json_t *view, const char *const *others, const struct spl_camera_defaults *defaults,
+                         const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
+
+/* COLMAP's models by number, -1 for an unknown name; their parameters to fx, fy, cx, cy. Distortion other than 0 is
+ * refused. */
+int spl_colmap_model_from_name(const char *name);
+int spl_colmap_apply(int model, const struct spl_value *params, struct spl_camera *camera, struct spl_error *err);
+
+#endif

@@ -1,0 +1,152 @@
+/* From given parameters to a checked camera: defaults, conflicts, caps, and the pose and intrinsics in any of their
+ * forms.
+ *
+ * Invariant: what comes out has passed spl_camera_check() and lies within the caps, so that no later stage refuses it
+ * for a reason that this one could have named. Pure functions, any thread. */
+#include "geom/camera_json.h"
+
+#include <math.h>
+
+static const char *const names[SPL_CAMERA_PARAMS] = {
+#define PARAM(name, alias, kind, places, help) #name,
+#include "geom/camera_params.def"
+#undef PARAM
+};
+
+enum { width_default = 1280, height_default = 720 };
+
+static bool given(const struct spl_value *v, enum spl_camera_param param)
+{
+    return v[param].given;
+}
+
+static double get(const struct spl_value *v, enum spl_camera_param param, double otherwise)
+{
+    return v[param].given ? v[param].n[0] : otherwise;
+}
+
+static int conflict(enum spl_camera_param param, enum spl_camera_param with, struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' and '%s' exclude each other", names[param],
+                          names[with]);
+}
+
+static int missing(enum spl_camera_param param, enum spl_camera_param because, struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' is needed where '%s' is given", names[param],
+                          names[because]);
+}
+
+static int resolve_size(const struct spl_value *v, const struct spl_camera_limits *limits, uint32_t *width,
+                        uint32_t *height, struct spl_error *err)
+{
+    double size[2] = {get(v, SPL_CAMERA_width, width_default), get(v, SPL_CAMERA_height, height_default)};
+    for (int i = 0; i < 2; i++) {
+        const char *name = i ? "height" : "width";
+        if (size[i] < 1 || size[i] > limits->side_px)
+            return spl_fail_field(err, SPL_E_INPUT, name, "%s %.0f is outside 1 to %u", name, size[i], limits->side_px);
+    }
+    if (size[0] * size[1] > (double)limits->pixels)
+        return spl_fail_field(err, SPL_E_INPUT, given(v, SPL_CAMERA_width) ? "width" : "height",
+                              "%.0f x %.0f is %.0f pixels; the limit is %llu", size[0], size[1], size[0] * size[1],
+                              (unsigned long long)limits->pixels);
+    *width = (uint32_t)size[0];
+    *height = (uint32_t)size[1];
+    return 0;
+}
+
+static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera_defaults *defaults,
+                              struct spl_camera *camera, struct spl_error *err)
+{
+    static const enum spl_camera_param pinhole[] = {SPL_CAMERA_fx, SPL_CAMERA_fy, SPL_CAMERA_cx, SPL_CAMERA_cy};
+    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, defaults->fov), camera->width, camera->height, err);
+    if (rc)
+        return rc;
+    if (given(v, SPL_CAMERA_params) && !given(v, SPL_CAMERA_model))
+        return missing(SPL_CAMERA_model, SPL_CAMERA_params, err);
+    if (given(v, SPL_CAMERA_model)) {
+        if (!given(v, SPL_CAMERA_params))
+            return missing(SPL_CAMERA_params, SPL_CAMERA_model, err);
+        for (int i = 0; i < 4; i++)
+            if (given(v, pinhole[i]))
+                return conflict(pinhole[i], SPL_CAMERA_params, err);
+        if (given(v, SPL_CAMERA_fov))
+            return conflict(SPL_CAMERA_fov, SPL_CAMERA_params, err);
+        return spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, err);
+    }
+    if (given(v, SPL_CAMERA_fov) && given(v, SPL_CAMERA_fx))
+        return conflict(SPL_CAMERA_fov, SPL_CAMERA_fx, err);
+    if (given(v, SPL_CAMERA_fy) && !given(v, SPL_CAMERA_fx))
+        return missing(SPL_CAMERA_fx, SPL_CAMERA_fy, err);
+    camera->fx = get(v, SPL_CAMERA_fx, camera->fx);
+    camera->fy = get(v, SPL_CAMERA_fy, camera->fx);
+    camera->cx = get(v, SPL_CAMERA_cx, camera->cx);
+    camera->cy = get(v, SPL_CAMERA_cy, camera->cy);
+    return 0;
+}
+
+static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
+                        struct spl_camera *camera, struct spl_error *err)
+{
+    static const enum spl_camera_param look_at[] = {SPL_CAMERA_eye, SPL_CAMERA_target, SPL_CAMERA_up},
+                                       colmap[] = {SPL_CAMERA_q, SPL_CAMERA_t};
+    if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
+        return missing(SPL_CAMERA_matrix, SPL_CAMERA_convention, err);
+    for (int i = 0; i < 3; i++) {
+        if (!given(v, look_at[i]))
+            continue;
+        for (enum spl_camera_param other = SPL_CAMERA_matrix; other <= SPL_CAMERA_t; other++)
+            if (given(v, other))
+                return conflict(look_at[i], other, err);
+    }
+    if (given(v, SPL_CAMERA_matrix)) {
+        for (int i = 0; i < 2; i++)
+            if (given(v, colmap[i]))
+                return conflict(colmap[i], SPL_CAMERA_matrix, err);
+        if (!given(v, SPL_CAMERA_convention))
+            return missing(SPL_CAMERA_convention, SPL_CAMERA_matrix, err);
+        return spl_camera_set_matrix(camera, v[SPL_CAMERA_matrix].n, (enum spl_axes)v[SPL_CAMERA_convention].n[0], err);
+    }
+    if (given(v, SPL_CAMERA_q) != given(v, SPL_CAMERA_t))
+        return given(v, SPL_CAMERA_q) ? missing(SPL_CAMERA_t, SPL_CAMERA_q, err)
+                                      : missing(SPL_CAMERA_q, SPL_CAMERA_t, err);
+    if (given(v, SPL_CAMERA_q))
+        return spl_camera_set_colmap(camera, v[SPL_CAMERA_q].n, v[SPL_CAMERA_t].n, err);
+    return spl_camera_look_at(camera, given(v, SPL_CAMERA_eye) ? v[SPL_CAMERA_eye].n : defaults->eye,
+                              given(v, SPL_CAMERA_target) ? v[SPL_CAMERA_target].n : defaults->target,
+                              given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up, err);
+}
+
+/* Without a default view, a camera that says only where it stands would be drawn from a made-up angle. */
+static int check_complete(const struct spl_value *v, struct spl_error *err)
+{
+    bool free_pose = given(v, SPL_CAMERA_matrix) || given(v, SPL_CAMERA_q) || given(v, SPL_CAMERA_t);
+    if (!free_pose && !given(v, SPL_CAMERA_eye))
+        return spl_fail_field(err, SPL_E_INPUT, "eye", "a pose is missing: eye and target, matrix, or q and t");
+    if (!free_pose && !given(v, SPL_CAMERA_target))
+        return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
+    if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model))
+        return spl_fail_field(err, SPL_E_INPUT, "fov", "intrinsics are missing: fov, fx, or model and params");
+    return 0;
+}
+
+int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
+                           const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err)
+{
+    static const struct spl_camera_defaults fallback = {
+        .up = {0, 0, 1}, .fov = 60, .near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    int rc;
+    *camera = (struct spl_camera){0};
+    if (!defaults && (rc = check_complete(values, err)))
+        return rc;
+    if (!defaults)
+        defaults = &fallback;
+    if ((rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
+        (rc = resolve_intrinsics(values, defaults, camera, err)) || (rc = resolve_pose(values, defaults, camera, err)))
+        return rc;
+    camera->near = get(values, SPL_CAMERA_near, defaults->near);
+    camera->far = get(values, SPL_CAMERA_far, defaults->far);
+    if (given(values, SPL_CAMERA_near) && !given(values, SPL_CAMERA_far) && camera->far <= camera->near)
+        camera->far = INFINITY;
+    return spl_camera_check(camera, err);
+}

@@ -1,0 +1,117 @@
+/* NPY 1.0 to 3.0 in: the layer's own numbers, no conversion.
+ *
+ * The header is a Python dictionary with three keys that numpy always writes; its values are looked for by key, so that
+ * their order does not matter. The file must be as long as its header says before anything is allocated. Any thread. */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "image/decode.h"
+
+enum { header_max = 4096, prefix_bytes = 10, shape_max = 4 };
+
+static const struct {
+    const char *type;
+    unsigned channels; /* 0: two dimensions */
+} rows[] = {
+    [SPL_PIXEL_RGBA8] = {"|u1", 4},
+    [SPL_PIXEL_F32] = {"<f4", 0},
+    [SPL_PIXEL_F32X3] = {"<f4", 3},
+    [SPL_PIXEL_U32] = {"<u4", 0},
+};
+
+static int fail(const char *path, const char *field, const char *what, struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_INPUT, field, "%s: NPY header: %s", path, what);
+}
+
+/* The text between magic and pixels, as a string; the file stands at the pixels. */
+static int read_header(FILE *file, const char *path, char text[header_max], struct spl_error *err)
+{
+    unsigned char prefix[prefix_bytes + 2];
+    size_t length = 0, more = 0;
+    if (fread(prefix, 1, prefix_bytes, file) == prefix_bytes) {
+        length = prefix[8] | (size_t)prefix[9] << 8;
+        more = prefix[6] > 1 ? 2 : 0; /* from 2.0 on the length has four bytes */
+    }
+    if (more && fread(prefix + prefix_bytes, 1, more, file) == more)
+        length |= (size_t)prefix[10] << 16 | (size_t)prefix[11] << 24;
+    if (length == 0 || prefix[6] < 1 || prefix[6] > 3)
+        return fail(path, "version", "broken, or of a version other than 1, 2 and 3", err);
+    if (length >= header_max)
+        return fail(path, "header", "longer than that of any image", err);
+    if (fread(text, 1, length, file) != length)
+        return fail(path, "header", "cut off", err);
+    text[length] = 0;
+    return SPL_OK;
+}
+
+/* What stands behind 'key': */
+static const char *find(const char *header, const char *key)
+{
+    const char *at = strstr(header, key);
+    at = at ? at + strlen(key) : NULL;
+    at = at ? at + strspn(at, " ") : NULL;
+    return at && *at == ':' ? at + 1 + strspn(at + 1, " ") : NULL;
+}
+
+static unsigned parse_shape(const char *at, uint64_t shape[shape_max])
+{
+    unsigned count = 0;
+    if (!at || *at++ != '(')
+        return 0;
+    for (at += strspn(at, " "); *at >= '0' && *at <= '9' && count < shape_max; at += strspn(at, " ,")) {
+        char *end;
+        errno = 0;
+        shape[count++] = strtoull(at, &end, 10);
+        if (errno)
+            return 0;
+        at = end;
+    }
+    return *at == ')' ? count : 0;
+}
+
+int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
+{
+    char header[header_max];
+    uint64_t shape[shape_max];
+    const char *wanted = rows[out->type].type;
+    unsigned channels = rows[out->type].channels, dimensions = channels ? 3 : 2;
+    int rc = read_header(file, path, header, err);
+    if (rc)
+        return rc;
+    const char *descr = find(header, "'descr'"), *order = find(header, "'fortran_order'");
+    if (!descr || *descr++ != '\'' || strncmp(descr, wanted, strlen(wanted)) || descr[strlen(wanted)] != '\'')
+        return spl_fail_field(err, SPL_E_INPUT, "descr", "%s: layer %s is stored as '%s', not '%.*s'", path,
+                              spl_layer_name(out->layer), wanted, descr ? (int)strcspn(descr, "'}") : 0,
+                              descr ? descr : "");
+    if (!order || strncmp(order, "False", 5))
+        return fail(path, "fortran_order", "rows must come first: fortran_order must be False", err);
+    unsigned count = parse_shape(find(header, "'shape'"), shape);
+    if (count != dimensions || (channels && shape[2] != channels))
+        return spl_fail_field(err, SPL_E_INPUT, "shape", "%s: layer %s has the shape (height, width%s)", path,
+                              spl_layer_name(out->layer),
+                              channels == 4 ? ", 4"
+                              : channels    ? ", 3"
+                                            : "");
+    long start = ftell(file);
+    struct stat status;
+    uint64_t limit = SPL_IMAGE_PIXELS_MAX, pixel_bytes = spl_pixel_bytes(out->type);
+    if (start < 0 || fstat(fileno(file), &status))
+        return spl_fail_errno(err, errno, "%s: cannot be read", path);
+    /* sizes beyond the limit are the next call's to name; below it nothing overflows */
+    if (shape[0] <= limit && shape[1] <= limit && shape[0] * shape[1] <= limit &&
+        (uint64_t)status.st_size != (uint64_t)start + shape[0] * shape[1] * pixel_bytes)
+        return spl_fail_field(err, SPL_E_INPUT, "shape",
+                              "%s: %llu bytes behind the header, %llu x %llu pixels need %llu", path,
+                              (unsigned long long)(status.st_size - start), (unsigned long long)shape[1],
+                              (unsigned long long)shape[0], (unsigned long long)(shape[0] * shape[1] * pixel_bytes));
+    if ((rc = spl_decode_begin(path, shape[1], shape[0], out, err)))
+        return rc;
+    size_t pixels = (size_t)out->width * out->height;
+    if (fread(out->pixels, pixel_bytes, pixels, file) != pixels)
+        return ferror(file) ? spl_fail_errno(err, errno, "%s: cannot be read", path)
+                            : spl_fail(err, SPL_E_INPUT, "%s: became shorter while it was read", path);
+    return SPL_OK;
+}
