@@ -155,10 +155,12 @@ static void leaf(const struct spl_material *m, const struct spl_primitive *p, do
     mix(color, m->colors[2], 0.6 * (1 - smooth(0.08, 0.2, rib)) + 0.2 * side);
 }
 
-void spl_material_color(const struct spl_material *m, const struct spl_primitive *p, const double position[3],
-                        uint8_t out[3])
+void spl_material_shade(const struct spl_material *m, const struct spl_primitive *p, const double position[3],
+                        double color[3])
 {
-    double color[3] = {m->colors[0][0], m->colors[0][1], m->colors[0][2]}, from[3];
+    double from[3];
+    for (int i = 0; i < 3; i++)
+        color[i] = m->colors[0][i];
     sub3(position, p->center, from);
     double u = dot3(from, p->u), v = dot3(from, p->v);
     if (p->kind == SPL_PRIMITIVE_CONE) { /* unrolled */
@@ -190,5 +192,14 @@ void spl_material_color(const struct spl_material *m, const struct spl_primitive
         break;
     }
     for (int i = 0; i < 3; i++)
-        out[i] = (uint8_t)(color[i] <= 0 ? 0 : color[i] >= 255 ? 255 : color[i] + 0.5);
+        color[i] = color[i] <= 0 ? 0 : color[i] >= 255 ? 255 : color[i];
+}
+
+void spl_material_color(const struct spl_material *material, const struct spl_primitive *primitive,
+                        const double position[3], uint8_t color[3])
+{
+    double exact[3];
+    spl_material_shade(material, primitive, position, exact);
+    for (int i = 0; i < 3; i++)
+        color[i] = (uint8_t)(exact[i] + 0.5);
 }
