@@ -10,17 +10,22 @@
 
 struct spl_synth_options {
     const char *scene;        /* a name of spl_synth_scene_name() */
-    const char *directory;    /* created when missing; SCENE.ptx and SCENE.ply are written there, temp file + rename */
-    uint64_t points;          /* wanted returns over all stations, 10^3 .. 10^10; what comes is within 2 % */
+    const char *directory;    /* created when missing; SCENE.FORMAT is written there, temp file + rename */
+    uint64_t points;          /* wanted returns over all passes, 10^3 .. 10^10; what comes is within 2 % */
     uint64_t seed;
     double noise;             /* range noise sigma, metres; negative = the scene's default */
-    const char *formats;      /* comma-separated "ptx,ply"; NULL = both */
+    double mixed;             /* 0..1: share of the pulses on an edge whose range lies between both surfaces */
+    double dropout;           /* 0..0.9: share of returns lost; more where it is dark, grazing or far */
+    double misregister;       /* 0..10 metres by which each station's, head's or flight line's pose is off */
+    const char *formats;      /* of "ptx,ply,las"; NULL = ptx,ply of scenes scanned from tripods, ply,las of others */
     unsigned threads;         /* 0 = all cores; the files do not depend on it */
     void (*progress)(void *context, const struct spl_progress *progress);
     void *progress_context;
+    void (*file)(void *context, const char *path); /* each file as it is complete; may be NULL */
+    void *file_context;
 };
 
-/* Deterministic by scene, points, seed and noise; streams, so memory does not grow with points. */
+/* Deterministic by scene, points, seed, noise and faults; streams, so memory does not grow with points. */
 int spl_synth(const struct spl_synth_options *options, uint64_t *points_written, struct spl_error *err);
 
 /* The i-th scene's name and one-line description, NULL past the end. */

@@ -14,29 +14,39 @@
 
 static void usage(FILE *out)
 {
-    fprintf(out,
-            "usage: splatd synth SCENE [--points N] [--seed S] [--noise SIGMA] [--format LIST] [--threads N] -o DIR\n"
-            "       splatd synth SCENE --print-views [--size WxH]\n"
-            "       splatd synth --list\n\n"
-            "Scans an analytic scene from its stations and writes DIR/SCENE.ptx (structured, one pose a station) and\n"
-            "DIR/SCENE.ply (all stations, world coordinates). Equal arguments give equal files on any number of\n"
-            "threads.\n\n"
-            "A scan to play with, packed:\n"
-            "  splatd synth courtyard -o scan && splatd pack scan/courtyard.ptx -o courtyard.spld\n"
-            "Five million points, another noise pattern, PTX only:\n"
-            "  splatd synth courtyard --points 5e6 --seed 7 --format ptx -o scan\n"
-            "Points exactly on the surfaces, for comparing against the truth:\n"
-            "  splatd synth courtyard --noise 0 --format ply -o scan\n\n"
-            "  -n, --points N      returns over all stations, within 2 %% (1000 to 1e10; default 1e6)\n"
-            "  -s, --seed S        of the range noise (default 1)\n"
-            "      --noise SIGMA   range noise, metres (default: the scene's)\n"
-            "      --format LIST   ptx, ply or ptx,ply (default)\n"
-            "      --threads N     default: all cores\n"
-            "  -o, --output DIR    made when missing\n"
-            "      --print-views   the scene's sample cameras as JSON, for bench and render\n"
-            "      --size WxH      of those, pixels (default 1280x720)\n"
-            "      --list          the scenes, a line each\n\n"
-            "The files' paths go to stdout, messages to stderr.\n");
+    fprintf(
+        out,
+        "usage: splatd synth SCENE [--points N] [--seed S] [--noise SIGMA] [--mixed SHARE] [--dropout SHARE]\n"
+        "                    [--misregister METRES] [--format LIST] [--threads N] -o DIR\n"
+        "       splatd synth SCENE --print-views [--size WxH]\n"
+        "       splatd synth --list\n\n"
+        "Scans an analytic scene: from tripods (DIR/SCENE.ptx, structured, one pose a station), from a vehicle or "
+        "from\n"
+        "the air (DIR/SCENE.las); and DIR/SCENE.ply, all passes, world coordinates. Equal arguments give equal files "
+        "on\n"
+        "any number of threads.\n\n"
+        "A scan to play with, packed:\n"
+        "  splatd synth courtyard -o scan && splatd pack scan/courtyard.ptx -o courtyard.spld\n"
+        "Five million points, another noise pattern, PTX only:\n"
+        "  splatd synth courtyard --points 5e6 --seed 7 --format ptx -o scan\n"
+        "Points exactly on the surfaces, for comparing against the truth:\n"
+        "  splatd synth courtyard --noise 0 --format ply -o scan\n"
+        "A bad scan: ghosts at edges, holes, stations that are 2 cm off:\n"
+        "  splatd synth courtyard --mixed 0.5 --dropout 0.05 --misregister 0.02 -o scan\n\n"
+        "  -n, --points N      returns over all passes, within 2 %% (1000 to 1e10; default 1e6)\n"
+        "  -s, --seed S        of the noise and the faults (default 1)\n"
+        "      --noise SIGMA   range noise, metres (default: the scene's)\n"
+        "      --mixed SHARE   of the pulses on an edge, 0 to 1, whose point lies between both surfaces (default 0)\n"
+        "      --dropout SHARE of the returns that are lost, 0 to 0.9; more where it is dark, grazing, far (default "
+        "0)\n"
+        "      --misregister M metres, 0 to 10, by which each station or pass is off its place (default 0)\n"
+        "      --format LIST   of ptx,ply,las (default: ptx,ply from tripods, ply,las from what moves)\n"
+        "      --threads N     default: all cores\n"
+        "  -o, --output DIR    made when missing\n"
+        "      --print-views   the scene's sample cameras as JSON, for bench and render\n"
+        "      --size WxH      of those, pixels (default 1280x720)\n"
+        "      --list          the scenes, a line each\n\n"
+        "The files' paths go to stdout, messages to stderr.\n");
 }
 
 /* A whole number as "5000000" or "5e6"; its range is the library's. */
@@ -51,12 +61,10 @@ static int parse_points(const char *text, uint64_t *points, struct spl_error *er
     return result;
 }
 
-static void print_paths(const struct spl_synth_options *o)
+static void print_path(void *context, const char *path)
 {
-    static const char *const formats[] = {"ptx", "ply"};
-    for (size_t i = 0; i < 2; i++)
-        if (!o->formats || strstr(o->formats, formats[i]))
-            printf("%s/%s.%s\n", o->directory, o->scene, formats[i]);
+    (void)context;
+    puts(path);
 }
 
 static int print_views(const char *scene, const uint32_t size[2])
@@ -72,11 +80,24 @@ static int print_views(const char *scene, const uint32_t size[2])
 
 int spl_cmd_synth(int argc, char **argv)
 {
-    enum { opt_noise = 256, opt_format, opt_threads, opt_list, opt_print_views, opt_size };
+    enum {
+        opt_noise = 256,
+        opt_format,
+        opt_threads,
+        opt_list,
+        opt_print_views,
+        opt_size,
+        opt_mixed,
+        opt_dropout,
+        opt_misregister
+    };
     static const struct option options[] = {
         {"points", required_argument, NULL, 'n'},
         {"seed", required_argument, NULL, 's'},
         {"noise", required_argument, NULL, opt_noise},
+        {"mixed", required_argument, NULL, opt_mixed},
+        {"dropout", required_argument, NULL, opt_dropout},
+        {"misregister", required_argument, NULL, opt_misregister},
         {"format", required_argument, NULL, opt_format},
         {"threads", required_argument, NULL, opt_threads},
         {"output", required_argument, NULL, 'o'},
@@ -87,8 +108,12 @@ int spl_cmd_synth(int argc, char **argv)
         {0},
     };
     struct spl_cmd_progress progress = {0};
-    struct spl_synth_options o = {
-        .points = 1000000, .seed = 1, .noise = -1, .progress = spl_cmd_progress, .progress_context = &progress};
+    struct spl_synth_options o = {.points = 1000000,
+                                  .seed = 1,
+                                  .noise = -1,
+                                  .progress = spl_cmd_progress,
+                                  .progress_context = &progress,
+                                  .file = print_path};
     uint64_t threads = 0, written = 0;
     uint32_t size[2] = {1280, 720};
     bool want_views = false;
@@ -104,6 +129,15 @@ int spl_cmd_synth(int argc, char **argv)
             break;
         case opt_noise:
             result = spl_cmd_parse_real("--noise", optarg, 0, 1, &o.noise, &err);
+            break;
+        case opt_mixed:
+            result = spl_cmd_parse_real("--mixed", optarg, 0, 1, &o.mixed, &err);
+            break;
+        case opt_dropout:
+            result = spl_cmd_parse_real("--dropout", optarg, 0, 0.9, &o.dropout, &err);
+            break;
+        case opt_misregister:
+            result = spl_cmd_parse_real("--misregister", optarg, 0, 10, &o.misregister, &err);
             break;
         case opt_format:
             o.formats = optarg;
@@ -150,6 +184,5 @@ int spl_cmd_synth(int argc, char **argv)
     spl_cmd_progress_finish(&progress);
     if (result)
         return spl_cmd_fail(&err);
-    print_paths(&o);
     return 0;
 }

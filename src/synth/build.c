@@ -2,6 +2,7 @@
 #include "synth/build.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "synth/random.h"
@@ -29,6 +30,23 @@ void spl_build_station(struct spl_scene *scene, const double position[3], double
         .position = {position[0], position[1], position[2]},
         .rotation = {cy, -sy * ct, sy * st, sy, cy * ct, -cy * st, 0, st, ct},
     };
+}
+
+void spl_build_track(struct spl_scene *scene, const double (*points)[3], size_t count)
+{
+    scene->track = spl_alloc(count, sizeof *scene->track, &scene->error);
+    if (!scene->track)
+        return;
+    scene->track_count = count;
+    for (size_t i = 0; i < count; i++) {
+        struct spl_track_point *p = &scene->track[i];
+        double step[3];
+        memcpy(p->position, points[i], sizeof p->position);
+        sub3(points[i + 1 < count ? i + 1 : i], points[i > 0 ? i - 1 : 0], p->heading);
+        normalise3(p->heading);
+        sub3(points[i], points[i > 0 ? i - 1 : 0], step);
+        p->at = i ? p[-1].at + sqrt(dot3(step, step)) : 0;
+    }
 }
 
 static void add(struct spl_scene *scene, const struct spl_primitive *primitive)

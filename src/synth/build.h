@@ -13,6 +13,9 @@ uint32_t spl_build_object(struct spl_scene *scene, const char *name);
 /* A scanner at `position`, turned by `yaw` around z after tilting by `tilt` around its x axis; degrees. */
 void spl_build_station(struct spl_scene *scene, const double position[3], double yaw, double tilt);
 
+/* The trajectory of a mobile scanner: at least two points, none above the one before it. */
+void spl_build_track(struct spl_scene *scene, const double (*points)[3], size_t count);
+
 /* `u` and `v` are unit and orthogonal; `offset` (may be NULL) is the texture coordinate of the centre. */
 void spl_build_rectangle(struct spl_scene *scene, struct spl_skin skin, const double center[3], const double u[3],
                          const double v[3], const double half[2], const double offset[2]);

@@ -6,7 +6,6 @@
 #include <stdint.h>
 
 #include "base/error.h"
-#include "synth/scanner.h"
 
 struct spl_output {
     char *path, *temporary;      /* NULL while there is none */
@@ -23,18 +22,5 @@ int spl_output_write_at(struct spl_output *out, const void *bytes, size_t count,
 int spl_output_commit(struct spl_output *out, struct spl_error *err);
 /* Removes the temporary file unless it was committed. */
 void spl_output_finish(struct spl_output *out);
-
-enum { SPL_PTX_HEADER_MAX = 1024, SPL_PTX_CELL_MAX = 64, SPL_PLY_HEADER_BYTES = 384, SPL_PLY_POINT_BYTES = 15 };
-
-/* The writers below return the number of bytes they put at `to`. */
-
-/* The header of one station, NUL-terminated. */
-size_t spl_ptx_header(char to[SPL_PTX_HEADER_MAX], const struct spl_scan_grid *grid, const struct spl_station *station);
-/* One line, at most SPL_PTX_CELL_MAX bytes. */
-size_t spl_ptx_cell(char *to, const struct spl_return *r);
-
-/* The same length for any count, so that it can be written again when the count is known. */
-void spl_ply_header(char to[SPL_PLY_HEADER_BYTES], uint64_t count, const char *scene, uint64_t seed, double sigma);
-size_t spl_ply_point(char *to, const struct spl_return *r);
 
 #endif

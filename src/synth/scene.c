@@ -72,6 +72,7 @@ void spl_scene_destroy(struct spl_scene *scene)
     free(scene->nodes);
     free(scene->objects);
     free(scene->stations);
+    free(scene->track);
     free(scene);
 }
 

@@ -38,12 +38,15 @@ struct spl_scanner {
     double divergence;            /* the beam's full angle, radians */
     double range;                 /* metres, at which a dropout share is as asked for */
     unsigned returns;             /* of one pulse, at most, 1 .. SPL_SCANNER_RETURNS_MAX */
-    const double (*track)[3];     /* mobile: the trajectory, static */
-    size_t track_count;
     double length;                /* airborne, sweep */
     double half_angle;            /* airborne, degrees */
     bool zigzag;                  /* airborne: every other line runs back, else all run the same way */
     double width, growth;         /* sweep */
+};
+
+struct spl_track_point {
+    double position[3], heading[3]; /* heading: unit, between its neighbours' directions */
+    double at;                      /* metres from the start */
 };
 
 /* Where somebody would stand, or hover, and look; scene coordinates, z up. */
@@ -64,6 +67,8 @@ struct spl_scene {
     struct spl_scanner scanner;
     struct spl_station *stations; /* what they are is the scanner's kind */
     size_t station_count;
+    struct spl_track_point *track; /* mobile: the trajectory, a polyline */
+    size_t track_count;
     double offset[3];             /* world = scene + offset; whole metres */
     const struct spl_named_camera *cameras; /* static */
     size_t camera_count;

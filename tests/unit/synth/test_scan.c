@@ -294,7 +294,14 @@ static void bad_arguments_are_named_and_leave_nothing(void **state)
     REFUSED(noise, -INFINITY, SPL_E_USAGE, "noise", "inf");
     REFUSED(formats, "", SPL_E_USAGE, "format", "ptx, ply");
     REFUSED(formats, "ptx,", SPL_E_USAGE, "format", "ptx, ply");
-    REFUSED(formats, "ply,las", SPL_E_USAGE, "format", "'las'");
+    REFUSED(formats, "ply,laz", SPL_E_USAGE, "format", "'laz'");
+    REFUSED(formats, "pl", SPL_E_USAGE, "format", "'pl'");
+    REFUSED(mixed, 1.01, SPL_E_USAGE, "mixed", "1.01");
+    REFUSED(mixed, NAN, SPL_E_USAGE, "mixed", "0 to 1");
+    REFUSED(dropout, 0.95, SPL_E_USAGE, "dropout", "0 to 0.9");
+    REFUSED(dropout, -0.1, SPL_E_USAGE, "dropout", "-0.1");
+    REFUSED(misregister, 11, SPL_E_USAGE, "misregister", "11 m");
+    REFUSED(misregister, NAN, SPL_E_USAGE, "misregister", "0 to 10");
     REFUSED(directory, "", SPL_E_USAGE, "directory", "directory");
     REFUSED(directory, NULL, SPL_E_USAGE, "directory", "directory");
     REFUSED(directory, "/proc/no/where", SPL_E_IO, "", "/proc/no");
@@ -398,6 +405,11 @@ static void the_command_line_names_what_is_wrong(void **state)
         {"courtyard -o x --seed 1.5", "--seed"},
         {"courtyard -o x --noise nan", "--noise"},
         {"courtyard -o x --noise -1", "--noise"},
+        {"courtyard -o x --mixed 2", "--mixed"},
+        {"courtyard -o x --dropout 1", "--dropout"},
+        {"courtyard -o x --misregister -1", "--misregister"},
+        {"courtyard --print-views --size 0x5", "--size"},
+        {"nowhere --print-views", "courtyard"},
         {"courtyard -o x --threads 0", "--threads"},
         {"courtyard -o x --format e57", "e57"},
         {"courtyard --output", "--help"},
