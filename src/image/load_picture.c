@@ -85,7 +85,7 @@ int spl_decode_png(FILE *file, const char *path, struct spl_image *out, struct s
 static int decompress(tjhandle handle, const uint8_t *bytes, size_t length, const char *path, struct spl_image *out,
                       struct spl_error *err)
 {
-    int width, height, sampling, colorspace;
+    int width = 0, height = 0, sampling, colorspace;
     if (tjDecompressHeader3(handle, bytes, length, &width, &height, &sampling, &colorspace))
         return spl_fail(err, SPL_E_INPUT, "%s: JPEG: %s", path, tjGetErrorStr2(handle));
     int rc = spl_decode_begin(path, (uint64_t)width, (uint64_t)height, out, err);
