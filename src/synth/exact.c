@@ -3,10 +3,10 @@
  * every other grid of as many rectangles, so edges of any direction converge fast. A pixel has enough when its four
  * quarters, which are such sequences themselves, agree; their spread is some four times the error of the whole.
  *
- * Sixteen places that agree may all have missed a wire. So pixels that are done after sixteen while a neighbour shows
- * another surface or several are sampled again, from sixty-four on, in a second pass. Both passes write a pixel from
- * what belongs to that pixel or from the finished first pass, hence the bytes are the same for any number of threads.
- */
+ * Sixteen places that agree may do so by chance, or all have missed a wire. So a pixel that shows several surfaces
+ * takes sixty-four at least; and so does, in a second pass, one whose neighbours show several or another one. Both
+ * passes write a pixel from what belongs to that pixel or from the finished first pass, hence the bytes are the same
+ * for any number of threads. */
 #include "synth/exact.h"
 
 #include <math.h>
@@ -23,7 +23,7 @@
 
 enum {
     base_samples = 16, /* a pixel without edges gets these */
-    neighbour_samples = 64,
+    edge_samples = 64, /* one in or beside which surfaces meet, at least these */
     rows_at_once = 4,
 };
 static const uint64_t pixels_max = (uint64_t)1 << 26;
@@ -140,6 +140,7 @@ static void begin_pixel(struct pixel *p, const struct picture *picture, uint32_t
     p->y = y;
     p->shift[0] = (uint32_t)hash;
     p->shift[1] = (uint32_t)(hash >> 32);
+    p->surface = nothing;
     p->mixed = false;
     spl_lens_corners(picture->lens, x, y, corners);
     spl_beam_init(&p->beam, picture->scene, picture->lens->origin, picture->lens->nearest, corners);
@@ -158,7 +159,7 @@ static void integrate(struct pixel *p, uint32_t least, size_t at)
         for (uint32_t i = 0; i < 4; i++)
             parts[i] = sample(p, i * count / 4, (i + 1) * count / 4);
         total = total_of(parts);
-        while (count < picture->samples && (count < least || !agree(parts, &total))) {
+        while (count < picture->samples && (count < (p->mixed ? edge_samples : least) || !agree(parts, &total))) {
             parts[0] = total;
             for (uint32_t i = 1; i < 4; i++)
                 parts[i] = sample(p, i * count, (i + 1) * count);
@@ -179,7 +180,6 @@ static void probe(struct pixel *p, size_t at)
     const struct picture *picture = p->picture;
     const struct spl_primitive *primitives = picture->scene->primitives;
     double direction[3], position[3], normal[3] = {0}, t;
-    p->surface = nothing;
     bool hit = cast(p, p->x + 0.5, p->y + 0.5, direction, &t, &p->surface);
     if (hit) {
         mad3(p->beam.origin, t, direction, position);
@@ -232,7 +232,7 @@ static void second_pass(void *context, size_t begin, size_t end, unsigned worker
             if (picture->mixed[at] || !beside_an_edge(picture, x, (uint32_t)y))
                 continue;
             begin_pixel(&p, picture, x, (uint32_t)y);
-            integrate(&p, neighbour_samples, at);
+            integrate(&p, edge_samples, at);
         }
 }
 
