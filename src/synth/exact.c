@@ -3,10 +3,10 @@
  * every other grid of as many rectangles, so edges of any direction converge fast. A pixel has enough when its four
  * quarters, which are such sequences themselves, agree; their spread is some four times the error of the whole.
  *
- * Sixteen places that agree may do so by chance, or all have missed a wire. So a pixel that shows several surfaces
- * takes sixty-four at least; and so does, in a second pass, one whose neighbours show several or another one. Both
- * passes write a pixel from what belongs to that pixel or from the finished first pass, hence the bytes are the same
- * for any number of threads. */
+ * Quarters of few places may agree by chance, or all have missed a wire. So a pixel that shows several surfaces takes
+ * 256 places at least, and one whose neighbours show several or another one takes 64, in a second pass. Both passes
+ * write a pixel from what belongs to that pixel or from the finished first pass, hence the bytes are the same for any
+ * number of threads. */
 #include "synth/exact.h"
 
 #include <math.h>
@@ -22,8 +22,9 @@
 #include "synth/vector.h"
 
 enum {
-    base_samples = 16, /* a pixel without edges gets these */
-    edge_samples = 64, /* one in or beside which surfaces meet, at least these */
+    base_samples = 16,   /* a pixel without edges gets these */
+    beside_samples = 64, /* one beside an edge, at least these */
+    edge_samples = 256,  /* one in which surfaces meet */
     rows_at_once = 4,
 };
 static const uint64_t pixels_max = (uint64_t)1 << 26;
@@ -232,7 +233,7 @@ static void second_pass(void *context, size_t begin, size_t end, unsigned worker
             if (picture->mixed[at] || !beside_an_edge(picture, x, (uint32_t)y))
                 continue;
             begin_pixel(&p, picture, x, (uint32_t)y);
-            integrate(&p, edge_samples, at);
+            integrate(&p, beside_samples, at);
         }
 }
 
