@@ -60,8 +60,8 @@ void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, dou
     }
     double determinant = uu * vv - uv * uv;
     if (determinant <= 1e-9 * uu * vv) { // one size only
-        *fixed_ms = 0.5 * su / uu;
-        *ms_per_mpx = 0.5 * sv / vv;
+        *fixed_ms = 0.25 * su / uu;
+        *ms_per_mpx = 0.75 * sv / vv;
         return;
     }
     *fixed_ms = (su * vv - sv * uv) / determinant;

@@ -61,7 +61,7 @@ int spl_profile_init(struct spl_profile *profile, const struct spl_dataset_info 
 void spl_profile_finish(struct spl_profile *profile);
 
 /* The line through a setting's median times at one or more sizes, for fixed_ms and ms_per_mpx: least squares in relative
- * error, neither term negative. With one size half of the time is taken as fixed; the planner corrects it as other sizes
+ * error, neither term negative. With one size a quarter of the time is taken as fixed; the planner corrects it as other sizes
  * are asked for. count >= 1, mpx and ms > 0. */
 void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, double *fixed_ms, double *ms_per_mpx);
 

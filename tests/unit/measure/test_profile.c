@@ -288,8 +288,8 @@ static void test_time_fit(void **state)
     assert_true(fabs(fixed - 10) < 1e-9);
     assert_true(fabs(slope - 10) < 1e-9);
     spl_profile_fit_time((double[]){2}, (double[]){40}, 1, &fixed, &slope);
-    assert_true(fabs(fixed - 20) < 1e-9);
-    assert_true(fabs(slope - 10) < 1e-9);
+    assert_true(fabs(fixed - 10) < 1e-9);
+    assert_true(fabs(slope - 15) < 1e-9);
     spl_profile_fit_time((double[]){1, 4}, (double[]){10, 9}, 2, &fixed, &slope); // larger and faster: noise
     assert_true(slope == 0 && fixed > 9 && fixed < 10);
     spl_profile_fit_time((double[]){1, 4}, (double[]){10, 50}, 2, &fixed, &slope); // steeper than proportional

@@ -1,0 +1,207 @@
+/* The planner: estimate, choice, learning; see planner.h for the model.
+ *
+ * Learning is a stochastic gradient on the residual r = ln(measured / estimate): each term takes a share of r. The
+ * first frames take large shares, because a profile may come from a machine of another speed; later r is clipped to a
+ * few spreads before it is used, so that one stalled frame cannot move what hundreds have taught. A setting's own term
+ * fades as other settings are drawn, or one that was slow once would never be tried again. The spread takes a large
+ * step up when a frame exceeds it and a small one down when it does not (Robbins and Monro), which settles where 3 %
+ * exceed it, whatever the distribution. Pure but for allocation. */
+#include "measure/planner.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+static const double tolerance = 1.2; /* of a budget, for nearly all frames */
+static const double spread_quantile = 0.95, spread_step = 0.05;
+static const double spread_least = 0.02, spread_most = 1.5;
+static const double shared_gain = 0.1, setting_gain = 0.1, layer_gain = 0.1, fade = 0.99;
+static const double learned_most = 6.9; /* ln 1000 */
+enum { first_frames = 6 };
+static const double first_gain = 0.5;
+
+/* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order. */
+static const struct spl_candidate common[] = {
+    {{SPL_METHOD_POINTS, 4, 1}, 6, 10, 15, NAN, 0},   {{SPL_METHOD_POINTS, 2, 1}, 6, 20, 18, NAN, 0},
+    {{SPL_METHOD_SPLAT, 8, 0.25}, 4, 12, 19, NAN, 0}, {{SPL_METHOD_SPLAT, 4, 0.25}, 5, 16, 20, NAN, 0},
+    {{SPL_METHOD_SPLAT, 4, 0.5}, 8, 35, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5}, 8, 50, 24, NAN, 0},
+    {{SPL_METHOD_SPLAT, 4, 1}, 8, 135, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1}, 8, 180, 28, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 1}, 10, 250, 30, NAN, 0},  {{SPL_METHOD_SPLAT, 1, 2}, 20, 900, 32, NAN, 0},
+};
+enum { common_count = sizeof common / sizeof *common };
+
+/* One-sided 95 % point of Student's t, by Cornish and Fisher's expansion: within 1 % from 4 degrees of freedom on. */
+static double student(double freedom)
+{
+    return 1.6449 + 1.5238 / freedom + 1.4203 / (freedom * freedom);
+}
+
+double spl_profile_psnr_bound(const struct spl_profile *profile, const struct spl_profile_point *point)
+{
+    double n = profile->views;
+    if (n < 2 || isnan(point->psnr_sd))
+        return isnan(point->psnr_q05) ? point->psnr : point->psnr_q05;
+    return point->psnr - student(n - 1) * point->psnr_sd * sqrt(1 + 1 / n);
+}
+
+int spl_planner_init(struct spl_planner *planner, const struct spl_profile *profile,
+                     bool (*usable)(const struct spl_setting *setting), struct spl_error *err)
+{
+    size_t capacity = profile && profile->count > common_count ? profile->count : common_count;
+    double tail = 0;
+    *planner = (struct spl_planner){0};
+    if (!(planner->candidates = spl_alloc(capacity, sizeof *planner->candidates, err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; profile && i < profile->count; i++) {
+        const struct spl_profile_point *p = &profile->points[i];
+        if (usable && !usable(&p->setting))
+            continue;
+        planner->candidates[planner->count++] = (struct spl_candidate){.setting = p->setting,
+                                                                       .fixed_ms = p->fixed_ms,
+                                                                       .ms_per_mpx = p->ms_per_mpx,
+                                                                       .psnr = p->psnr,
+                                                                       .bound = spl_profile_psnr_bound(profile, p)};
+        tail += log(p->ms_q90 / p->ms);
+    }
+    /* From the 90 % quantile of a normal distribution to its 95 %: 1.645 / 1.28. */
+    planner->spread = planner->count ? fmin(fmax(1.285 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
+    if (!planner->count)
+        for (size_t i = 0; i < common_count; i++)
+            if (!usable || usable(&common[i].setting))
+                planner->candidates[planner->count++] = common[i];
+    return 0;
+}
+
+void spl_planner_finish(struct spl_planner *planner)
+{
+    free(planner->candidates);
+    *planner = (struct spl_planner){0};
+}
+
+double spl_planner_estimate(const struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
+                            enum spl_layer layer)
+{
+    const struct spl_candidate *c = &planner->candidates[index];
+    double mpx = 1e-6 * width * height;
+    return (c->fixed_ms + c->ms_per_mpx * mpx) * exp(planner->shared + c->learned + planner->layer[layer]);
+}
+
+static bool matches(const struct spl_setting *setting, const struct spl_demand *demand)
+{
+    return (!demand->keep_method || setting->method == demand->kept.method) &&
+           (!demand->keep_lod || setting->lod == demand->kept.lod) &&
+           (!demand->keep_supersample || setting->supersample == demand->kept.supersample);
+}
+
+static double rank(double psnr)
+{
+    return isnan(psnr) ? -INFINITY : psnr;
+}
+
+/* How one candidate stands to the demand. */
+struct standing {
+    double ms, tail_ms;
+    bool in_time, accurate;
+};
+
+static struct standing assess(const struct spl_planner *planner, size_t index, const struct spl_demand *demand)
+{
+    const struct spl_candidate *c = &planner->candidates[index];
+    struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(c->bound) >= demand->psnr};
+    s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
+    s.tail_ms = s.ms * exp(planner->spread);
+    if (!isnan(demand->budget_ms))
+        s.in_time = s.ms + demand->extra_ms <= demand->budget_ms &&
+                    s.tail_ms + demand->extra_ms <= tolerance * demand->budget_ms;
+    return s;
+}
+
+/* Is candidate a (standing x) to be preferred to b (standing y)? */
+static bool better(const struct spl_demand *demand, const struct spl_candidate *a, const struct standing *x,
+                   const struct spl_candidate *b, const struct standing *y)
+{
+    bool timed = !isnan(demand->budget_ms);
+    if (timed && x->in_time != y->in_time)
+        return x->in_time;
+    if (timed && !x->in_time) // neither: the fastest
+        return x->ms < y->ms;
+    if (x->accurate != y->accurate)
+        return x->accurate;
+    if (!isnan(demand->psnr) && x->accurate) // both: the cheaper
+        return x->ms < y->ms;
+    double gain = isnan(demand->psnr) ? rank(a->psnr) - rank(b->psnr) : rank(a->bound) - rank(b->bound);
+    if (isnan(gain) || gain == 0) // two of unknown accuracy, or two equals
+        gain = rank(a->psnr) - rank(b->psnr);
+    return isnan(gain) || gain == 0 ? x->ms < y->ms : gain > 0;
+}
+
+static int refuse(const struct spl_demand *demand, struct spl_error *err)
+{
+    const char *field = demand->keep_lod ? "lod" : demand->keep_supersample ? "supersample" : "method";
+    return spl_fail_field(err, SPL_E_INPUT, field,
+                          "no measured setting has the %s asked for; leave it out, or ask without budget and psnr",
+                          field);
+}
+
+int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
+                       struct spl_error *err)
+{
+    struct standing best = {0};
+    const struct spl_candidate *chosen = NULL;
+    for (size_t i = 0; i < planner->count; i++) {
+        const struct spl_candidate *c = &planner->candidates[i];
+        if (!matches(&c->setting, demand))
+            continue;
+        struct standing s = assess(planner, i, demand);
+        if (chosen && !better(demand, c, &s, chosen, &best))
+            continue;
+        chosen = c;
+        best = s;
+    }
+    if (!chosen)
+        return refuse(demand, err);
+    *choice = (struct spl_choice){.setting = chosen->setting,
+                                  .index = (size_t)(chosen - planner->candidates),
+                                  .ms = best.ms,
+                                  .psnr = chosen->bound,
+                                  .meets = best.in_time && best.accurate};
+    return 0;
+}
+
+ptrdiff_t spl_planner_find(const struct spl_planner *planner, const struct spl_setting *setting)
+{
+    for (size_t i = 0; i < planner->count; i++) {
+        const struct spl_setting *s = &planner->candidates[i].setting;
+        if (s->method == setting->method && s->lod == setting->lod && s->supersample == setting->supersample)
+            return (ptrdiff_t)i;
+    }
+    return -1;
+}
+
+static double clamp(double x, double most)
+{
+    return fmin(fmax(x, -most), most);
+}
+
+void spl_planner_learn(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height, enum spl_layer layer,
+                       double ms)
+{
+    spl_assert(index < planner->count);
+    if (!(ms > 0) || !isfinite(ms))
+        return;
+    double residual = log(ms / spl_planner_estimate(planner, index, width, height, layer));
+    bool first = planner->frames++ < first_frames;
+    if (!first) {
+        planner->spread += spread_step * (residual > planner->spread ? spread_quantile : spread_quantile - 1);
+        planner->spread = fmin(fmax(planner->spread, spread_least), spread_most);
+        residual = clamp(residual, 2 * planner->spread + 0.1);
+    }
+    for (size_t i = 0; i < planner->count; i++)
+        planner->candidates[i].learned *= fade;
+    struct spl_candidate *c = &planner->candidates[index];
+    planner->shared = clamp(planner->shared + (first ? first_gain : shared_gain) * residual, learned_most);
+    c->learned = clamp(c->learned + setting_gain * residual, learned_most);
+    if (layer != SPL_LAYER_COLOR)
+        planner->layer[layer] = clamp(planner->layer[layer] + layer_gain * residual, learned_most);
+}

@@ -1,0 +1,74 @@
+/* Chooses a setting for a demand on time or accuracy, from what a profile promises and what frames then took.
+ *
+ * A setting's time is estimated as
+ *     ms = (fixed_ms + ms_per_mpx · megapixels) · exp(shared + setting + layer)
+ * where the three terms are learned from measured frames: how this machine is now, how this setting differs from its
+ * model, how a layer other than colour does. `spread` follows the 95 % quantile of what remains, ln(measured / estimate),
+ * so that the tail, not the mean, is held against the budget. No clock, no I/O; a planner belongs to one thread. */
+#ifndef SPL_MEASURE_PLANNER_H
+#define SPL_MEASURE_PLANNER_H
+
+#include "measure/profile.h"
+
+struct spl_demand {
+    double budget_ms;  /* > 0; NAN: any time */
+    double psnr;       /* dB; NAN: any accuracy */
+    double extra_ms;   /* >= 0: what the budget must hold beside the frame, the encoding */
+    uint32_t width, height;
+    enum spl_layer layer;
+    bool keep_method, keep_lod, keep_supersample; /* only settings that equal `kept` in these */
+    struct spl_setting kept;
+};
+
+struct spl_choice {
+    struct spl_setting setting;
+    size_t index;      /* of the planner's setting; for learn() */
+    double ms;         /* expected time of the frame, without extra_ms */
+    double psnr;       /* dB that 19 of 20 views reach, see spl_profile_psnr_bound(); NAN without a profile */
+    bool meets;        /* whether the demand can be met; else this is the best there is */
+};
+
+struct spl_planner {
+    struct spl_candidate {
+        struct spl_setting setting;
+        double fixed_ms, ms_per_mpx;
+        double psnr, bound; /* mean and lower bound, dB; the mean without a profile is a rank, the bound NAN */
+        double learned;     /* ln of this setting's own factor */
+    } *candidates;
+    size_t count;
+    double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
+    uint64_t frames;    /* learned from */
+};
+
+/* The PSNR that a further view reaches with 95 % probability: the one-sided prediction bound mean − t · sd · √(1 + 1/n) of n
+ * views whose PSNR is normally distributed. The 5 % quantile where the deviation is unknown; NAN where PSNR is. */
+double spl_profile_psnr_bound(const struct spl_profile *profile, const struct spl_profile_point *point);
+
+/* Takes what it needs from `profile`. NULL: a conservative table of common settings whose times are those of a slow
+ * machine; nothing is promised of their accuracy. Settings that `usable` (may be NULL) refuses are left out; when none
+ * is left the table is used. */
+int spl_planner_init(struct spl_planner *planner, const struct spl_profile *profile,
+                     bool (*usable)(const struct spl_setting *setting), struct spl_error *err);
+void spl_planner_finish(struct spl_planner *planner);
+
+/* budget alone: the most accurate setting whose 95 % quantile stays below 1.2 times the budget and whose expected time
+ * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
+ * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
+ * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
+ * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has. */
+int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
+                       struct spl_error *err);
+
+/* The estimate for one setting, as choose() makes it. */
+double spl_planner_estimate(const struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
+                            enum spl_layer layer);
+
+/* The index of `setting`, or -1: frames that nobody planned teach as well. */
+ptrdiff_t spl_planner_find(const struct spl_planner *planner, const struct spl_setting *setting);
+
+/* A frame of setting `index` took `ms`. Single outliers move little, a lasting change of speed is followed within about
+ * ten frames; learned factors stay within 1/1000 … 1000. Numbers that are not finite and positive are ignored. */
+void spl_planner_learn(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height, enum spl_layer layer,
+                       double ms);
+
+#endif
