@@ -1,53 +1,80 @@
-/* splatd bench: options in, spl_bench(), a table or JSON out. Progress goes to stderr, figures to stdout. */
-#include "cmd/cmd.h"
+/* splatd bench: options in; a table of frame times, or with -o a comparison with a reference. Progress goes to stderr,
+ * figures to stdout. */
+#include "cmd/bench.h"
 
 #include <getopt.h>
-#include <inttypes.h>
-#include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "cmd/cmd.h"
 #include "cmd/options.h"
-#include "measure/bench.h"
 
-enum { LIST_MAX = 16 };
+enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
 
 struct arguments {
     struct spl_dataset *datasets[LIST_MAX];
     const char *devices[LIST_MAX];
     enum spl_method methods[LIST_MAX];
-    double lods[LIST_MAX];
+    double lods[LIST_MAX], supersamples[LIST_MAX];
+    size_t supersample_count;
     struct spl_path path;
-    const char *views, *set;
-    bool json;
+    const char *views, *set, *output;
+    bool json, sized, listed[3]; /* listed: --method, --lod, --supersample were given */
+    uint32_t repeats;
     struct spl_bench_options bench;
+    struct spl_cmd_bench_sweep sweep;
 };
 
 static void help(void)
 {
-    puts("usage: splatd bench NAME.spld… [OPTION…]\n"
-         "\n"
-         "Measures frame times of datasets on this machine: each combination of dataset, device, method and level of\n"
-         "detail renders the same camera path, all in turn. Beside them runs a calibrator in plain C (5 M points, two\n"
-         "threads); 'units' are multiples of its time, which compare between machines and days, milliseconds do not.\n"
-         "\n"
-         "  --views FILE --set NAME   path from the view 'overview' to the view 'close' of entry NAME in a JSON file\n"
-         "                            {\"NAME\": {\"overview\": {\"eye\": [x, y, z], \"target\": […], \"up\": […],\n"
-         "                            \"vfov_deg\": 40, \"near\": 0.1, \"far\": 50}, \"close\": {…}}};\n"
-         "                            default: round the dataset's default view, closing in\n"
-         "  --frames N                places on the path (20)\n"
-         "  --size WxH                (1280x720)\n"
-         "  --device LIST             such as vulkan,egl (auto); 'splatd devices' lists them\n"
-         "  --method LIST             such as splat,points (splat)\n"
-         "  --lod LIST                pixels a splat, such as 1,2 (1)\n"
-         "  --memory-limit MB         device memory; less than the dataset needs measures paging\n"
-         "  --json                    everything, quartiles too, as one JSON object\n"
-         "\n"
-         "  splatd bench hall.spld\n"
-         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
-         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json");
+    puts(
+        "usage: splatd bench NAME.spld… [OPTION…]\n"
+        "\n"
+        "Measures frame times of datasets on this machine: each combination of dataset, device, method and level of\n"
+        "detail renders the same camera path, all in turn. Beside them runs a calibrator in plain C (5 M points, two\n"
+        "threads); 'units' are multiples of its time, which compare between machines and days, milliseconds do not.\n"
+        "\n"
+        "  --views FILE --set NAME   path from the view 'overview' to the view 'close' of entry NAME in a JSON file\n"
+        "                            {\"NAME\": {\"overview\": {\"eye\": [x, y, z], \"target\": […], \"up\": […],\n"
+        "                            \"vfov_deg\": 40, \"near\": 0.1, \"far\": 50}, \"close\": {…}}};\n"
+        "                            default: round the dataset's default view, closing in\n"
+        "  --frames N                places on the path (20)\n"
+        "  --size WxH                (1280x720)\n"
+        "  --device LIST             such as vulkan,egl (auto); 'splatd devices' lists them\n"
+        "  --method LIST             such as splat,points (splat)\n"
+        "  --lod LIST                pixels a splat, such as 1,2 (1)\n"
+        "  --memory-limit MB         device memory; less than the dataset needs measures paging\n"
+        "  --json                    everything, quartiles too, as one JSON object\n"
+        "\n"
+        "Accuracy against time, with -o: every view under every setting, compared with a reference and timed in turn.\n"
+        "OUT gets bench.json, bench.csv, chart.svg, index.html (open it in a browser) and state.jsonl, from which the\n"
+        "same command goes on when it was stopped. What each setting costs goes to NAME.profile.json, from which\n"
+        "'splatd serve' chooses.\n"
+        "  -o, --output OUT          the folder\n"
+        "  --views FILE|DIR          views as JSON, or a COLMAP text model; without it, or with --set, --frames places "
+        "(8)\n"
+        "                            on the path above\n"
+        "  --reference DIR           exact images VIEW.color.png, VIEW.depth.npy, VIEW.normal.npy, VIEW.coverage.npy, "
+        "as\n"
+        "                            'splatd synth SCENE --views' writes them\n"
+        "  --photographs             the views' photographs; without either: the dataset's own render with every "
+        "splat\n"
+        "                            and 4x4 samples a pixel\n"
+        "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3,4)\n"
+        "  --supersample LIST        samples a pixel side, of 1,2,4 (1,2)\n"
+        "  --repeats N               times each view and setting is timed (5)\n"
+        "  --peers FILE.csv          rows name,ms,psnr of other programs, for the same chart\n"
+        "  --profile FILE, --no-profile\n"
+        "  --restart                 forget what OUT/state.jsonl holds\n"
+        "\n"
+        "  splatd bench hall.spld\n"
+        "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
+        "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
+        "  splatd bench hall.spld -o hall-bench\n"
+        "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
+        "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench");
 }
 
 /* Splits `text` at commas, in place, and hands each piece to `take`. */
@@ -86,6 +113,58 @@ static int take_lod(struct arguments *a, const char *text, struct spl_error *err
     return spl_cmd_parse_real("--lod", text, 0, 1024, &a->lods[a->bench.lod_count++], err);
 }
 
+static int take_supersample(struct arguments *a, const char *text, struct spl_error *err)
+{
+    uint64_t side = 0;
+    int status = spl_cmd_parse_count("--supersample", text, 1, 4, &side, err);
+    if (!status && side == 3)
+        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 1, 2 or 4, not 3");
+    a->supersamples[a->supersample_count++] = (double)side;
+    return status;
+}
+
+/* Options that only mean something with -o. */
+static int take_sweep_option(struct arguments *a, int option, struct spl_error *err)
+{
+    uint64_t count = 0;
+    int status = 0;
+    switch (option) {
+    case 'o':
+        a->sweep.output = optarg;
+        break;
+    case 'r':
+        a->sweep.sweep.reference = (struct spl_reference){.kind = SPL_REFERENCE_EXACT, .folder = optarg};
+        break;
+    case 'p':
+        a->sweep.sweep.reference = (struct spl_reference){.kind = SPL_REFERENCE_PHOTOGRAPHS};
+        break;
+    case 'x':
+        a->supersample_count = 0;
+        a->listed[2] = true;
+        status = each("--supersample", optarg, take_supersample, a, err);
+        break;
+    case 'e':
+        status = spl_cmd_parse_count("--repeats", optarg, 1, SPL_SWEEP_REPEATS_MAX, &count, err);
+        a->sweep.sweep.repeats = (uint32_t)count;
+        break;
+    case 'P':
+        a->sweep.peers = optarg;
+        break;
+    case 'f':
+        a->sweep.profile = optarg;
+        break;
+    case 'F':
+        a->sweep.no_profile = true;
+        break;
+    case 'R':
+        a->sweep.sweep.restart = true;
+        break;
+    default:
+        status = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
+    }
+    return status;
+}
+
 static int take_option(struct arguments *a, int option, struct spl_error *err)
 {
     uint64_t count = 0;
@@ -105,6 +184,7 @@ static int take_option(struct arguments *a, int option, struct spl_error *err)
         a->bench.frames = (uint32_t)count;
         break;
     case 'z':
+        a->sized = true;
         status = spl_cmd_parse_size("--size", optarg, &a->bench.width, &a->bench.height, err);
         break;
     case 'b':
@@ -117,36 +197,99 @@ static int take_option(struct arguments *a, int option, struct spl_error *err)
         break;
     case 'm':
         a->bench.method_count = 0;
+        a->listed[0] = true;
         status = each("--method", optarg, take_method, a, err);
         break;
     case 'l':
         a->bench.lod_count = 0;
+        a->listed[1] = true;
         status = each("--lod", optarg, take_lod, a, err);
         break;
     default:
-        status = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
+        status = take_sweep_option(a, option, err);
     }
     return status;
+}
+
+/* With -o some defaults are others, and one dataset on one device is compared. */
+static int finish_sweep(struct arguments *a, struct spl_error *err)
+{
+    static const double lods[] = {0.5, 0.75, 1, 1.5, 2, 3, 4};
+    struct spl_cmd_bench_sweep *s = &a->sweep;
+    if (a->bench.device_count != 1)
+        return spl_fail(err, SPL_E_USAGE, "with -o one device is measured, not %zu", a->bench.device_count);
+    if (a->json)
+        return spl_fail(err, SPL_E_USAGE, "--json is for the table of frame times; with -o there is OUT/bench.json");
+    if (a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF && (!a->views || a->set))
+        return spl_fail(err, SPL_E_USAGE, "a reference is of views that have names: give them with --views");
+    if (!a->listed[0]) {
+        a->methods[1] = SPL_METHOD_POINTS;
+        a->bench.method_count = 2;
+    }
+    if (!a->listed[1]) {
+        memcpy(a->lods, lods, sizeof lods);
+        a->bench.lod_count = sizeof lods / sizeof *lods;
+    }
+    if (!a->listed[2]) {
+        a->supersamples[0] = 1;
+        a->supersamples[1] = 2;
+        a->supersample_count = 2;
+    }
+    s->views = a->set ? NULL : a->views;
+    s->path = a->bench.path;
+    s->places = a->bench.frames ? a->bench.frames : 8;
+    s->width = a->sized ? a->bench.width : 0;
+    s->height = a->sized ? a->bench.height : 0;
+    s->methods = a->methods;
+    s->method_count = a->bench.method_count;
+    s->lods = a->lods;
+    s->lod_count = a->bench.lod_count;
+    s->supersamples = a->supersamples;
+    s->supersample_count = a->supersample_count;
+    s->sweep.renderer = (struct spl_renderer_options){.device = a->devices[0], .memory_limit = a->bench.memory_limit};
+    return 0;
 }
 
 static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
     static const struct option options[] = {
-        {"views", required_argument, NULL, 'v'},  {"set", required_argument, NULL, 's'},
-        {"frames", required_argument, NULL, 'n'}, {"size", required_argument, NULL, 'z'},
-        {"device", required_argument, NULL, 'd'}, {"method", required_argument, NULL, 'm'},
-        {"lod", required_argument, NULL, 'l'},    {"memory-limit", required_argument, NULL, 'b'},
-        {"json", no_argument, NULL, 'j'},         {NULL, 0, NULL, 0},
+        {"views", required_argument, NULL, 'v'},
+        {"set", required_argument, NULL, 's'},
+        {"frames", required_argument, NULL, 'n'},
+        {"size", required_argument, NULL, 'z'},
+        {"device", required_argument, NULL, 'd'},
+        {"method", required_argument, NULL, 'm'},
+        {"lod", required_argument, NULL, 'l'},
+        {"memory-limit", required_argument, NULL, 'b'},
+        {"json", no_argument, NULL, 'j'},
+        {"output", required_argument, NULL, 'o'},
+        {"reference", required_argument, NULL, 'r'},
+        {"photographs", no_argument, NULL, 'p'},
+        {"supersample", required_argument, NULL, 'x'},
+        {"repeats", required_argument, NULL, 'e'},
+        {"peers", required_argument, NULL, 'P'},
+        {"profile", required_argument, NULL, 'f'},
+        {"no-profile", no_argument, NULL, 'F'},
+        {"restart", no_argument, NULL, 'R'},
+        {NULL, 0, NULL, 0},
     };
     a->devices[0] = "auto";
     a->methods[0] = SPL_METHOD_SPLAT;
     a->lods[0] = 1;
     a->bench = (struct spl_bench_options){
-        .datasets = a->datasets, .devices = a->devices, .device_count = 1, .methods = a->methods, .method_count = 1,
-        .lods = a->lods, .lod_count = 1, .width = 1280, .height = 720, .frames = 20,
+        .datasets = a->datasets,
+        .devices = a->devices,
+        .device_count = 1,
+        .methods = a->methods,
+        .method_count = 1,
+        .lods = a->lods,
+        .lod_count = 1,
+        .width = 1280,
+        .height = 720,
     };
+    a->sweep.sweep.repeats = 5;
     int option, status = 0;
-    while (!status && (option = getopt_long(argc, argv, "", options, NULL)) != -1)
+    while (!status && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
         status = take_option(a, option, err);
     if (!status && optind == argc)
         status = spl_fail(err, SPL_E_USAGE, "bench needs at least one NAME.spld; 'splatd bench --help' shows how");
@@ -154,10 +297,20 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
         status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);
     if (!status && a->set && !a->views)
         status = spl_fail(err, SPL_E_USAGE, "--set names an entry of --views FILE, which is missing");
-    if (!status && a->views) {
+    if (!status && a->views && (!a->sweep.output || a->set)) {
         status = spl_path_load(&a->path, a->views, a->set, err);
         a->bench.path = &a->path;
     }
+    if (!status && a->sweep.output && argc - optind != 1)
+        status = spl_fail(err, SPL_E_USAGE, "with -o one dataset is measured, not %d", argc - optind);
+    if (!status && a->sweep.output)
+        status = finish_sweep(a, err);
+    if (!status && !a->sweep.output &&
+        (a->listed[2] || a->sweep.peers || a->sweep.profile || a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
+        status = spl_fail(err, SPL_E_USAGE,
+                          "--supersample, --reference, --photographs, --peers and --profile go with -o OUT");
+    a->sweep.dataset_path = argv[optind];
+    a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {
         status = spl_dataset_open(argv[i], false, &a->datasets[a->bench.dataset_count], err);
         a->bench.dataset_count += !status;
@@ -172,62 +325,6 @@ static void show_progress(void *context, uint32_t frame, uint32_t frames)
         fprintf(stderr, "\rframe %u of %u%s", frame + 1, frames, frame + 1 < frames ? "" : "\r\033[K");
 }
 
-static void print_table(const struct spl_bench_options *o, const struct spl_bench_report *r)
-{
-    printf("%ux%u, %u frames a row, medians in ms; 1 unit = %.1f ms (quartiles %.1f to %.1f)\n", o->width, o->height,
-           o->frames, r->calibrator.median, r->calibrator.q1, r->calibrator.q3);
-    for (size_t i = 0; i < o->device_count; i++) {
-        const struct spl_bench_row *row = &r->rows[i * o->method_count * o->lod_count];
-        printf("%s = %s, %s\n", row->device.backend, row->device.name, row->device.driver);
-    }
-    printf("\n%-16s %-7s %-7s %4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s\n", "dataset", "device", "method",
-           "lod", "frame", "q1", "q3", "units", "floor", "select", "upload", "clear", "depth", "shade", "resolve",
-           "readback", "splats");
-    for (size_t i = 0; i < r->row_count; i++) {
-        const struct spl_bench_row *row = &r->rows[i];
-        printf("%-16.16s %-7s %-7s %4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f %10.0f\n",
-               spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), row->lod,
-               row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
-               row->select, row->upload, row->clear, row->depth, row->shade, row->resolve, row->readback, row->splats);
-        if (row->incomplete)
-            printf("%-16s %u of %u frames with coarser nodes in the place of pages that were not resident\n", "",
-                   row->incomplete, o->frames);
-    }
-    printf("\nunits: frame / calibrator beside it; floor: units that plain C takes to scatter as many one-pixel points.\n");
-}
-
-static json_t *summary_json(const struct spl_summary *s)
-{
-    return json_pack("{s:f, s:f, s:f, s:f, s:f}", "min", s->min, "q1", s->q1, "median", s->median, "q3", s->q3, "max",
-                     s->max);
-}
-
-static json_t *row_json(const struct spl_bench_row *row)
-{
-    const struct spl_dataset_info *info = spl_dataset_get_info(row->dataset);
-    return json_pack(
-        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f}, s:f, s:f, s:i, s:I}",
-        "dataset", info->id, "leaf_splats", (json_int_t)info->leaf_splats, "backend", row->device.backend, "device",
-        row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
-        "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
-        "select", row->select, "upload", row->upload, "clear", row->clear, "depth", row->depth, "shade", row->shade,
-        "resolve", row->resolve, "readback", row->readback, "splats_drawn", row->splats, "chunks_drawn", row->chunks,
-        "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
-}
-
-static int print_json(const struct spl_bench_options *o, const struct spl_bench_report *r, struct spl_error *err)
-{
-    json_t *rows = json_array();
-    for (size_t i = 0; i < r->row_count; i++)
-        json_array_append_new(rows, row_json(&r->rows[i]));
-    json_t *root = json_pack("{s:s, s:i, s:i, s:i, s:o, s:o}", "version", SPLATD_VERSION, "width", (int)o->width,
-                             "height", (int)o->height, "frames", (int)o->frames, "calibrator_ms",
-                             summary_json(&r->calibrator), "rows", rows);
-    int failed = !root || json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(6)) || putchar('\n') == EOF;
-    json_decref(root);
-    return failed ? spl_fail(err, SPL_E_IO, "writing the figures failed") : 0;
-}
-
 int spl_cmd_bench(int argc, char **argv)
 {
     if (argc == 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h"))) {
@@ -240,14 +337,18 @@ int spl_cmd_bench(int argc, char **argv)
     int status = parse(&a, argc, argv, &err);
     if (status)
         goto done;
+    if (a.sweep.output) {
+        status = spl_cmd_bench_sweep(&a.sweep, a.datasets[0], &err);
+        goto done;
+    }
     a.bench.progress = show_progress;
     status = spl_bench(&a.bench, &report, &err);
     if (status)
         goto done;
     if (a.json)
-        status = print_json(&a.bench, &report, &err);
+        status = spl_cmd_bench_print_json(&a.bench, &report, &err);
     else
-        print_table(&a.bench, &report);
+        spl_cmd_bench_print_table(&a.bench, &report);
 done:
     spl_bench_report_finish(&report);
     for (size_t i = 0; i < a.bench.dataset_count; i++)

@@ -9,7 +9,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double quantile(const double *sorted, size_t count, double share)
+double spl_quantile(const double *sorted, size_t count, double share)
 {
     double at = share * (double)(count - 1);
     size_t below = (size_t)at, above = below + 1 < count ? below + 1 : below;
@@ -23,9 +23,9 @@ struct spl_summary spl_summarise(double *values, size_t count)
         return out;
     qsort(values, count, sizeof *values, compare);
     out.min = values[0];
-    out.q1 = quantile(values, count, 0.25);
-    out.median = quantile(values, count, 0.5);
-    out.q3 = quantile(values, count, 0.75);
+    out.q1 = spl_quantile(values, count, 0.25);
+    out.median = spl_quantile(values, count, 0.5);
+    out.q3 = spl_quantile(values, count, 0.75);
     out.max = values[count - 1];
     return out;
 }

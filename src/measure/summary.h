@@ -11,4 +11,7 @@ struct spl_summary {
 /* Sorts `values` in place; quantiles are interpolated linearly. count == 0 gives zeros. */
 struct spl_summary spl_summarise(double *values, size_t count);
 
+/* The value below which `share` (0..1) of the `count` (> 0) ascending values lie, interpolated linearly. */
+double spl_quantile(const double *sorted, size_t count, double share);
+
 #endif

@@ -1,0 +1,32 @@
+/* What the files of 'splatd bench' share: bench.c reads the options, bench_table.c prints frame times, bench_sweep.c
+ * runs the comparison with a reference. */
+#ifndef SPL_CMD_BENCH_H
+#define SPL_CMD_BENCH_H
+
+#include "measure/bench.h"
+#include "measure/sweep.h"
+
+enum { SPL_CMD_BENCH_LIST_MAX = 64 };
+
+void spl_cmd_bench_print_table(const struct spl_bench_options *options, const struct spl_bench_report *report);
+int spl_cmd_bench_print_json(const struct spl_bench_options *options, const struct spl_bench_report *report,
+                             struct spl_error *err);
+
+struct spl_cmd_bench_sweep {
+    const char *dataset_path, *output; /* file; folder */
+    const char *views;                 /* JSON or COLMAP folder; NULL = `path` */
+    const struct spl_path *path;       /* NULL = the dataset's own orbit */
+    uint32_t places;                   /* on a path */
+    uint32_t width, height;            /* 0 = 1280x720 on a path, the views' own otherwise */
+    const char *peers, *profile;       /* CSV, may be NULL; NULL = beside the dataset */
+    bool no_profile;
+    struct spl_sweep_options sweep; /* all but dataset, views, settings, folder, progress */
+    const enum spl_method *methods;
+    const double *lods, *supersamples;
+    size_t method_count, lod_count, supersample_count;
+};
+
+/* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */
+int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_dataset *dataset, struct spl_error *err);
+
+#endif

@@ -1,0 +1,80 @@
+/* Peers' CSV. Small files, read line by line; what cannot be drawn (no number, no time above zero, no name) is refused
+ * with its line rather than left out silently. Any thread. */
+#include "measure/peers.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+/* Cuts the last field off `line` and parses it. */
+static int take_number(char *line, const char *field, double least, const char *path, size_t number, double *out,
+                       struct spl_error *err)
+{
+    char *comma = strrchr(line, ','), *end;
+    if (!comma)
+        return spl_fail_field(err, SPL_E_INPUT, field, "%s: line %zu: a row is name,ms,psnr; '%.80s' has fewer fields",
+                              path, number, line);
+    *comma = 0;
+    *out = strtod(comma + 1, &end);
+    end += strspn(end, " \t");
+    if (end == comma + 1 || *end || !isfinite(*out) || *out <= least)
+        return spl_fail_field(err, SPL_E_INPUT, field, "%s: line %zu: '%.40s' is no %s", path, number, comma + 1,
+                              field);
+    return SPL_OK;
+}
+
+static int take_row(struct spl_peers *peers, char *line, const char *path, size_t number, struct spl_error *err)
+{
+    struct spl_peer row = {0};
+    int rc = take_number(line, "psnr", -INFINITY, path, number, &row.psnr, err);
+    if (!rc)
+        rc = take_number(line, "ms", 0, path, number, &row.ms, err);
+    if (rc)
+        return rc;
+    if (!*line || strlen(line) >= sizeof row.name)
+        return spl_fail_field(err, SPL_E_INPUT, "name", "%s: line %zu: a name has 1 to %zu bytes", path, number,
+                              sizeof row.name - 1);
+    memcpy(row.name, line, strlen(line));
+    struct spl_peer *rows = spl_realloc(peers->rows, peers->count + 1, sizeof *rows, err);
+    if (!rows)
+        return SPL_E_NOMEM;
+    peers->rows = rows;
+    rows[peers->count++] = row;
+    return SPL_OK;
+}
+
+int spl_peers_load(struct spl_peers *peers, const char *path, struct spl_error *err)
+{
+    memset(peers, 0, sizeof *peers);
+    FILE *file = fopen(path, "r");
+    if (!file)
+        return spl_fail_errno(err, errno, "cannot open %s", path);
+    char *line = NULL;
+    size_t room = 0, number = 0;
+    int rc = SPL_OK;
+    while (!rc && getline(&line, &room, file) > 0) {
+        line[strcspn(line, "\r\n")] = 0;
+        number++;
+        if (*line && *line != '#' && (number > 1 || strcmp(line, "name,ms,psnr")))
+            rc = take_row(peers, line, path, number, err);
+    }
+    if (!rc && ferror(file))
+        rc = spl_fail(err, SPL_E_IO, "cannot read %s", path);
+    if (!rc && !peers->count)
+        rc = spl_fail(err, SPL_E_INPUT, "%s holds no row name,ms,psnr", path);
+    free(line);
+    fclose(file);
+    if (rc)
+        spl_peers_finish(peers);
+    return rc;
+}
+
+void spl_peers_finish(struct spl_peers *peers)
+{
+    free(peers->rows);
+    memset(peers, 0, sizeof *peers);
+}

@@ -1,0 +1,40 @@
+/* What a sweep comes to: the profile, and the same with everything behind it as JSON, CSV and a chart. */
+#ifndef SPL_MEASURE_REPORT_H
+#define SPL_MEASURE_REPORT_H
+
+#include <jansson.h>
+
+#include "measure/peers.h"
+#include "measure/profile.h"
+#include "measure/summary.h"
+#include "measure/sweep.h"
+
+struct spl_report {
+    const struct spl_sweep *sweep; /* borrowed */
+    struct spl_profile profile;    /* point i is the sweep's setting i */
+    struct spl_summary calibrator; /* milliseconds */
+};
+
+/* Times of a setting: median over the repeats of each view, then median (ms) and 90 % quantile (ms_q90) over the views.
+ * psnr: 10 log10 of 255² over the mean of the views' mean square errors, so that the worst views count as they should;
+ * psnr_sd and psnr_q05: over the views' own PSNR. Other measures: means over the views that have them, depth_rmse from
+ * the mean of squares. Equal images count as SPL_PROFILE_PSNR_MAX. On failure *report is zeroed. */
+int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, struct spl_error *err);
+void spl_report_finish(struct spl_report *report);
+
+/* The whole of it; a new reference, NULL without memory. */
+json_t *spl_report_to_json(const struct spl_report *report, const struct spl_peers *peers);
+
+/* One row a setting with a header row: see api/measures.md for the columns' meaning. *csv is released with free(). */
+int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *length, struct spl_error *err);
+
+/* The chart of a profile, whoever measured it: a colour a method, a curve a method and supersampling, labels are the
+ * levels of detail. `calibrator_ms` is told in the subtitle where it is above 0; `peers` may be NULL. data-index of a
+ * point is its index in the profile. *svg is released with free(). */
+int spl_report_chart(const struct spl_profile *profile, double calibrator_ms, const struct spl_peers *peers, char **svg,
+                     size_t *length, struct spl_error *err);
+
+/* "splat lod=1", "points lod=2 2×2". */
+void spl_report_setting_name(const struct spl_setting *setting, char name[64]);
+
+#endif

@@ -1,0 +1,105 @@
+/* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
+ * supersampling is a dash pattern. Pure but for allocation; any thread. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "measure/chart.h"
+#include "measure/report.h"
+
+static const double supersamples[] = {1, 2, 4, 0.5, 0.25};
+enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples };
+
+struct build {
+    struct spl_chart_point *points;
+    size_t point_count;
+    struct spl_chart_curve *curves;
+    size_t curve_count;
+};
+
+static void add_curve(struct build *b, const char *name, unsigned color, unsigned dash, size_t first_point)
+{
+    if (b->point_count == first_point)
+        return;
+    struct spl_chart_curve *curve = &b->curves[b->curve_count++];
+    *curve = (struct spl_chart_curve){
+        .color = color, .dash = dash, .points = b->points + first_point, .count = b->point_count - first_point};
+    snprintf(curve->name, sizeof curve->name, "%s", name);
+}
+
+static void add_settings(struct build *b, const struct spl_profile *profile, enum spl_method method, double supersample,
+                         unsigned dash)
+{
+    size_t first = b->point_count;
+    for (size_t i = 0; i < profile->count; i++) {
+        const struct spl_profile_point *p = &profile->points[i];
+        if (p->setting.method != method || p->setting.supersample != supersample)
+            continue;
+        struct spl_chart_point *out = &b->points[b->point_count++];
+        *out = (struct spl_chart_point){.ms = p->ms, .psnr = p->psnr, .front = p->front, .index = (int32_t)i};
+        snprintf(out->label, sizeof out->label, "%g", p->setting.lod);
+        snprintf(out->detail, sizeof out->detail, "90 %% of views within %.4g ms", p->ms_q90);
+    }
+    char name[64];
+    if (supersample == 1)
+        snprintf(name, sizeof name, "%s", spl_method_name(method));
+    else
+        snprintf(name, sizeof name, "%s %g×%g", spl_method_name(method), supersample, supersample);
+    add_curve(b, name, method, dash, first);
+}
+
+/* One curve for each name, in the order in which the names first appear. */
+static void add_peers(struct build *b, const struct spl_peers *peers)
+{
+    unsigned color = SPL_METHOD_COUNT;
+    for (size_t i = 0; peers && i < peers->count; i++) {
+        const char *name = peers->rows[i].name;
+        size_t first = b->point_count, j = 0;
+        while (strcmp(peers->rows[j].name, name))
+            j++;
+        if (j < i)
+            continue;
+        for (; j < peers->count; j++)
+            if (!strcmp(peers->rows[j].name, name))
+                b->points[b->point_count++] =
+                    (struct spl_chart_point){.ms = peers->rows[j].ms, .psnr = peers->rows[j].psnr, .index = -1};
+        add_curve(b, name, color++, 0, first);
+    }
+}
+
+int spl_report_chart(const struct spl_profile *profile, double calibrator_ms, const struct spl_peers *peers, char **svg,
+                     size_t *length, struct spl_error *err)
+{
+    *svg = NULL;
+    size_t peer_count = peers ? peers->count : 0;
+    struct build b = {.points = spl_alloc(profile->count + peer_count, sizeof *b.points, err)};
+    b.curves = spl_alloc((size_t)SPL_METHOD_COUNT * SUPERSAMPLES + peer_count, sizeof *b.curves, err);
+    int rc = SPL_E_NOMEM;
+    if (!b.points || !b.curves)
+        goto done;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        for (unsigned i = 0; i < SUPERSAMPLES; i++)
+            add_settings(&b, profile, (enum spl_method)method, supersamples[i], i);
+    add_peers(&b, peers);
+    static const struct {
+        const char *name, *text;
+    } references[] = {
+        {"self", "its own 4×4 supersampled render"}, {"exact", "exact images"}, {"photographs", "photographs"}};
+    const char *against = profile->reference;
+    for (size_t i = 0; i < sizeof references / sizeof *references; i++)
+        if (!strcmp(references[i].name, profile->reference))
+            against = references[i].text;
+    char title[256], subtitle[512], unit[64] = "";
+    if (calibrator_ms > 0)
+        snprintf(unit, sizeof unit, "; calibrator %.3g ms", calibrator_ms);
+    snprintf(title, sizeof title, "%s: accuracy against time", profile->dataset_id);
+    snprintf(subtitle, sizeof subtitle, "%u views of %u×%u against %s; %s%s; labels: lod", profile->views,
+             profile->width, profile->height, against, profile->device, unit);
+    struct spl_chart chart = {.title = title, .subtitle = subtitle, .curves = b.curves, .curve_count = b.curve_count};
+    rc = spl_chart_write(&chart, svg, length, err);
+done:
+    free(b.points);
+    free(b.curves);
+    return rc;
+}

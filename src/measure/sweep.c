@@ -1,0 +1,398 @@
+/* The sweep. Of a view only one reference and one frame are in memory at a time; results are some hundred bytes each. A
+ * picture is on disk before the record that vouches for it, so a resumed run has all pictures of what it skips.
+ * Owned by one thread, which owns the renderer. */
+#include "measure/sweep.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "measure/calibrator.h"
+#include "measure/record.h"
+#include "measure/state.h"
+#include "measure/thumbnail.h"
+#include "measure/tolerance.h"
+
+#define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S) /* of rendering: a calibrator takes about 0.1 s */
+
+struct job {
+    struct spl_sweep *sweep;
+    const struct spl_sweep_options *options;
+    struct spl_renderer *renderer;
+    struct spl_calibrator *calibrator;
+    struct spl_tolerance *tolerance;
+    struct spl_state *state;
+    uint64_t rendering_ns, calibrated_ns; /* rendering_ns when the calibrator last ran */
+    uint64_t done, total;                 /* frames of this stage */
+};
+
+struct spl_sweep_accuracy *spl_sweep_get_accuracy(const struct spl_sweep *s, size_t setting, size_t view)
+{
+    return &s->accuracy[setting * s->options->views->count + view];
+}
+
+struct spl_sweep_time *spl_sweep_get_time(const struct spl_sweep *s, size_t setting, size_t view,
+                                          enum spl_sweep_size size, size_t repeat)
+{
+    size_t pair = setting * s->options->views->count + view;
+    return &s->times[(pair * SPL_SWEEP_SIZES + size) * s->options->repeats + repeat];
+}
+
+size_t spl_sweep_page_views(size_t views)
+{
+    return views < SPL_SWEEP_PAGE_VIEWS ? views : SPL_SWEEP_PAGE_VIEWS;
+}
+
+size_t spl_sweep_page_view(size_t views, size_t i)
+{
+    return i * views / spl_sweep_page_views(views);
+}
+
+static bool has_pictures(size_t views, size_t view)
+{
+    for (size_t i = 0; i < spl_sweep_page_views(views); i++)
+        if (spl_sweep_page_view(views, i) == view)
+            return true;
+    return false;
+}
+
+void spl_sweep_picture_path(const struct spl_sweep_options *o, enum spl_sweep_picture kind, size_t view, size_t setting,
+                            char path[4096])
+{
+    if (kind == SPL_SWEEP_REFERENCE)
+        snprintf(path, 4096, "%s/pictures/view%zu-reference.jpg", o->folder, view);
+    else
+        snprintf(path, 4096, "%s/pictures/view%zu-setting%zu%s.jpg", o->folder, view, setting,
+                 kind == SPL_SWEEP_ERROR ? "-error" : "");
+}
+
+static int save_picture(const struct spl_sweep_options *o, enum spl_sweep_picture kind, size_t view, size_t setting,
+                        const struct spl_image *image, const struct spl_image *truth, struct spl_error *err)
+{
+    struct spl_encoded encoded;
+    int rc = kind == SPL_SWEEP_ERROR ? spl_thumbnail_error(image, truth, SPL_SWEEP_PICTURE_SIDE, &encoded, err)
+                                     : spl_thumbnail_color(image, SPL_SWEEP_PICTURE_SIDE, &encoded, err);
+    if (rc)
+        return rc;
+    char path[4096];
+    spl_sweep_picture_path(o, kind, view, setting, path);
+    FILE *file = fopen(path, "w");
+    bool failed = !file || fwrite(encoded.bytes, 1, encoded.length, file) != encoded.length;
+    failed |= file && fclose(file);
+    if (failed)
+        rc = spl_fail_errno(err, errno, "cannot write %s", path);
+    spl_encoded_finish(&encoded);
+    return rc;
+}
+
+static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t view, enum spl_sweep_size size,
+                      struct spl_view *out)
+{
+    spl_view_init(out);
+    out->camera = o->views->views[view].camera;
+    out->method = o->settings[setting].method;
+    out->lod = o->settings[setting].lod;
+    out->supersample = (uint32_t)o->settings[setting].supersample;
+    if (size == SPL_SWEEP_FULL)
+        return;
+    struct spl_camera *c = &out->camera;
+    double x = (double)((c->width + 1) / 2) / c->width, y = (double)((c->height + 1) / 2) / c->height;
+    c->width = (c->width + 1) / 2;
+    c->height = (c->height + 1) / 2;
+    c->fx *= x;
+    c->cx *= x;
+    c->fy *= y;
+    c->cy *= y;
+}
+
+/* Renders and accounts for the time. */
+static int render(struct job *job, const struct spl_view *view, struct spl_frame *frame, double *ms,
+                  struct spl_error *err)
+{
+    uint64_t begin = spl_now_ns();
+    int rc = spl_renderer_render(job->renderer, job->options->dataset, view, frame, err);
+    uint64_t taken = spl_now_ns() - begin;
+    job->rendering_ns += taken;
+    *ms = (double)taken / SPL_NS_PER_MS;
+    return rc;
+}
+
+static void advance(struct job *job, const char *stage)
+{
+    job->done++;
+    if (job->options->progress)
+        job->options->progress(job->options->progress_context, stage, job->done, job->total);
+}
+
+/* -------------------------------------------------------------------------------------------------------- accuracy */
+
+static struct spl_picture picture(const struct spl_image images[SPL_LAYER_COUNT])
+{
+    const struct spl_image *layer[SPL_LAYER_COUNT];
+    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+        layer[i] = images[i].pixels ? &images[i] : NULL;
+    return (struct spl_picture){.color = layer[SPL_LAYER_COLOR],
+                                .depth = layer[SPL_LAYER_DEPTH],
+                                .normal = layer[SPL_LAYER_NORMAL],
+                                .coverage = layer[SPL_LAYER_COVERAGE]};
+}
+
+static int compare(struct job *job, size_t setting, size_t v, const struct spl_image truth[SPL_LAYER_COUNT],
+                   float *tolerance, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(job->sweep, setting, v);
+    struct spl_view view;
+    fill_view(o, setting, v, SPL_SWEEP_FULL, &view);
+    view.background[3] = 0;
+    view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH | 1u << SPL_LAYER_NORMAL | 1u << SPL_LAYER_ID |
+                  1u << SPL_LAYER_COVERAGE;
+    struct spl_frame frame;
+    double ms;
+    int rc = render(job, &view, &frame, &ms, err);
+    if (rc)
+        return rc;
+    spl_tolerance_fill(job->tolerance, &view, &frame.images[SPL_LAYER_ID], &frame.images[SPL_LAYER_DEPTH], 0,
+                       tolerance);
+    struct spl_picture image = picture(frame.images), reference = picture(truth);
+    reference.tolerance_m = tolerance;
+    rc = spl_metrics_compare(&image, &reference, 0, &a->metrics, err);
+    a->splats = (double)frame.stats.splats_drawn;
+    a->complete = frame.stats.complete;
+    if (!rc && has_pictures(o->views->count, v)) {
+        const struct spl_image *color = &frame.images[SPL_LAYER_COLOR];
+        rc = save_picture(o, SPL_SWEEP_RENDER, v, setting, color, NULL, err);
+        if (!rc)
+            rc = save_picture(o, SPL_SWEEP_ERROR, v, setting, color, &truth[SPL_LAYER_COLOR], err);
+    }
+    spl_frame_finish(&frame);
+    if (!rc)
+        rc = spl_state_add(job->state, spl_record_accuracy(setting, v, a), err);
+    a->done = !rc;
+    return rc;
+}
+
+static int compare_view(struct job *job, size_t v, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    size_t missing = 0;
+    for (size_t s = 0; s < o->setting_count; s++)
+        missing += !spl_sweep_get_accuracy(job->sweep, s, v)->done;
+    if (!missing)
+        return SPL_OK;
+    const struct spl_camera *camera = &o->views->views[v].camera;
+    struct spl_image truth[SPL_LAYER_COUNT] = {0};
+    float *tolerance = spl_alloc_raw((size_t)camera->width * camera->height, sizeof *tolerance, err);
+    uint64_t begin = spl_now_ns();
+    int rc = tolerance ? spl_reference_get(&o->reference, v, job->renderer, o->dataset, truth, err) : SPL_E_NOMEM;
+    if (o->reference.kind == SPL_REFERENCE_SELF)
+        job->rendering_ns += spl_now_ns() - begin;
+    if (!rc && has_pictures(o->views->count, v))
+        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &truth[SPL_LAYER_COLOR], NULL, err);
+    for (size_t s = 0; !rc && s < o->setting_count; s++) {
+        if (spl_sweep_get_accuracy(job->sweep, s, v)->done)
+            continue;
+        rc = compare(job, s, v, truth, tolerance, err);
+        advance(job, "accuracy");
+    }
+    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+        spl_image_finish(&truth[i]);
+    free(tolerance);
+    return rc;
+}
+
+static int compare_all(struct job *job, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    job->done = job->total = 0;
+    for (size_t s = 0; s < o->setting_count; s++)
+        for (size_t v = 0; v < o->views->count; v++)
+            job->total += !spl_sweep_get_accuracy(job->sweep, s, v)->done;
+    int rc = SPL_OK;
+    for (size_t v = 0; !rc && v < o->views->count; v++)
+        rc = compare_view(job, v, err);
+    return rc;
+}
+
+/* ----------------------------------------------------------------------------------------------------------- times */
+
+static int calibrate(struct job *job, struct spl_error *err)
+{
+    if (job->calibrated_ns && job->rendering_ns - job->calibrated_ns < CALIBRATE_EVERY_NS)
+        return SPL_OK;
+    json_t *record = spl_record_calibrator(spl_calibrator_run(job->calibrator));
+    if (record && !spl_record_take(job->sweep, record))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory: the calibrator's time could not be kept");
+    job->calibrated_ns = job->rendering_ns ? job->rendering_ns : 1;
+    return spl_state_add(job->state, record, err);
+}
+
+static int time_frame(struct job *job, size_t setting, size_t v, enum spl_sweep_size size, struct spl_sweep_time *t,
+                      struct spl_error *err)
+{
+    struct spl_view view;
+    struct spl_frame frame;
+    fill_view(job->options, setting, v, size, &view);
+    int rc = render(job, &view, &frame, &t->ms, err);
+    if (rc)
+        return rc;
+    const struct spl_frame_stats *s = &frame.stats;
+    t->select_ms = s->select_ms;
+    t->upload_ms = s->upload_ms;
+    t->clear_ms = s->clear_ms;
+    t->depth_ms = s->depth_ms;
+    t->shade_ms = s->shade_ms;
+    t->resolve_ms = s->resolve_ms;
+    t->readback_ms = s->readback_ms;
+    spl_frame_finish(&frame);
+    return SPL_OK;
+}
+
+/* One frame a setting that does not count: kernels are made, pages come in. */
+static int warm_up(struct job *job, struct spl_error *err)
+{
+    struct spl_sweep_time ignored;
+    int rc = SPL_OK;
+    for (size_t s = 0; !rc && s < job->options->setting_count; s++)
+        rc = time_frame(job, s, 0, SPL_SWEEP_FULL, &ignored, err);
+    return rc;
+}
+
+static int time_view(struct job *job, size_t repeat, size_t v, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (size_t i = 0; !rc && i < job->options->setting_count * SPL_SWEEP_SIZES; i++) {
+        size_t setting = i / SPL_SWEEP_SIZES;
+        enum spl_sweep_size size = i % SPL_SWEEP_SIZES;
+        struct spl_sweep_time *t = spl_sweep_get_time(job->sweep, setting, v, size, repeat);
+        if (t->done)
+            continue;
+        rc = calibrate(job, err);
+        if (!rc)
+            rc = time_frame(job, setting, v, size, t, err);
+        if (!rc)
+            rc = spl_state_add(job->state, spl_record_time(setting, v, size, repeat, t), err);
+        t->done = !rc;
+        advance(job, "times");
+    }
+    return rc;
+}
+
+static int time_all(struct job *job, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    size_t count = o->setting_count * o->views->count * SPL_SWEEP_SIZES * o->repeats;
+    job->done = job->total = 0;
+    for (size_t i = 0; i < count; i++)
+        job->total += !job->sweep->times[i].done;
+    int rc = job->total ? warm_up(job, err) : SPL_OK;
+    for (size_t repeat = 0; !rc && repeat < o->repeats; repeat++)
+        for (size_t v = 0; !rc && v < o->views->count; v++)
+            rc = time_view(job, repeat, v, err);
+    return rc;
+}
+
+/* ----------------------------------------------------------------------------------------------------------- the run
+ */
+
+static int make_folder(const char *path, struct spl_error *err)
+{
+    return mkdir(path, 0777) && errno != EEXIST ? spl_fail_errno(err, errno, "cannot make the folder %s", path)
+                                                : SPL_OK;
+}
+
+static bool take_record(void *context, const json_t *record)
+{
+    return spl_record_take(context, record);
+}
+
+static int open_state(struct job *job, uint64_t reference_hash, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    char path[4096];
+    if ((size_t)snprintf(path, sizeof path, "%s/pictures/view18446744073709551615-setting1024-error.jpg", o->folder) >=
+        sizeof path)
+        return spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", o->folder);
+    int rc = make_folder(o->folder, err);
+    snprintf(path, sizeof path, "%s/pictures", o->folder);
+    if (!rc)
+        rc = make_folder(path, err);
+    json_t *plan = rc ? NULL : spl_record_plan(job->sweep, reference_hash, err);
+    if (!plan)
+        return rc ? rc : SPL_E_INPUT;
+    snprintf(path, sizeof path, "%s/state.jsonl", o->folder);
+    rc = spl_state_open(path, plan, o->restart, take_record, job->sweep, &job->state, &job->sweep->resumed, err);
+    json_decref(plan);
+    return rc;
+}
+
+static int open_renderer(struct job *job, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    int rc = spl_renderer_create(&o->renderer, &job->renderer, err);
+    if (!rc)
+        rc = spl_renderer_add(job->renderer, o->dataset, err);
+    if (!rc)
+        rc = spl_renderer_preload(job->renderer, o->dataset, err);
+    if (!rc)
+        job->sweep->device = *spl_renderer_get_device(job->renderer);
+    return rc;
+}
+
+static int allocate(struct spl_sweep *sweep, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = sweep->options;
+    if (o->setting_count > SPL_PROFILE_POINTS_MAX || o->repeats > SPL_SWEEP_REPEATS_MAX)
+        return spl_fail(err, SPL_E_LIMIT, "%zu settings and %u repeats are more than %d and %d", o->setting_count,
+                        o->repeats, SPL_PROFILE_POINTS_MAX, SPL_SWEEP_REPEATS_MAX);
+    size_t pairs = o->setting_count * o->views->count;
+    sweep->accuracy = spl_alloc(pairs, sizeof *sweep->accuracy, err);
+    sweep->times = spl_alloc(pairs * SPL_SWEEP_SIZES * o->repeats, sizeof *sweep->times, err);
+    return sweep->accuracy && sweep->times ? SPL_OK : SPL_E_NOMEM;
+}
+
+int spl_sweep_run(const struct spl_sweep_options *options, struct spl_sweep *sweep, struct spl_error *err)
+{
+    spl_assert(options->setting_count && options->views->count && options->repeats);
+    uint64_t begin = spl_now_ns(), reference_hash;
+    *sweep = (struct spl_sweep){.options = options};
+    struct job job = {.sweep = sweep, .options = options};
+    int rc = spl_reference_check(&options->reference, &reference_hash, err);
+    if (!rc)
+        rc = allocate(sweep, err);
+    if (!rc)
+        rc = open_renderer(&job, err);
+    if (!rc)
+        rc = open_state(&job, reference_hash, err);
+    if (!rc)
+        rc = spl_calibrator_create(&job.calibrator, err);
+    if (!rc)
+        rc = spl_tolerance_create(options->dataset, &job.tolerance, err);
+    if (!rc)
+        rc = compare_all(&job, err);
+    if (!rc)
+        rc = time_all(&job, err);
+    if (job.renderer)
+        spl_renderer_remove(job.renderer, options->dataset);
+    spl_renderer_destroy(job.renderer);
+    spl_calibrator_destroy(job.calibrator);
+    spl_tolerance_destroy(job.tolerance);
+    spl_state_close(job.state);
+    sweep->rendering_s = (double)job.rendering_ns / SPL_NS_PER_S;
+    sweep->seconds = (double)(spl_now_ns() - begin) / SPL_NS_PER_S;
+    if (rc)
+        spl_sweep_finish(sweep);
+    return rc;
+}
+
+void spl_sweep_finish(struct spl_sweep *sweep)
+{
+    free(sweep->accuracy);
+    free(sweep->times);
+    free(sweep->calibrator);
+    memset(sweep, 0, sizeof *sweep);
+}

@@ -1,0 +1,142 @@
+/* Radii by splat id. Chunks are numbered by their first splat, so that a binary search finds an id's chunk;
+ * neighbouring pixels mostly show the same one, which is tried first. Ids that a device should not have returned are
+ * treated as no splat. Read-only once created, so any thread may fill. */
+#include "measure/tolerance.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
+
+/* src/render/select.c draws clusters of inner nodes this much smaller. */
+static const double cluster_radius_share = 0.9;
+
+struct spl_tolerance {
+    const struct spl_dataset *dataset;
+    const struct spl_chunk *chunks;
+    uint32_t chunk_count;
+    uint32_t *nodes; /* of each chunk */
+    uint32_t *order; /* chunks by ascending first_id */
+};
+
+struct job {
+    const struct spl_tolerance *tolerance;
+    const struct spl_view *view;
+    const uint32_t *ids;
+    const float *depths;
+    float *out;
+    uint32_t width;
+};
+
+static int by_first_id(const void *a, const void *b, void *context)
+{
+    const struct spl_chunk *chunks = context;
+    uint32_t x = chunks[*(const uint32_t *)a].first_id, y = chunks[*(const uint32_t *)b].first_id;
+    return (x > y) - (x < y);
+}
+
+int spl_tolerance_create(const struct spl_dataset *dataset, struct spl_tolerance **out, struct spl_error *err)
+{
+    *out = NULL;
+    struct spl_tolerance *t = spl_alloc(1, sizeof *t, err);
+    if (!t)
+        return SPL_E_NOMEM;
+    uint32_t node_count;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    t->dataset = dataset;
+    t->chunks = spl_dataset_get_chunks(dataset, &t->chunk_count);
+    t->nodes = spl_alloc(t->chunk_count, sizeof *t->nodes, err);
+    t->order = spl_alloc(t->chunk_count, sizeof *t->order, err);
+    if (!t->nodes || !t->order) {
+        spl_tolerance_destroy(t);
+        return SPL_E_NOMEM;
+    }
+    for (uint32_t n = 0; n < node_count; n++)
+        for (uint32_t c = 0; c < nodes[n].chunk_count; c++)
+            t->nodes[nodes[n].first_chunk + c] = n;
+    for (uint32_t c = 0; c < t->chunk_count; c++)
+        t->order[c] = c;
+    qsort_r(t->order, t->chunk_count, sizeof *t->order, by_first_id, (void *)t->chunks);
+    *out = t;
+    return SPL_OK;
+}
+
+void spl_tolerance_destroy(struct spl_tolerance *t)
+{
+    if (!t)
+        return;
+    free(t->nodes);
+    free(t->order);
+    free(t);
+}
+
+static bool holds(const struct spl_chunk *chunk, uint32_t id)
+{
+    return id >= chunk->first_id && id - chunk->first_id < chunk->count;
+}
+
+/* The chunk of splat `id`; chunk_count when there is none. */
+static uint32_t find_chunk(const struct spl_tolerance *t, uint32_t id)
+{
+    uint32_t low = 0, high = t->chunk_count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (t->chunks[t->order[middle]].first_id <= id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low && holds(&t->chunks[t->order[low - 1]], id) ? t->order[low - 1] : t->chunk_count;
+}
+
+static double drawn_radius(const struct job *job, uint32_t index, uint32_t id, double z)
+{
+    const struct spl_tolerance *t = job->tolerance;
+    const struct spl_chunk *chunk = &t->chunks[index];
+    uint32_t node_count;
+    const struct spl_node *node = spl_dataset_get_nodes(t->dataset, &node_count) + t->nodes[index];
+    size_t bytes;
+    struct spl_splat splat;
+    spl_chunk_decode(chunk, spl_dataset_get_page(t->dataset, node->page, &bytes), id - chunk->first_id, &splat);
+    const struct spl_camera *camera = &job->view->camera;
+    double focal = fmax(camera->fx, camera->fy) * job->view->supersample, lod = job->view->lod;
+    double share = (double)chunk->radius_mean / SPL_RADIUS_SPACING * focal / fmax(z, camera->near) / lod;
+    double fraction = lod > 0 ? fmin(fmax(share * share, 0.25), 1) : 1;
+    return splat.radius / sqrt(fraction) * (node->child_count ? cluster_radius_share : 1);
+}
+
+static void fill_rows(void *context, size_t begin, size_t end, unsigned worker)
+{
+    (void)worker;
+    const struct job *job = context;
+    const struct spl_tolerance *t = job->tolerance;
+    const float nothing = (float)spl_dataset_get_info(t->dataset)->splat_radius;
+    uint32_t last = t->chunk_count;
+    for (size_t i = begin * job->width; i < end * job->width; i++) {
+        uint32_t id = job->ids[i];
+        job->out[i] = nothing;
+        if (id == UINT32_MAX || !(job->depths[i] > 0))
+            continue;
+        if (last == t->chunk_count || !holds(&t->chunks[last], id))
+            last = find_chunk(t, id);
+        if (last < t->chunk_count)
+            job->out[i] = (float)drawn_radius(job, last, id, job->depths[i]);
+    }
+}
+
+void spl_tolerance_fill(const struct spl_tolerance *tolerance, const struct spl_view *view, const struct spl_image *id,
+                        const struct spl_image *depth, unsigned threads, float *out)
+{
+    spl_assert(id->type == SPL_PIXEL_U32 && depth->type == SPL_PIXEL_F32 && id->width == depth->width &&
+               id->height == depth->height);
+    struct job job = {.tolerance = tolerance,
+                      .view = view,
+                      .ids = id->pixels,
+                      .depths = depth->pixels,
+                      .out = out,
+                      .width = id->width};
+    spl_parallel_for(threads, id->height, 16, fill_rows, &job);
+}
