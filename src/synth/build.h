@@ -38,5 +38,12 @@ void spl_build_tree(struct spl_scene *scene, struct spl_skin bark, struct spl_sk
 
 /* The scenes; one file each in scenes/. They set materials, scanner, cameras and offset as well. */
 void spl_build_courtyard(struct spl_scene *scene);
+void spl_build_railway(struct spl_scene *scene);
+void spl_build_powerline(struct spl_scene *scene);
+void spl_build_thin_walls(struct spl_scene *scene);
+void spl_build_steps(struct spl_scene *scene);
+void spl_build_density(struct spl_scene *scene);
+void spl_build_trees(struct spl_scene *scene);
+void spl_build_interior(struct spl_scene *scene);
 
 #endif

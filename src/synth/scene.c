@@ -19,6 +19,16 @@ static const struct {
 } scenes[] = {
     {"courtyard", "20 x 16 m: textured facades, columns, a sphere, wires, a tree; 4 terrestrial stations",
      spl_build_courtyard},
+    {"railway", "120 m of two curved tracks: rails, catenary wires, a platform, a bridge; mobile, two heads",
+     spl_build_railway},
+    {"powerline", "400 x 120 m: pylons, conductors, fields, trees, a road; airborne, UTM coordinates, 20 points/m2",
+     spl_build_powerline},
+    {"thin-walls", "sheets 5 to 50 mm apart, a wedge, sheets seen edge-on; 5 terrestrial stations", spl_build_thin_walls},
+    {"steps", "stairs of 1 mm to 1 m, fins and pickets of all spacings; 5 terrestrial stations", spl_build_steps},
+    {"density", "one surface, 1 to 10000 points/m2 along its 46 m (at a million points)", spl_build_density},
+    {"tree", "three trees, a hedge, a brick wall behind; 5 terrestrial stations", spl_build_trees},
+    {"interior", "two furnished rooms with a door between and labelled walls; 5 terrestrial stations",
+     spl_build_interior},
 };
 enum { scene_count = sizeof scenes / sizeof *scenes };
 

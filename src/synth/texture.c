@@ -53,10 +53,10 @@ static double noise(double x, double y, double z, bool flat, uint32_t seed)
 }
 
 /* Octaves from wave `coarse` down to the finest, each 0.6 as strong as the last; 0..1 around 0.5. */
-static double octaves(const double p[3], double coarse, double stretch, bool flat, uint32_t seed)
+static double octaves(const double p[3], double coarse, double stretch, bool flat, double finest, uint32_t seed)
 {
     double sum = 0, weight = 1, total = 0;
-    for (double wave = coarse; wave >= finest_wave; wave /= 2.17) {
+    for (double wave = coarse; wave >= (finest > 0 ? finest : finest_wave); wave /= 2.17) {
         sum += weight * noise(p[0] / wave, p[1] / wave, p[2] / (wave * stretch), flat, seed++);
         total += weight;
         weight *= 0.6;
@@ -87,7 +87,7 @@ static void masonry(const struct spl_material *m, double u, double v, double col
     double edge = fmin(fmin(x, m->size[0] - x), fmin(y, m->size[1] - y)); /* to the middle of the joint */
     double block = cell_value((int32_t)column, (int32_t)row, 0, m->seed);
     mix(color, m->colors[1], block);
-    double tint = octaves((double[3]){u, v, 0}, 0.21, 1, true, m->seed + 1) - 0.5;
+    double tint = octaves((double[3]){u, v, 0}, 0.21, 1, true, m->finest, m->seed + 1) - 0.5;
     for (int i = 0; i < 3; i++)
         color[i] += 255 * m->grain * tint;
     mix(color, m->colors[2], 1 - smooth(m->joint / 2 - ramp / 2, m->joint / 2 + ramp / 2, edge));
@@ -115,22 +115,22 @@ static const uint8_t letters[26][5] = {
     {0x1f, 0x20, 0x40, 0x20, 0x1f}, {0x3f, 0x40, 0x38, 0x40, 0x3f}, {0x63, 0x14, 0x08, 0x14, 0x63},
     {0x03, 0x04, 0x78, 0x04, 0x03}, {0x61, 0x59, 0x49, 0x4d, 0x43},
 };
-enum { line_letters = 18, line_count = 6, letter_width = 6, letter_height = 10 };
+enum { line_letters = SPL_PLAQUE_LETTERS, line_count = SPL_PLAQUE_LINES, letter_width = 6, letter_height = 10 };
 static const char inscription[line_count][line_letters + 1] = {
     "MEASURE WHAT CAN  ", "BE MEASURED AND   ", "MAKE MEASURABLE   ",
     "WHAT CANNOT BE    ", "SPLATS JUDGED BY  ", "VEXING QUARTZ FORM",
 };
 
-/* Whether letter-pixel (x, y) of the inscription is inked; y grows downwards. */
-static bool inked(int x, int y)
+/* Whether letter-pixel (x, y) of the text is inked; y grows downwards. */
+static bool inked(const char (*text)[line_letters + 1], int x, int y)
 {
     x -= letter_width;
     y -= letter_height / 2;
     if (x < 0 || y < 0 || x >= line_letters * letter_width || y >= line_count * letter_height)
         return false;
-    char letter = inscription[y / letter_height][x / letter_width];
+    char letter = text[y / letter_height][x / letter_width];
     int column = x % letter_width, row = y % letter_height;
-    return letter != ' ' && column < 5 && row < 7 && letters[letter - 'A'][column] >> row & 1;
+    return letter >= 'A' && letter <= 'Z' && column < 5 && row < 7 && letters[letter - 'A'][column] >> row & 1;
 }
 
 /* The bitmap, interpolated, with the contrast of its edges raised: strokes stay letters, edges stay ramps. */
@@ -138,11 +138,12 @@ static void plaque(const struct spl_material *m, const double half[2], double u,
 {
     double x = (u + half[0]) / (2 * half[0]) * (line_letters + 2) * letter_width - 0.5;
     double y = (half[1] - v) / (2 * half[1]) * (line_count + 1) * letter_height - 0.5;
+    const char(*text)[line_letters + 1] = m->text ? m->text : inscription;
     int ix = (int)floor(x), iy = (int)floor(y);
     x -= ix;
     y -= iy;
-    double top = inked(ix, iy) * (1 - x) + inked(ix + 1, iy) * x;
-    double bottom = inked(ix, iy + 1) * (1 - x) + inked(ix + 1, iy + 1) * x;
+    double top = inked(text, ix, iy) * (1 - x) + inked(text, ix + 1, iy) * x;
+    double bottom = inked(text, ix, iy + 1) * (1 - x) + inked(text, ix + 1, iy + 1) * x;
     mix(color, m->colors[1], smooth(0.25, 0.75, top * (1 - y) + bottom * y));
 }
 
@@ -176,10 +177,10 @@ void spl_material_shade(const struct spl_material *m, const struct spl_primitive
         masonry(m, u, v, color);
         break;
     case SPL_MATERIAL_PLASTER:
-        three_way(m, octaves((double[3]){u, v, 0}, m->size[0], 1, true, m->seed), color);
+        three_way(m, octaves((double[3]){u, v, 0}, m->size[0], 1, true, m->finest, m->seed), color);
         break;
     case SPL_MATERIAL_SOLID:
-        three_way(m, octaves(position, m->size[0], m->size[1] / m->size[0], false, m->seed), color);
+        three_way(m, octaves(position, m->size[0], m->size[1] / m->size[0], false, m->finest, m->seed), color);
         break;
     case SPL_MATERIAL_WINDOW:
         window(m, p->half, u, v, color);

@@ -18,6 +18,8 @@ enum spl_material_kind {
     SPL_MATERIAL_LEAF,    /* a disc with a rib, a shade between colors[0] and colors[1] for each primitive */
 };
 
+enum { SPL_PLAQUE_LETTERS = 18, SPL_PLAQUE_LINES = 6 };
+
 struct spl_material {
     enum spl_material_kind kind;
     uint8_t colors[3][3];
@@ -25,6 +27,8 @@ struct spl_material {
     double joint;   /* width, metres */
     double grain;   /* 0..1, strength of the noise */
     uint32_t seed;
+    double finest;         /* shortest wave of the noise, metres; 0 = 16 mm */
+    const char (*text)[SPL_PLAQUE_LETTERS + 1]; /* of a plaque: SPL_PLAQUE_LINES lines of A to Z; NULL = an inscription */
 };
 
 /* The colour of `primitive` at a point of its surface: sRGB levels 0..255, not rounded. Any thread. */
