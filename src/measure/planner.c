@@ -13,7 +13,6 @@
 
 #include "base/memory.h"
 
-static const double tolerance = 1.2; /* of a budget, for nearly all frames */
 static const double spread_quantile = 0.95, spread_step = 0.05;
 static const double spread_least = 0.02, spread_most = 1.5;
 static const double shared_gain = 0.1, setting_gain = 0.1, layer_gain = 0.1, fade = 0.99;
@@ -113,7 +112,7 @@ static struct standing assess(const struct spl_planner *planner, size_t index, c
     s.tail_ms = s.ms * exp(planner->spread);
     if (!isnan(demand->budget_ms))
         s.in_time = s.ms + demand->extra_ms <= demand->budget_ms &&
-                    s.tail_ms + demand->extra_ms <= tolerance * demand->budget_ms;
+                    s.tail_ms + demand->extra_ms <= SPL_BUDGET_TOLERANCE * demand->budget_ms;
     return s;
 }
 

@@ -10,6 +10,9 @@
 
 #include "measure/profile.h"
 
+/* Of a budget: frames may take up to this multiple, and one in twenty longer. */
+#define SPL_BUDGET_TOLERANCE 1.2
+
 struct spl_demand {
     double budget_ms;  /* > 0; NAN: any time */
     double psnr;       /* dB; NAN: any accuracy */

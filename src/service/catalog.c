@@ -74,7 +74,7 @@ static int open_entry(struct spl_catalog_entry *entry, bool verify, struct spl_e
     memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
     memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
     encode_uri(entry->uri, sizeof entry->uri, info->id);
-    return 0;
+    return spl_plan_create(entry->path, info, &entry->plan, err);
 }
 
 struct opening {
@@ -138,6 +138,7 @@ done:
 void spl_catalog_finish(struct spl_catalog *catalog)
 {
     for (size_t i = 0; i < catalog->count; i++) {
+        spl_plan_destroy(catalog->entries[i].plan);
         spl_dataset_close(catalog->entries[i].dataset);
         free(catalog->entries[i].path);
     }

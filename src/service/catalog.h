@@ -5,7 +5,7 @@
 #include <splatd/dataset.h>
 
 #include "base/error.h"
-#include "service/request.h"
+#include "service/plan.h"
 
 struct spl_catalog_entry {
     char *path;
@@ -13,6 +13,7 @@ struct spl_catalog_entry {
     const struct spl_dataset_info *info;
     struct spl_camera_defaults defaults;
     char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
+    struct spl_plan *plan;
 };
 
 struct spl_catalog {

@@ -59,6 +59,10 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
     if (!full)
         return json;
+    struct spl_profile profile;
+    bool profiled = !spl_plan_copy_profile(entry->plan, &profile, NULL);
+    set(json, "profile", profiled ? json_sprintf("%s/profile", entry->uri) : json_null());
+    spl_profile_finish(&profile);
     set(json, "levels", count(info->levels));
     set(json, "leaf_splats", count(info->leaf_splats));
     set(json, "page_bytes", count(info->page_bytes));

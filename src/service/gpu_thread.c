@@ -42,6 +42,8 @@ static int build(struct gpu *gpu, struct spl_error *err)
     pthread_mutex_lock(&pipeline->mutex);
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
+    for (size_t i = 0; options->plans && i < options->dataset_count; i++)
+        spl_plan_set_device(options->plans[i], spl_renderer_get_device(gpu->renderer));
     for (size_t i = 0; !rc && i < options->dataset_count; i++)
         rc = spl_renderer_add(gpu->renderer, options->datasets[i], err);
     for (size_t i = 0; !rc && i < options->dataset_count && !spl_queue_is_closed(pipeline->render); i++)
@@ -125,12 +127,26 @@ static void inject(struct gpu *gpu)
     spl_renderer_inject_loss(gpu->renderer);
 }
 
+/* Sets the view to what its demand is best met with. A job that lacks the time is refused before it is planned. */
+static int plan(struct spl_job *job)
+{
+    if (!job->plan || !job->request.planned)
+        return 0;
+    double left_ms = (double)spl_remaining_ns(job->deadline_ns) / SPL_NS_PER_MS;
+    return spl_plan_apply(job->plan, &job->request, left_ms, &job->choice, &job->promised_ms, &job->err);
+}
+
 /* Renders one job and passes it on; false when the thread must end. */
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
     job->queue_ms = (double)(spl_now_ns() - job->accepted_ns) / SPL_NS_PER_MS;
     if (spl_job_is_over(job) || spl_pipeline_reserve_frame(pipeline, job)) {
+        spl_pipeline_finish_job(pipeline, job);
+        return true;
+    }
+    job->began_ns = spl_now_ns();
+    if (plan(job)) {
         spl_pipeline_finish_job(pipeline, job);
         return true;
     }
@@ -142,10 +158,13 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     if (!rc) {
         gpu->frames++;
         spl_count(pipeline->options.counters, frames);
-        uint64_t took = spl_now_ns() - began, mean = atomic_load(&pipeline->frame_ns);
+        job->rendered_ns = spl_now_ns();
+        uint64_t took = job->rendered_ns - began, mean = atomic_load(&pipeline->frame_ns);
         atomic_store(&pipeline->frame_ns, mean ? (7 * mean + took) / 8 : took);
         atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
         job->stats = job->frame.stats;
+        if (job->plan && !job->stats.pages_loaded) // loading is no property of the setting
+            spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
         rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
     }
     if (rc)

@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "service/counters.h"
+#include "service/plan.h"
 #include "service/request.h"
 
 struct spl_job {
@@ -27,6 +28,11 @@ struct spl_job {
     struct spl_encoded encoded;
     size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
     double queue_ms, encode_ms;
+    struct spl_plan *plan;    // borrowed; may be NULL: nothing is planned
+    struct spl_choice choice; /* where request.planned */
+    double promised_ms;       /* the same */
+    uint64_t began_ns, rendered_ns;
+    double took_ms; /* from the frame's begin until it was encoded */
     struct spl_error err;
 };
 
@@ -37,6 +43,7 @@ struct spl_pipeline_options {
     struct spl_renderer_options renderer;
     const struct spl_dataset *const *datasets; /* borrowed until destroy */
     size_t dataset_count;
+    struct spl_plan *const *plans; /* one a dataset; borrowed until destroy; NULL: none */
     size_t queue, encoders;
     size_t frame_bytes_max; /* host memory for frames that wait for an encoder, 0 = 1 GiB */
     struct spl_counters *counters;

@@ -38,6 +38,11 @@ static void set_text(struct request *request, unsigned status, const char *type,
         header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
 }
 
+void spl_reply_text(struct request *request, const char *type, char *body)
+{
+    set_text(request, MHD_HTTP_OK, type, body);
+}
+
 void spl_reply_json(struct request *request, json_t *json)
 {
     char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
@@ -120,6 +125,25 @@ static void add_depth(struct request *request, const struct spl_job *job)
     }
 }
 
+/* What was chosen, what was promised, what it took. Such bytes depend on how busy the machine was: nobody keeps them.
+ */
+static void add_plan(struct request *request, const struct spl_job *job)
+{
+    const struct spl_choice *choice = &job->choice;
+    if (!job->plan || !job->request.planned)
+        return;
+    bool late = job->took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
+    char psnr[32] = "";
+    if (isfinite(choice->psnr))
+        snprintf(psnr, sizeof psnr, "; psnr=%.2f", choice->psnr);
+    header(request, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g", spl_method_name(choice->setting.method),
+           choice->setting.lod, choice->setting.supersample);
+    header(request, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
+    header(request, "Splatd-Took", "ms=%.2f", job->took_ms);
+    header(request, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");
+    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
+}
+
 /* Encoded bytes on their way to a client. */
 struct outgoing {
     struct spl_service *service;
@@ -158,6 +182,7 @@ void spl_reply_view(struct request *request, struct spl_job *job)
            job->encode_ms, (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
     add_camera(request, &job->request.view.camera);
     add_depth(request, job);
+    add_plan(request, job);
     job->encoded = (struct spl_encoded){0}; // the response owns the bytes
     header(request, "Splatd-Complete", "%s", s->complete ? "true" : "false");
     spl_pipeline_get_status(request->service->pipeline, &status);

@@ -4,6 +4,8 @@
  * refuses it for a reason that this one could have named. Pure functions, any thread. */
 #include "service/request.h"
 
+#include <math.h>
+
 #include "service/values.h"
 
 static bool given(const struct values *values, enum param param)
@@ -51,6 +53,34 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     return 0;
 }
 
+static int resolve_demand(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+{
+    static const double longest_ms = 600000;
+    struct spl_demand *demand = &out->demand;
+    double budget = get(values, PARAM_budget, NAN), psnr = get(values, PARAM_psnr, NAN);
+    if (given(values, PARAM_budget) && !(budget > 0 && budget <= longest_ms))
+        return spl_fail_field(err, SPL_E_INPUT, "budget", "budget %g ms is outside 0 (exclusive) to %.0f", budget,
+                              longest_ms);
+    if (given(values, PARAM_psnr) && !(psnr >= 0 && psnr <= SPL_PROFILE_PSNR_MAX))
+        return spl_fail_field(err, SPL_E_INPUT, "psnr", "psnr %g is outside 0 to %g", psnr, SPL_PROFILE_PSNR_MAX);
+    if (given(values, PARAM_psnr) && out->layer != SPL_LAYER_COLOR)
+        return spl_fail_field(err, SPL_E_INPUT, "psnr", "psnr is about colour; layer=%s takes a budget only",
+                              spl_layer_name(out->layer));
+    out->planned = given(values, PARAM_budget) || given(values, PARAM_psnr);
+    demand->budget_ms = budget;
+    demand->psnr = psnr;
+    demand->width = out->view.camera.width;
+    demand->height = out->view.camera.height;
+    demand->layer = out->layer;
+    demand->keep_method = given(values, PARAM_method);
+    demand->keep_lod = given(values, PARAM_lod);
+    demand->keep_supersample = given(values, PARAM_supersample);
+    demand->kept.method = out->view.method;
+    demand->kept.lod = out->view.lod;
+    demand->kept.supersample = out->view.supersample;
+    return 0;
+}
+
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
@@ -58,7 +88,8 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
     spl_view_init(&out->view);
     int rc;
     if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
-        (rc = resolve_drawing(values, out, err)) || (rc = resolve_encoding(values, out, err)))
+        (rc = resolve_drawing(values, out, err)) || (rc = resolve_encoding(values, out, err)) ||
+        (rc = resolve_demand(values, out, err)))
         return rc;
     return spl_view_check(&out->view, err);
 }

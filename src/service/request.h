@@ -9,11 +9,14 @@
 #include <splatd/render.h>
 
 #include "geom/camera_json.h"
+#include "measure/planner.h"
 
 struct spl_view_request {
     struct spl_view view; /* deadline_ns is left at "none" */
     enum spl_layer layer; /* the one bit of view.layers */
     struct spl_encode_options encode;
+    bool planned;             /* budget or psnr was given: the service chooses what demand.keep_* leaves open */
+    struct spl_demand demand; /* extra_ms is left at 0 */
 };
 
 /* `query` is what stands behind '?', still percent-encoded; it need not end in NUL. */

@@ -17,6 +17,10 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
         value->n[0] = json_is_true(json);
         return 0;
     }
+    if (kind == SPL_KIND_DURATION && json_is_number(json)) {
+        value->n[0] = json_number_value(json);
+        return 0;
+    }
     if (kind == SPL_KIND_FLAG || !json_is_string(json))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name,
                               kind == SPL_KIND_FLAG ? "true or false" : "text", spl_json_type_name(json));

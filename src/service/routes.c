@@ -50,7 +50,8 @@ static void show_status(struct request *request, const struct spl_catalog_entry 
 static int parse_view(struct request *request, const struct spl_catalog_entry *entry, bool post,
                       struct spl_view_request *view, struct spl_error *err)
 {
-    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = request->service->options->pixels_max};
+    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX,
+                                       .pixels = request->service->options->pixels_max};
     int rc =
         post
             ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)
@@ -75,6 +76,7 @@ static void make_view(struct request *request, const struct spl_catalog_entry *e
     if (!(job = spl_alloc(1, sizeof *job, &err)))
         goto refuse;
     job->dataset = entry->dataset;
+    job->plan = entry->plan;
     job->request = view;
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = job->accepted_ns + service->options->deadline_ms * SPL_NS_PER_MS;
@@ -99,6 +101,7 @@ static const struct route {
     {"/v1/status", ALLOW_GET, false, show_status},
     {"/v1/datasets", ALLOW_GET, false, list_datasets},
     {"/v1/datasets/{id}", ALLOW_GET, false, show_dataset},
+    {"/v1/datasets/{id}/profile", ALLOW_GET, true, spl_show_profile},
     {"/v1/datasets/{id}/view", ALLOW_GET | ALLOW_POST, true, make_view},
 };
 

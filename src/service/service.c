@@ -156,16 +156,19 @@ static void finish_loop(struct spl_service *service)
 
 static int start_pipeline(struct spl_service *service, struct spl_error *err)
 {
-    const struct spl_dataset **datasets = spl_alloc(service->catalog.count, sizeof *datasets, err);
-    if (!datasets)
+    const struct spl_dataset **datasets = service->datasets = spl_alloc(service->catalog.count, sizeof *datasets, err);
+    struct spl_plan **plans = service->plans = spl_alloc(service->catalog.count, sizeof *plans, err);
+    if (!datasets || !plans)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < service->catalog.count; i++)
+    for (size_t i = 0; i < service->catalog.count; i++) {
         datasets[i] = service->catalog.entries[i].dataset;
-    service->datasets = datasets;
+        plans[i] = service->catalog.entries[i].plan;
+    }
     struct spl_pipeline_options options = {
         .renderer = service->options->renderer,
         .datasets = datasets,
         .dataset_count = service->catalog.count,
+        .plans = plans,
         .queue = service->options->queue,
         .encoders = service->options->encoders,
         .counters = &service->counters,
@@ -198,6 +201,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
 done:
     spl_pipeline_destroy(service->pipeline);
     free(service->datasets);
+    free(service->plans);
     spl_catalog_finish(&service->catalog);
     if (service->listen_fd >= 0)
         close(service->listen_fd);

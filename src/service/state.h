@@ -55,6 +55,7 @@ struct spl_service {
     const struct spl_service_options *options;
     struct spl_catalog catalog;
     const struct spl_dataset **datasets; /* of the catalog, for the pipeline */
+    struct spl_plan **plans;             /* the same */
     struct spl_pipeline *pipeline;
     struct spl_counters counters;
     uint64_t started_ns;
@@ -95,11 +96,15 @@ void spl_waiting_refuse_all(struct spl_service *service);
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);
 
+/* profile_route.c: /v1/datasets/{id}/profile. */
+void spl_show_profile(struct request *request, const struct spl_catalog_entry *entry, bool post);
+
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail);
 void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
+void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
 void spl_reply_view(struct request *request, struct spl_job *job);          /* takes job->encoded */
 
 /* describe.c: new references; NULL without memory. */

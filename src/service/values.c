@@ -2,6 +2,7 @@
  * functions, any thread. */
 #include "service/values.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -65,6 +66,19 @@ static int parse_color(struct spl_value *value, const char *name, const char *te
     return 0;
 }
 
+/* "50ms", "0.05s", "50". */
+static int parse_duration(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    size_t digits = strspn(text, "0123456789.");
+    const char *unit = text + digits;
+    char *end = NULL;
+    double scale = !*unit || !strcmp(unit, "ms") ? 1 : !strcmp(unit, "s") ? 1000 : 0;
+    value->n[0] = digits ? scale * strtod(text, &end) : 0;
+    if (end != unit || scale == 0)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no time; write 50ms, 0.05s or 50", name, text);
+    return 0;
+}
+
 static int flag_from_name(const char *name)
 {
     return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
@@ -83,6 +97,8 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
     };
     if (kind == SPL_KIND_COLOR)
         return parse_color(value, name, text, err);
+    if (kind == SPL_KIND_DURATION)
+        return parse_duration(value, name, text, err);
     if (kind < SPL_KIND_END)
         return spl_value_from_choice(value, (enum spl_value_kind)kind, name, text, err);
     int choice = table[kind].lookup(text);

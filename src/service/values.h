@@ -16,6 +16,7 @@ enum {
     SPL_KIND_METHOD,
     SPL_KIND_LAYER,
     SPL_KIND_FORMAT,
+    SPL_KIND_DURATION, /* ms */
 };
 
 enum param {
@@ -46,7 +47,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
 /* Marks `param` as given under `name`; refuses the second time. */
 int spl_values_claim(struct values *values, enum param param, const char *name, struct spl_error *err);
 
-/* Text to the numbers of a choice, a flag or a colour. */
+/* Text to the numbers of a choice, a flag, a colour or a duration. */
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */

@@ -22,6 +22,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                             : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);
     if (rc ? err.code != rc || !err.message[0] : err.code != 0)
         abort();
+    const struct spl_demand *demand = &request.demand;
+    if (!rc && (demand->budget_ms <= 0 || demand->psnr < 0 ||
+                request.planned != !(isnan(demand->budget_ms) && isnan(demand->psnr))))
+        abort();
     const struct spl_camera *camera = &request.view.camera;
     if (!rc &&
         (spl_view_check(&request.view, &err) || camera->width > limits.side_px || camera->height > limits.side_px ||

@@ -21,6 +21,10 @@ QUERIES = [
     ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
     ("background=red", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"),
     ("margin=1e9", "margin"),
+    ("budget=0", "budget"), ("budget=-5", "budget"), ("budget=fast", "budget"), ("budget=5m", "budget"),
+    ("budget=", "budget"), ("budget=1e3", "budget"), ("budget=nan", "budget"), ("budget=601s", "budget"),
+    ("budget=.", "budget"), ("budget=5%20ms", "budget"), ("budget=5&budget=6", "budget"), ("psnr=101", "psnr"),
+    ("psnr=-1", "psnr"), ("psnr=nan", "psnr"), ("psnr=high", "psnr"), ("psnr=30&layer=depth", "psnr"),
     ("depth_scale=0", "depth_scale"), ("colour=red", "colour"), ("eye=1,2,3&eye=1,2,3", "eye"),
     ("POC=1,2,3&eye=1,2,3", "eye"),
     ("width", "width"), ("width=", "width"), ("width=%zz", "width"), ("width=%4", "width"), ("width=%00", "width"),
@@ -34,7 +38,9 @@ BODIES = [
     ('{"camera":{"matrix":[1],"convention":"opengl"}}', "matrix"),
     ('{"camera":{"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}', "convention"),
     ('{"camera":{"q":[0,0,0,0],"t":[0,0,0]}}', "q"), ('{"camera":{"q":[1,0,0,0]}}', "t"),
-    ('{"camera":{"model":"OPENCV","params":[1,1,1,1,0.1,0,0,0]}}', "params"), ("[" * 100000, "body"),
+    ('{"camera":{"model":"OPENCV","params":[1,1,1,1,0.1,0,0,0]}}', "params"),
+    ('{"budget":0}', "budget"), ('{"budget":"0ms"}', "budget"), ('{"budget":[5]}', "budget"),
+    ('{"budget":true}', "budget"), ('{"psnr":"38"}', "psnr"), ('{"camera":{"psnr":38}}', "psnr"), ("[" * 100000, "body"),
 ]
 
 

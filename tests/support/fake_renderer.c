@@ -1,6 +1,7 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
- * colour that take as long as FAKE_FRAME_MS says, losses on demand, failures to open after FAKE_OPEN_LIMIT times.
- * TSan sees all of it, which it cannot with a driver that compiles its own code. */
+ * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), losses on
+ * demand, failures to open after FAKE_OPEN_LIMIT times. TSan sees all of it, which it cannot with a driver that
+ * compiles its own code. */
 #include <splatd/render.h>
 
 #include <stdlib.h>
@@ -84,6 +85,16 @@ static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_
     return 0;
 }
 
+/* FAKE_FRAME_MS and, a megapixel of splats at lod=1, FAKE_MPX_MS: proportional to samples, a quarter of it for points,
+ * less where the level is coarser. */
+static uint64_t frame_ns(const struct spl_view *view)
+{
+    double side = (double)view->supersample, samples = 1e-6 * view->camera.width * view->camera.height * side * side;
+    double share = (view->method == SPL_METHOD_POINTS ? 0.25 : 1) / (view->lod > 1 ? view->lod : 1);
+    double ms = (double)setting("FAKE_FRAME_MS", 1) + (double)setting("FAKE_MPX_MS", 0) * samples * share;
+    return (uint64_t)(ms * SPL_NS_PER_MS);
+}
+
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err)
 {
@@ -93,7 +104,7 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
         renderer->lost = true;
         return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
     }
-    uint64_t until = spl_now_ns() + (uint64_t)setting("FAKE_FRAME_MS", 1) * SPL_NS_PER_MS;
+    uint64_t until = spl_now_ns() + frame_ns(view);
     while (spl_remaining_ns(until)) {
         if (!spl_remaining_ns(view->deadline_ns))
             return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");

@@ -86,6 +86,46 @@ static void ogc_names_mean_the_same(void **state)
     assert_memory_equal(&a, &b, sizeof a);
 }
 
+static void demands_arrive(void **state)
+{
+    (void)state;
+    struct spl_view_request r;
+    struct spl_error err;
+    assert_int_equal(query("", &r, &err), 0);
+    assert_true(!r.planned && isnan(r.demand.budget_ms) && isnan(r.demand.psnr));
+    static const struct {
+        const char *text;
+        double ms;
+    } times[] = {{"50ms", 50}, {"0.05s", 50}, {"50", 50}, {".5", 0.5}, {"600s", 600000}};
+    char text[64];
+    for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
+        snprintf(text, sizeof text, "budget=%s", times[i].text);
+        assert_int_equal(query(text, &r, &err), 0);
+        assert_true(r.planned && r.demand.budget_ms == times[i].ms && isnan(r.demand.psnr));
+        snprintf(text, sizeof text, "{\"budget\": \"%s\"}", times[i].text);
+        assert_int_equal(json(text, &r, &err), 0);
+        assert_true(r.demand.budget_ms == times[i].ms);
+    }
+    assert_int_equal(json("{\"budget\": 50, \"psnr\": 38}", &r, &err), 0);
+    assert_true(r.demand.budget_ms == 50 && r.demand.psnr == 38);
+    assert_int_equal(query("psnr=38&method=points&lod=2&width=64&height=32", &r, &err), 0);
+    assert_true(r.planned && r.demand.keep_method && r.demand.keep_lod && !r.demand.keep_supersample);
+    assert_true(r.demand.kept.method == SPL_METHOD_POINTS && r.demand.kept.lod == 2);
+    assert_true(r.demand.width == 64 && r.demand.height == 32 && r.demand.layer == SPL_LAYER_COLOR);
+    static const char *const bad[] = {"budget=0",    "budget=0ms",   "budget=-1",   "budget=1m",
+                                      "budget=ms",   "budget=1.2.3", "budget=601s", "budget=1e2",
+                                      "budget=1 ms", "budget=inf",   "budget="};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(query(bad[i], &r, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "budget");
+    }
+    static const char *const worse[] = {"psnr=-1", "psnr=100.1", "psnr=nan", "psnr=30&layer=normal"};
+    for (size_t i = 0; i < sizeof worse / sizeof *worse; i++) {
+        assert_int_equal(query(worse[i], &r, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "psnr");
+    }
+}
+
 static void assert_same_pose(const struct spl_camera *a, const struct spl_camera *b)
 {
     for (int i = 0; i < 3; i++)
@@ -311,7 +351,7 @@ int main(void)
         cmocka_unit_test(nothing_given_is_the_default_view), cmocka_unit_test(every_parameter_arrives),
         cmocka_unit_test(ogc_names_mean_the_same),           cmocka_unit_test(camera_forms_agree),
         cmocka_unit_test(queries_are_refused_by_name),       cmocka_unit_test(bodies_are_refused_by_name),
-        cmocka_unit_test(percent_decoding_is_exact),
+        cmocka_unit_test(percent_decoding_is_exact),         cmocka_unit_test(demands_arrive),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,40 @@
+/* A dataset's profile as JSON or as a chart. Owned by the loop's thread. */
+#include <string.h>
+
+#include "service/state.h"
+
+/* Names the first parameter that is not "format" with a value we have. */
+static void refuse(struct request *request)
+{
+    char name[64] = "format";
+    for (const char *pair = request->query; *pair; pair += strcspn(pair, "&"), pair += *pair == '&') {
+        size_t length = strcspn(pair, "=&");
+        if (length == 6 && !strncmp(pair, "format", 6))
+            continue;
+        snprintf(name, sizeof name, "%.*s", (int)length, pair);
+        break;
+    }
+    spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", name, "a profile takes format=json or format=svg only");
+}
+
+static void reply_with(struct request *request, const struct spl_profile *profile)
+{
+    if (!strcmp(request->query, "") || !strcmp(request->query, "format=json"))
+        spl_reply_json(request, spl_profile_to_json(profile));
+    else
+        refuse(request);
+}
+
+void spl_show_profile(struct request *request, const struct spl_catalog_entry *entry, bool post)
+{
+    (void)post;
+    struct spl_error err = {0};
+    struct spl_profile profile;
+    if (spl_plan_copy_profile(entry->plan, &profile, &err)) {
+        err.code = err.code == SPL_E_NOMEM ? err.code : SPL_E_NOT_FOUND;
+        spl_reply_error(request, &err);
+        return;
+    }
+    reply_with(request, &profile);
+    spl_profile_finish(&profile);
+}

@@ -1,0 +1,193 @@
+"""Profiles and planned views over HTTP: what is chosen, promised and said of it, on a renderer whose frames take a known
+time by setting; profiles that are broken or about something else are ignored with a warning."""
+import contextlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import tempfile
+
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run
+
+PROFILE = "/v1/datasets/wall/profile"
+DEVICE = {"backend": "fake", "name": "flat colour", "driver": "tests", "software": True}
+MPX_MS = 100  # a megapixel of splats at lod=1; frame_ns() in tests/support/fake_renderer.c has the rest
+
+
+def point(method, lod, supersample, psnr, **more):
+    ms = MPX_MS * supersample ** 2 / lod * (0.25 if method == "points" else 1)
+    return {"method": method, "lod": lod, "supersample": supersample, "ms": ms, "ms_q90": 1.05 * ms, "fixed_ms": 0.1,
+            "ms_per_mpx": ms, "psnr": psnr, "psnr_sd": 0.5, "psnr_q05": psnr - 1, **more}
+
+
+def profile(version, **more):
+    return {"format": "splatd-profile", "format_version": 1, "splatd": "0.1.0",
+            "dataset": {"id": "wall", "version": version}, "device": DEVICE, "reference": "exact", "views": 8,
+            "width": 1000, "height": 1000,
+            "points": [point("points", 4, 1, 18), point("points", 1, 1, 22), point("splat", 4, 1, 26),
+                       point("splat", 2, 1, 30), point("splat", 1, 1, 33), point("splat", 1, 2, 36)], **more}
+
+
+def version():
+    with Daemon(FAKE) as d:
+        return d.ask("/v1/datasets/wall").json()["version"]
+
+
+VERSION = version()
+
+
+@contextlib.contextmanager
+def serving(document, binary=FAKE, **environment):
+    """A daemon over a copy of the wall with `document` (text, JSON or None) beside it, and that file's path."""
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = pathlib.Path(folder, "wall.spld")
+        shutil.copy(WALL, dataset)
+        path = dataset.with_name("wall.profile.json")
+        if document is not None:
+            path.write_text(document if isinstance(document, str) else json.dumps(document))
+        with Daemon(binary, datasets=[str(dataset)], **{"FAKE_FRAME_MS": 0, "FAKE_MPX_MS": MPX_MS, **environment}) as d:
+            yield d, path
+
+
+def fields(header):
+    return dict(part.split("=") for part in header.split("; "))
+
+
+def ask(d, **params):
+    """A planned view of 500 × 500 pixels (0.25 megapixels): what was chosen, and the reply."""
+    reply = d.view(width=500, height=500, format="raw", **params)
+    assert reply.status == 200, reply.body
+    chosen = fields(reply.headers["Splatd-Chosen"])
+    return (chosen["method"], float(chosen["lod"]), float(chosen["supersample"])), reply
+
+
+def test_profile_is_served():
+    with serving(profile(VERSION)) as (d, _):
+        assert d.ask("/v1/datasets/wall").json()["profile"] == PROFILE
+        served = d.ask(PROFILE).json()
+        assert served == d.ask(PROFILE + "?format=json").json()
+        assert served["dataset"] == {"id": "wall", "version": VERSION} and served["device"] == DEVICE
+        assert [p["psnr"] for p in served["points"]] == [18, 22, 26, 30, 33, 36]
+        assert [p["front"] for p in served["points"]] == [True, False, True, True, True, True]
+        assert served["points"][0]["ssim"] is None
+        for query, field in [("format=gif", "format"), ("x=1", "x"), ("format=json&x=1", "x"), ("format", "format")]:
+            reply = d.ask(f"{PROFILE}?{query}")
+            assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
+
+
+def test_without_a_profile_the_choice_is_cautious():
+    with serving(None) as (d, _):
+        reply = d.ask(PROFILE)
+        assert reply.status == 404 and "splatd bench" in reply.json()["detail"], reply.body
+        assert d.ask("/v1/datasets/wall").json()["profile"] is None
+        setting, reply = ask(d, budget="10ms")
+        assert setting[0] == "points" and "psnr" not in reply.headers["Splatd-Promised"]
+        setting, reply = ask(d, psnr=20)
+        assert setting == ("splat", 1, 2) and reply.headers["Splatd-Demand"] == "best-effort"
+
+
+def test_budget_and_psnr_choose():
+    with serving(profile(VERSION)) as (d, _):
+        setting, reply = ask(d, budget="24ms")  # 25 for lod=1, 12.5 for lod=2
+        assert setting == ("splat", 2, 1), setting
+        promised, took = fields(reply.headers["Splatd-Promised"]), fields(reply.headers["Splatd-Took"])
+        assert 12 < float(promised["ms"]) < 16 and 28.5 < float(promised["psnr"]) < 29.5, promised
+        assert float(took["ms"]) >= 12.5 and reply.headers["Cache-Control"] == "no-store"
+        timing = dict(re.findall(r"(\w+);dur=([\d.]+)", reply.headers["Server-Timing"]))
+        assert float(timing["total"]) >= float(took["ms"])
+        assert ask(d, budget="0.024s")[0] == setting and ask(d, budget="24")[0] == setting
+        assert ask(d, psnr=25.5)[0] == ("splat", 2, 1)  # 26 is the mean; a deviation of 0.5 promises less
+        setting, reply = ask(d, psnr=24.5, budget="1s")
+        assert setting == ("splat", 4, 1) and reply.headers["Splatd-Demand"] == "met"
+        setting, reply = ask(d, psnr=50)
+        assert setting == ("splat", 1, 2) and reply.headers["Splatd-Demand"] == "best-effort"
+        setting, reply = ask(d, psnr=32, budget="24ms")
+        assert setting == ("splat", 2, 1) and reply.headers["Splatd-Demand"] == "best-effort"
+        setting, reply = ask(d, budget="1ms")
+        assert setting == ("points", 4, 1) and reply.headers["Splatd-Demand"] == "best-effort"
+        plain = d.view(width=500, height=500)
+        assert plain.headers["Splatd-Chosen"] is None and plain.headers["Cache-Control"] is None
+        reply = d.post({"width": 500, "height": 500, "budget": 24, "format": "raw"})
+        assert fields(reply.headers["Splatd-Chosen"])["lod"] == "2"
+        reply = d.post({"width": 500, "height": 500, "budget": "24ms", "psnr": 20, "format": "raw"})
+        assert reply.headers["Splatd-Demand"] in ("met", "missed")
+
+
+def test_given_parameters_narrow_the_choice():
+    with serving(profile(VERSION)) as (d, _):
+        assert ask(d, budget="1s", method="points")[0] == ("points", 1, 1)
+        assert ask(d, budget="1s", lod=4, method="splat")[0] == ("splat", 4, 1)
+        assert ask(d, psnr=10, supersample=2)[0] == ("splat", 1, 2)
+        reply = d.view(budget="1s", lod=1.25)
+        assert reply.status == 400 and reply.json()["field"] == "lod", reply.body
+
+
+def test_profiles_that_cannot_be_trusted_are_ignored():
+    other = VERSION[:-1] + ("0" if VERSION[-1] != "0" else "1")
+    broken = profile(VERSION)
+    broken["points"][2]["ms"] = -1
+    cases = [("{", "broken JSON"), ("[]", "format"), (profile(VERSION, format_version=2), "format_version"),
+             (broken, "ms -1 is outside"), (profile(other), f"version {other}"),
+             (profile(VERSION, device={**DEVICE, "name": "a real GPU"}), "a real GPU"),
+             (profile(VERSION, device={**DEVICE, "driver": "tests 2"}), "tests 2"),
+             (profile(VERSION, points=[]), "points"), ("x" * (2 << 20), "no profile")]
+    for document, said in cases:
+        with serving(document) as (d, _):
+            reply = d.ask(PROFILE)
+            assert reply.status == 404 and said in reply.json()["detail"], (said, reply.body)
+            assert d.ask("/v1/datasets/wall").json()["profile"] is None
+            assert ask(d, budget="10ms")[0][0] == "points"
+            warnings = [line for line in d.lines if "warning" in line and "profile ignored" in line]
+            assert len(warnings) == 1 and said in warnings[0], d.lines
+
+
+def test_a_new_profile_is_read_without_a_restart():
+    with serving(None) as (d, path):
+        ask(d, budget="24ms")
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps(profile(VERSION)))
+        part.rename(path)
+        assert ask(d, budget="24ms")[0] == ("splat", 2, 1)
+        assert d.ask(PROFILE).status == 200
+        path.write_text("{")
+        ask(d, budget="24ms")
+        assert d.ask(PROFILE).status == 404
+
+
+def test_a_slower_machine_is_learned():
+    with serving(profile(VERSION), FAKE_MPX_MS=2 * MPX_MS) as (d, _):
+        promised, took = 0, 0
+        for i in range(30):  # 25 ms at lod=2 instead of 12.5
+            setting, reply = ask(d, budget="40ms")
+            if i >= 20:
+                promised += float(fields(reply.headers["Splatd-Promised"])["ms"])
+                took += float(fields(reply.headers["Splatd-Took"])["ms"])
+        assert setting == ("splat", 2, 1), setting
+        assert 0.7 < promised / took < 1.4, (promised, took)
+
+
+def test_the_deadline_caps_a_budget():
+    with serving(profile(VERSION)) as (d, _):
+        assert ask(d, budget="9s")[0] == ("splat", 1, 2)
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = shutil.copy(WALL, folder)
+        pathlib.Path(folder, "wall.profile.json").write_text(json.dumps(profile(VERSION)))
+        with Daemon(FAKE, "--deadline", "80", datasets=[dataset], FAKE_FRAME_MS=0, FAKE_MPX_MS=1) as d:
+            assert ask(d, budget="9s")[0] == ("splat", 1, 1)  # 100 ms were promised of the next one
+
+
+def test_a_real_renderer_takes_what_is_chosen():
+    with Daemon(REAL) as d:
+        status = d.status()["device"]
+        device = {k: status[k] for k in DEVICE}
+    with serving(profile(VERSION, device=device), REAL) as (d, _):
+        assert d.ask(PROFILE).status == 200
+        for params in [{"budget": "1ms"}, {"budget": "10s"}, {"psnr": 25}, {"budget": "50ms", "layer": "depth"}]:
+            chosen, reply = ask(d, **params)
+            again = d.view(width=500, height=500, format="raw", method=chosen[0], lod=chosen[1],
+                           supersample=int(chosen[2]), layer=params.get("layer", "color"))
+            assert reply.body == again.body, chosen
+
+
+run(globals())
