@@ -146,7 +146,8 @@ static int write_report(const struct spl_cmd_bench_sweep *o, const struct spl_re
     if (!rc)
         rc = write_file(o->output, "bench.csv", csv, csv_length, err);
     if (!rc)
-        rc = spl_report_chart(&report->profile, report->calibrator.median, peers, &svg, &svg_length, err);
+        rc = spl_report_chart(&report->profile, spl_dataset_get_info(report->sweep->options->dataset)->leaf_splats,
+                              report->calibrator.median, peers, &svg, &svg_length, err);
     if (!rc)
         rc = write_file(o->output, "chart.svg", svg, svg_length, err);
     if (!rc)

@@ -162,7 +162,10 @@ static void write_points(const struct layout *l)
         spl_markup_text(l->out, at->curve->name);
         fputs(p->label[0] ? " " : "", l->out);
         spl_markup_text(l->out, p->label);
-        fprintf(l->out, ": %.2f dB, %.4g ms", p->psnr, p->ms);
+        if (isfinite(p->psnr))
+            fprintf(l->out, ": %.2f dB, %.4g ms", p->psnr, p->ms);
+        else
+            fprintf(l->out, ": equal, %.4g ms", p->ms);
         fputs(p->detail[0] ? "; " : "", l->out);
         spl_markup_text(l->out, p->detail);
         fprintf(l->out, "</title><circle class=\"s%u ", color);
@@ -223,7 +226,7 @@ static void write_legend(const struct layout *l, const struct spl_chart *chart)
     for (size_t c = 0; c < chart->curve_count; c++) {
         const struct spl_chart_curve *curve = &chart->curves[c];
         double w = 34 + 6.8 * (double)strlen(curve->name) + 14;
-        if (x + w > WIDTH - 90)
+        if (x + w > WIDTH - RIGHT - 170)
             break;
         fprintf(l->out,
                 "<path class=\"curve s%u\" stroke-dasharray=\"%s\" d=\"M%.1f 50h26\"/><text x=\"%.1f\" y=\"54\">",
@@ -232,7 +235,8 @@ static void write_legend(const struct layout *l, const struct spl_chart *chart)
         fputs("</text>\n", l->out);
         x += w;
     }
-    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"54\" text-anchor=\"end\">filled: the front</text>\n",
+    fprintf(l->out,
+            "<text class=\"soft\" x=\"%d\" y=\"54\" text-anchor=\"end\">labels: lod; filled: the front</text>\n",
             WIDTH - RIGHT);
 }
 
@@ -246,7 +250,8 @@ static void write_chart(struct layout *l, const struct spl_chart *chart)
     fprintf(l->out, "</title>\n%s<rect class=\"ground\" width=\"%d\" height=\"%d\"/>\n", style, WIDTH, HEIGHT);
     fprintf(l->out, "<text x=\"%d\" y=\"20\" font-size=\"15\" font-weight=\"600\">", LEFT);
     spl_markup_text(l->out, chart->title);
-    fprintf(l->out, "</text>\n<text class=\"soft\" x=\"%d\" y=\"37\" font-size=\"11\">", LEFT);
+    double fits = (WIDTH - LEFT - RIGHT) / (0.55 * (double)(strlen(chart->subtitle) + 1));
+    fprintf(l->out, "</text>\n<text class=\"soft\" x=\"%d\" y=\"37\" font-size=\"%.1f\">", LEFT, fits < 11 ? fits : 11);
     spl_markup_text(l->out, chart->subtitle);
     fputs("</text>\n", l->out);
     write_legend(l, chart);

@@ -68,8 +68,8 @@ static void add_peers(struct build *b, const struct spl_peers *peers)
     }
 }
 
-int spl_report_chart(const struct spl_profile *profile, double calibrator_ms, const struct spl_peers *peers, char **svg,
-                     size_t *length, struct spl_error *err)
+int spl_report_chart(const struct spl_profile *profile, uint64_t splats, double calibrator_ms,
+                     const struct spl_peers *peers, char **svg, size_t *length, struct spl_error *err)
 {
     *svg = NULL;
     size_t peer_count = peers ? peers->count : 0;
@@ -90,12 +90,14 @@ int spl_report_chart(const struct spl_profile *profile, double calibrator_ms, co
     for (size_t i = 0; i < sizeof references / sizeof *references; i++)
         if (!strcmp(references[i].name, profile->reference))
             against = references[i].text;
-    char title[256], subtitle[512], unit[64] = "";
+    char title[256], subtitle[512], unit[64] = "", many[64] = "";
+    if (splats)
+        snprintf(many, sizeof many, ", %.3g million splats", 1e-6 * (double)splats);
     if (calibrator_ms > 0)
         snprintf(unit, sizeof unit, "; calibrator %.3g ms", calibrator_ms);
-    snprintf(title, sizeof title, "%s: accuracy against time", profile->dataset_id);
-    snprintf(subtitle, sizeof subtitle, "%u views of %u×%u against %s; %s%s; labels: lod", profile->views,
-             profile->width, profile->height, against, profile->device, unit);
+    snprintf(title, sizeof title, "%s%s: accuracy against time", profile->dataset_id, many);
+    snprintf(subtitle, sizeof subtitle, "%u views of %u×%u against %s; %s%s", profile->views, profile->width,
+             profile->height, against, profile->device, unit);
     struct spl_chart chart = {.title = title, .subtitle = subtitle, .curves = b.curves, .curve_count = b.curve_count};
     rc = spl_chart_write(&chart, svg, length, err);
 done:
