@@ -126,20 +126,14 @@ void spl_motion_init(struct spl_motion *motion)
     *motion = (struct spl_motion){0};
 }
 
-static bool is_color(const struct spl_image *image)
-{
-    return image->layer == SPL_LAYER_COLOR && image->type == SPL_PIXEL_RGBA8 && image->width && image->height &&
-           image->pixels;
-}
-
 int spl_motion_add(struct spl_motion *motion, const struct spl_image *image, const struct spl_image *truth,
                    unsigned threads, struct spl_error *err)
 {
     bool first = !motion->previous;
     uint32_t width = first ? image->width : motion->width, height = first ? image->height : motion->height;
-    if (!is_color(image) || !is_color(truth))
+    if (!spl_metrics_is_color(image) || !spl_metrics_is_color(truth))
         return spl_fail_field(err, SPL_E_INPUT, "color", "%s of the path has no colour",
-                              is_color(image) ? "the truth" : "the image");
+                              spl_metrics_is_color(image) ? "the truth" : "the image");
     if (image->width != width || image->height != height || truth->width != width || truth->height != height)
         return spl_fail_field(
             err, SPL_E_INPUT, "color",

@@ -13,6 +13,12 @@ enum { SPL_METRICS_ROWS = 8, SPL_METRICS_BLOCK = 1024 };
 /* One level that both pictures are laid over: neither bright nor dark ones gain by being absent. */
 enum { SPL_METRICS_BACKGROUND = 128 };
 
+static inline bool spl_metrics_is_color(const struct spl_image *image)
+{
+    return image->layer == SPL_LAYER_COLOR && image->type == SPL_PIXEL_RGBA8 && image->width && image->height &&
+           image->pixels;
+}
+
 /* `count` RGBA8 pixels (straight alpha) over the background, as three planes; count <= SPL_METRICS_BLOCK. */
 void spl_metrics_flatten(const uint32_t *pixels, size_t count, uint8_t rgb[3][SPL_METRICS_BLOCK]);
 

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
+#include "measure/error_map.h"
 #include "measure/metrics.h"
 
 static bool close_to(double a, double b, double within)
@@ -344,7 +345,7 @@ static void normals_are_lines_without_a_sign(void **state)
     float image[] = {0, 0, -1, 0, s, c, 1, 0, 0, 1, 0, 0, NAN, 0, 1, 2, 0.002f, 0};
     struct spl_image t = wrap(SPL_LAYER_NORMAL, 6, 1, truth), i = wrap(SPL_LAYER_NORMAL, 6, 1, image);
     struct spl_metrics m = compare((struct spl_picture){.normal = &i}, (struct spl_picture){.normal = &t});
-    double small = 0.001 * 180 / M_PI; /* an arc cosine in floats would say 0 or 0.06 */
+    double small = 0.001 * 180 / M_PI; /* not of unit length, either */
     assert_true(close_to(m.normal_mean, (0 + 30 + 90 + small) / 4, 1e-4));
     assert_true(close_to(m.normal_median, (30 + small) / 2, 1e-4));
 }
@@ -470,6 +471,36 @@ static void an_offset_in_depth_shows_and_only_there(void **state)
         }
 }
 
+static void an_error_map_is_eight_times_the_difference(void **state)
+{
+    (void)state;
+    enum { width = 1030 }; /* beyond a block */
+    struct spl_image a = make_flat(width, 2, 100, 100, 100), b = make_flat(width, 2, 100, 100, 100), map;
+    set(&a, 5, 0, 101, 90, 0, 255);
+    set(&a, width - 1, 1, 255, 255, 255, 0); /* nothing there: grey 128 */
+    assert_int_equal(spl_error_map(&a, &b, &map, NULL), 0);
+    assert_true(map.layer == SPL_LAYER_COLOR && map.type == SPL_PIXEL_RGBA8 && map.width == width && map.height == 2);
+    const uint8_t *p = map.pixels;
+    assert_memory_equal(p, "\0\0\0\377", 4);
+    assert_memory_equal(p + 4 * 5, "\10\120\377\377", 4);
+    assert_memory_equal(p + 4 * (2 * width - 1), "\340\340\340\377", 4);
+    spl_image_finish(&map);
+    struct spl_error err = {0};
+    b.width--;
+    assert_int_equal(spl_error_map(&a, &b, &map, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "color");
+    assert_null(map.pixels);
+    b.width++;
+    b.type = SPL_PIXEL_F32;
+    assert_int_equal(spl_error_map(&a, &b, &map, NULL), SPL_E_INPUT);
+    b.type = SPL_PIXEL_RGBA8;
+    spl_memory_fail_after(1);
+    assert_int_equal(spl_error_map(&a, &b, &map, NULL), SPL_E_NOMEM);
+    spl_memory_fail_after(0);
+    spl_image_finish(&a);
+    spl_image_finish(&b);
+}
+
 /* ---- along a path ---- */
 
 static void flicker_is_change_that_the_truth_does_not_have(void **state)
@@ -548,6 +579,7 @@ int main(void)
         cmocka_unit_test(swapped_channels_show),
         cmocka_unit_test(one_dark_pixel_shows),
         cmocka_unit_test(an_offset_in_depth_shows_and_only_there),
+        cmocka_unit_test(an_error_map_is_eight_times_the_difference),
         cmocka_unit_test(flicker_is_change_that_the_truth_does_not_have),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,250 @@
+/* splatd compare: the figures of api/measures.md for two pictures in files. A picture is one image, or a stem whose
+ * layers lie in STEM.color.png, STEM.depth.npy and so on, as `splatd synth --views` writes them. */
+#include "cmd/cmd.h"
+
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include <jansson.h>
+
+#include "cmd/options.h"
+#include "cmd/output.h"
+#include "image/load.h"
+#include "measure/error_map.h"
+#include "measure/metrics.h"
+
+struct arguments {
+    const char *image, *truth, *map; /* map may be NULL */
+    double tolerance;
+    uint64_t threads;
+    int layer; /* of a single file */
+    bool json;
+};
+
+static void usage(FILE *out)
+{
+    fprintf(
+        out,
+        "usage: splatd compare IMAGE TRUTH [--tolerance D] [--error-map FILE.png] [--json]\n\n"
+        "Says how far IMAGE is from TRUTH. Each is a file (PNG, JPEG, NPY), or a stem: the layers are then read from\n"
+        "STEM.color.png (or .jpg), STEM.depth.npy (or .png), STEM.normal.npy and STEM.coverage.npy, as far as both\n"
+        "have them.\n\n"
+        "Two photographs or renders:\n"
+        "  splatd compare render.png photograph.jpg --error-map difference.png\n"
+        "All layers of a view against the exact ones, depth within 2 cm:\n"
+        "  splatd compare out/east scan/truth/east --tolerance 0.02\n"
+        "One depth image, for a script:\n"
+        "  splatd compare depth.npy truth.npy --layer depth --json\n\n"
+        "      --tolerance D      depth that may be off, the dataset's unit; the splat radius is apt (default 0)\n"
+        "      --layer LAYER      of single files: color (default), depth, normal or coverage\n"
+        "      --error-map FILE   8 times the difference of the colours, as PNG\n"
+        "      --json             one object, null where a figure is undefined; psnr is null for equal images, too\n"
+        "      --threads N        default: all cores\n\n"
+        "Figures go to stdout, messages to stderr. What each means: api/measures.md.\n");
+}
+
+static bool is_file(const char *path)
+{
+    struct stat status;
+    return !stat(path, &status) && S_ISREG(status.st_mode);
+}
+
+/* Fills the layers that are there; the rest stays zeroed. */
+static int load(const struct arguments *a, const char *path, struct spl_image images[SPL_LAYER_COUNT],
+                struct spl_error *err)
+{
+    static const struct {
+        enum spl_layer layer;
+        const char *ending;
+    } places[] = {
+        {SPL_LAYER_COLOR, "png"}, {SPL_LAYER_COLOR, "jpg"},  {SPL_LAYER_DEPTH, "npy"},
+        {SPL_LAYER_DEPTH, "png"}, {SPL_LAYER_NORMAL, "npy"}, {SPL_LAYER_COVERAGE, "npy"},
+    };
+    char name[4096];
+    int found = 0, rc = SPL_OK;
+    if (is_file(path))
+        return spl_image_load(path, (enum spl_layer)a->layer, &images[a->layer], err);
+    for (size_t i = 0; !rc && i < sizeof places / sizeof *places; i++) {
+        struct spl_image *image = &images[places[i].layer];
+        int length = snprintf(name, sizeof name, "%s.%s.%s", path, spl_layer_name(places[i].layer), places[i].ending);
+        if (image->pixels || (size_t)length >= sizeof name || !is_file(name))
+            continue;
+        rc = spl_image_load(name, places[i].layer, image, err);
+        found++;
+    }
+    if (!rc && !found)
+        return spl_fail(err, SPL_E_NOT_FOUND, "'%s' is no file, and no '%s.color.png', '.depth.npy', … is there", path,
+                        path);
+    return rc;
+}
+
+static int print_json(const struct spl_metrics *m, struct spl_error *err)
+{
+    const struct {
+        const char *name;
+        double value;
+    } rows[] = {
+        {"psnr", m->psnr},
+        {"ssim", m->ssim},
+        {"depth_rmse", m->depth_rmse},
+        {"depth_median", m->depth_median},
+        {"depth_beyond", m->depth_beyond},
+        {"holes", m->holes},
+        {"see_through", m->see_through},
+        {"halo", m->halo},
+        {"normal_mean", m->normal_mean},
+        {"normal_median", m->normal_median},
+    };
+    json_t *object = json_object();
+    int wrong = 0;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        wrong |=
+            json_object_set_new(object, rows[i].name, isfinite(rows[i].value) ? json_real(rows[i].value) : json_null());
+    char *text = wrong ? NULL : json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_decref(object);
+    if (!text)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the figures");
+    puts(text);
+    free(text);
+    return SPL_OK;
+}
+
+static void print_figure(const char *name, double value, const char *unit)
+{
+    if (!isnan(value))
+        printf("%-14s %.6g%s\n", name, value, unit);
+}
+
+static void print_table(const struct spl_metrics *m)
+{
+    print_figure("PSNR", m->psnr, " dB");
+    print_figure("SSIM", m->ssim, "");
+    print_figure("depth RMSE", m->depth_rmse, "");
+    print_figure("depth median", m->depth_median, "");
+    print_figure("depth beyond", 100 * m->depth_beyond, " %");
+    print_figure("see-through", 100 * m->see_through, " %");
+    print_figure("holes", 100 * m->holes, " %");
+    print_figure("halo", 100 * m->halo, " %");
+    print_figure("normal mean", m->normal_mean, " degrees");
+    print_figure("normal median", m->normal_median, " degrees");
+}
+
+static int write_map(const struct arguments *a, const struct spl_image *image, const struct spl_image *truth,
+                     struct spl_error *err)
+{
+    struct spl_image map = {0};
+    struct spl_encoded encoded = {0};
+    if (!image->pixels || !truth->pixels)
+        return spl_fail(err, SPL_E_INPUT, "--error-map needs the colours of both");
+    int rc = spl_error_map(image, truth, &map, err);
+    if (!rc)
+        rc = spl_image_encode(&map, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, err);
+    if (!rc)
+        rc = spl_cmd_write_output(a->map, encoded.bytes, encoded.length, err);
+    spl_encoded_finish(&encoded);
+    spl_image_finish(&map);
+    return rc;
+}
+
+static int compare(const struct arguments *a, struct spl_error *err)
+{
+    static const enum spl_layer layers[] = {SPL_LAYER_COLOR, SPL_LAYER_DEPTH, SPL_LAYER_NORMAL, SPL_LAYER_COVERAGE};
+    struct spl_image images[SPL_LAYER_COUNT] = {0}, truths[SPL_LAYER_COUNT] = {0};
+    struct spl_metrics metrics;
+    const struct spl_image *image[4], *truth[4];
+    int common = 0, rc = load(a, a->image, images, err);
+    if (!rc)
+        rc = load(a, a->truth, truths, err);
+    for (int i = 0; !rc && i < 4; i++) {
+        bool left = images[layers[i]].pixels, right = truths[layers[i]].pixels;
+        common += left && right;
+        image[i] = left ? &images[layers[i]] : NULL;
+        truth[i] = right ? &truths[layers[i]] : NULL;
+        if (left != right)
+            fprintf(stderr, "splatd: %s has no %s: not compared\n", left ? a->truth : a->image,
+                    spl_layer_name(layers[i]));
+    }
+    if (!rc && !common)
+        rc = spl_fail(err, SPL_E_INPUT, "'%s' and '%s' have no layer in common", a->image, a->truth);
+    if (!rc)
+        rc = spl_metrics_compare(&(struct spl_picture){image[0], image[1], image[2], image[3]},
+                                 &(struct spl_picture){truth[0], truth[1], truth[2], truth[3], NULL, a->tolerance},
+                                 (unsigned)a->threads, &metrics, err);
+    if (!rc && a->map)
+        rc = write_map(a, &images[SPL_LAYER_COLOR], &truths[SPL_LAYER_COLOR], err);
+    if (!rc && a->json)
+        rc = print_json(&metrics, err);
+    else if (!rc)
+        print_table(&metrics);
+    for (int i = 0; i < SPL_LAYER_COUNT; i++) {
+        spl_image_finish(&images[i]);
+        spl_image_finish(&truths[i]);
+    }
+    return rc;
+}
+
+static int parse_layer(const char *text, int *layer, struct spl_error *err)
+{
+    *layer = spl_layer_from_name(text);
+    bool good = *layer == SPL_LAYER_COLOR || *layer == SPL_LAYER_DEPTH || *layer == SPL_LAYER_NORMAL ||
+                *layer == SPL_LAYER_COVERAGE;
+    return good ? SPL_OK
+                : spl_fail(err, SPL_E_USAGE, "--layer takes color, depth, normal or coverage, not '%.32s'", text);
+}
+
+int spl_cmd_compare(int argc, char **argv)
+{
+    enum { opt_tolerance = 256, opt_layer, opt_map, opt_json, opt_threads };
+    static const struct option options[] = {
+        {"tolerance", required_argument, NULL, opt_tolerance},
+        {"layer", required_argument, NULL, opt_layer},
+        {"error-map", required_argument, NULL, opt_map},
+        {"json", no_argument, NULL, opt_json},
+        {"threads", required_argument, NULL, opt_threads},
+        {"help", no_argument, NULL, 'h'},
+        {0},
+    };
+    struct arguments a = {.layer = SPL_LAYER_COLOR};
+    struct spl_error err = {0};
+    int rc = SPL_OK;
+    for (int c; (c = getopt_long(argc, argv, "h", options, NULL)) >= 0;) {
+        switch (c) {
+        case opt_tolerance:
+            rc = spl_cmd_parse_real("--tolerance", optarg, 0, 1e12, &a.tolerance, &err);
+            break;
+        case opt_layer:
+            rc = parse_layer(optarg, &a.layer, &err);
+            break;
+        case opt_map:
+            a.map = optarg;
+            break;
+        case opt_json:
+            a.json = true;
+            break;
+        case opt_threads:
+            rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a.threads, &err);
+            break;
+        case 'h':
+            usage(stdout);
+            return 0;
+        default:
+            fprintf(stderr, "'splatd compare --help' shows how\n");
+            return 2;
+        }
+        if (rc)
+            return spl_cmd_fail(&err);
+    }
+    if (argc - optind != 2) {
+        fprintf(stderr, "splatd: compare takes an IMAGE and a TRUTH; 'splatd compare --help' shows how\n");
+        return 2;
+    }
+    a.image = argv[optind];
+    a.truth = argv[optind + 1];
+    if (compare(&a, &err))
+        return spl_cmd_fail(&err);
+    return fflush(stdout) ? spl_cmd_fail(&(struct spl_error){.code = SPL_E_IO, .message = "cannot write to stdout"})
+                          : 0;
+}
