@@ -112,19 +112,19 @@ static void fill_accuracy(struct spl_report *report, size_t setting, double *val
     const struct spl_sweep *sweep = report->sweep;
     struct spl_profile_point *p = &report->profile.points[setting];
     size_t views = sweep->options->views->count, count = 0;
-    double error = 0, sum = 0, squares = 0;
+    double sum = 0, squares = 0;
     for (size_t v = 0; v < views; v++) {
-        double psnr = fmin(spl_sweep_get_accuracy(sweep, setting, v)->metrics.psnr, SPL_PROFILE_PSNR_MAX);
+        double psnr = spl_sweep_get_accuracy(sweep, setting, v)->metrics.psnr;
         if (isnan(psnr))
             continue;
+        psnr = fmin(psnr, SPL_PROFILE_PSNR_MAX);
         values[count++] = psnr;
-        error += pow(10, -psnr / 10);
         sum += psnr;
     }
     for (size_t i = 0; i < count; i++)
         squares += pow(values[i] - sum / (double)count, 2);
     spl_summarise(values, count);
-    p->psnr = count ? -10 * log10(error / (double)count) : (double)NAN;
+    p->psnr = count ? sum / (double)count : (double)NAN;
     p->psnr_sd = count > 1 ? sqrt(squares / (double)(count - 1)) : (double)NAN;
     p->psnr_q05 = count ? spl_quantile(values, count, 0.05) : (double)NAN;
     p->ssim = mean_of(sweep, setting, offsetof(struct spl_metrics, ssim), 1);
@@ -137,6 +137,21 @@ static void fill_accuracy(struct spl_report *report, size_t setting, double *val
     for (size_t v = 0; v < views; v++)
         values[v] = spl_sweep_get_accuracy(sweep, setting, v)->splats;
     p->splats = spl_summarise(values, views).median;
+}
+
+/* PSNR of all views' pixels together. */
+static double psnr_overall(const struct spl_sweep *sweep, size_t setting)
+{
+    double error = 0;
+    size_t count = 0;
+    for (size_t v = 0; v < sweep->options->views->count; v++) {
+        double psnr = spl_sweep_get_accuracy(sweep, setting, v)->metrics.psnr;
+        if (isnan(psnr))
+            continue;
+        error += pow(10, -fmin(psnr, SPL_PROFILE_PSNR_MAX) / 10);
+        count++;
+    }
+    return count ? -10 * log10(error / (double)count) : (double)NAN;
 }
 
 int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, struct spl_error *err)
@@ -203,6 +218,8 @@ static int add_details(json_t *row, const struct spl_sweep *sweep, size_t settin
         failed |= json_array_append_new(list, view_json(sweep, setting, v));
     }
     failed |= json_object_set_new(row, "spread", json_real(spl_summarise(values, views).median));
+    double overall = psnr_overall(sweep, setting);
+    failed |= json_object_set_new(row, "psnr_overall", isnan(overall) ? json_null() : json_real(overall));
     failed |= json_object_set_new(row, "device_ms", json_real(device));
     failed |= json_object_set_new(row, "stages_ms", passes);
     failed |= json_object_set_new(row, "views", list);
@@ -268,7 +285,8 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
         free(values);
         return spl_fail(err, SPL_E_NOMEM, "out of memory: the table could not be written");
     }
-    fputs("method,lod,supersample,front,ms,ms_q90,device_ms,splats,psnr,psnr_sd,psnr_q05,ssim,depth_rmse,depth_beyond,"
+    fputs("method,lod,supersample,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
+          "depth_rmse,depth_beyond,"
           "holes,"
           "see_through,halo,normal_mean\n",
           out);
@@ -277,11 +295,11 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
         fprintf(out, "%s,%g,%g,%d", spl_method_name(p->setting.method), p->setting.lod, p->setting.supersample,
                 p->front);
         const double numbers[] = {
-            p->ms,           p->ms_q90,     over_views(sweep, s, SPL_SWEEP_FULL, pick_device, values),
-            p->splats,       p->psnr,       p->psnr_sd,
-            p->psnr_q05,     p->ssim,       p->depth_rmse,
-            p->depth_beyond, p->holes,      p->see_through,
-            p->halo,         p->normal_mean};
+            p->ms,          p->ms_q90,       over_views(sweep, s, SPL_SWEEP_FULL, pick_device, values),
+            p->splats,      p->psnr,         psnr_overall(sweep, s),
+            p->psnr_sd,     p->psnr_q05,     p->ssim,
+            p->depth_rmse,  p->depth_beyond, p->holes,
+            p->see_through, p->halo,         p->normal_mean};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
             put(out, numbers[i]);
         fputc('\n', out);

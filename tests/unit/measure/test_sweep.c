@@ -460,7 +460,7 @@ static void test_report(void **state)
     const struct spl_profile_point *p = report.profile.points;
     assert_true(p[0].ms == 16); /* views: 12 and 20 */
     assert_true(fabs(p[0].ms_q90 - (12 + 0.9 * 8)) < 1e-9);
-    assert_true(fabs(p[0].psnr + 10 * log10((0.01 + 0.001) / 2)) < 1e-9);
+    assert_true(p[0].psnr == 25);
     assert_true(fabs(p[0].psnr_q05 - 20.5) < 1e-9 && fabs(p[0].psnr_sd - sqrt(50)) < 1e-9);
     assert_true(fabs(p[0].ssim - 0.6) < 1e-9 && fabs(p[0].depth_rmse - sqrt(12.5)) < 1e-9 && p[0].holes == 0.25);
     assert_true(p[1].psnr == SPL_PROFILE_PSNR_MAX && p[1].front && !p[0].front);
@@ -476,7 +476,14 @@ static void test_report(void **state)
         json_array_get(json_object_get(json_array_get(json_object_get(json, "points"), 0), "views"), 1);
     assert_string_equal(json_string_value(json_object_get(view, "view")), "b");
     assert_true(json_number_value(json_object_get(json_object_get(view, "ms"), "median")) == 20);
+    const json_t *overall = json_object_get(json_array_get(json_object_get(json, "points"), 0), "psnr_overall");
+    assert_true(fabs(json_number_value(overall) + 10 * log10((0.01 + 0.001) / 2)) < 1e-9);
     json_decref(json);
+    accuracy[0].metrics.psnr = accuracy[1].metrics.psnr = NAN; /* a view without any pixel to compare */
+    struct spl_report without;
+    assert_int_equal(spl_report_init(&without, &sweep, NULL), 0);
+    assert_true(isnan(without.profile.points[0].psnr) && !without.profile.points[0].front);
+    spl_report_finish(&without);
     struct spl_peer peer[] = {{"other", 5, 33}, {"third", 6, 31}, {"other", 9, 35}};
     assert_int_equal(spl_report_chart(&report.profile, 1, 22, &(struct spl_peers){peer, 3}, &svg, &length, NULL), 0);
     assert_int_equal(count_of(svg, "<circle"), 5);
