@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "measure/calibrator.h"
+#include "measure/error_map.h"
 #include "measure/record.h"
 #include "measure/state.h"
 #include "measure/thumbnail.h"
@@ -71,11 +72,10 @@ void spl_sweep_picture_path(const struct spl_sweep_options *o, enum spl_sweep_pi
 }
 
 static int save_picture(const struct spl_sweep_options *o, enum spl_sweep_picture kind, size_t view, size_t setting,
-                        const struct spl_image *image, const struct spl_image *truth, struct spl_error *err)
+                        const struct spl_image *color, struct spl_error *err)
 {
     struct spl_encoded encoded;
-    int rc = kind == SPL_SWEEP_ERROR ? spl_thumbnail_error(image, truth, SPL_SWEEP_PICTURE_SIDE, &encoded, err)
-                                     : spl_thumbnail_color(image, SPL_SWEEP_PICTURE_SIDE, &encoded, err);
+    int rc = spl_thumbnail(color, SPL_SWEEP_PICTURE_SIDE, &encoded, err);
     if (rc)
         return rc;
     char path[4096];
@@ -86,6 +86,20 @@ static int save_picture(const struct spl_sweep_options *o, enum spl_sweep_pictur
     if (failed)
         rc = spl_fail_errno(err, errno, "cannot write %s", path);
     spl_encoded_finish(&encoded);
+    return rc;
+}
+
+/* What a setting's point shows on the page. */
+static int save_pictures(const struct spl_sweep_options *o, size_t view, size_t setting, const struct spl_image *color,
+                         const struct spl_image *truth, struct spl_error *err)
+{
+    struct spl_image map = {0};
+    int rc = save_picture(o, SPL_SWEEP_RENDER, view, setting, color, err);
+    if (!rc)
+        rc = spl_error_map(color, truth, &map, err);
+    if (!rc)
+        rc = save_picture(o, SPL_SWEEP_ERROR, view, setting, &map, err);
+    spl_image_finish(&map);
     return rc;
 }
 
@@ -163,12 +177,8 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_i
     rc = spl_metrics_compare(&image, &reference, 0, &a->metrics, err);
     a->splats = (double)frame.stats.splats_drawn;
     a->complete = frame.stats.complete;
-    if (!rc && has_pictures(o->views->count, v)) {
-        const struct spl_image *color = &frame.images[SPL_LAYER_COLOR];
-        rc = save_picture(o, SPL_SWEEP_RENDER, v, setting, color, NULL, err);
-        if (!rc)
-            rc = save_picture(o, SPL_SWEEP_ERROR, v, setting, color, &truth[SPL_LAYER_COLOR], err);
-    }
+    if (!rc && has_pictures(o->views->count, v))
+        rc = save_pictures(o, v, setting, &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR], err);
     spl_frame_finish(&frame);
     if (!rc)
         rc = spl_state_add(job->state, spl_record_accuracy(setting, v, a), err);
@@ -192,7 +202,7 @@ static int compare_view(struct job *job, size_t v, struct spl_error *err)
     if (o->reference.kind == SPL_REFERENCE_SELF)
         job->rendering_ns += spl_now_ns() - begin;
     if (!rc && has_pictures(o->views->count, v))
-        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &truth[SPL_LAYER_COLOR], NULL, err);
+        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &truth[SPL_LAYER_COLOR], err);
     for (size_t s = 0; !rc && s < o->setting_count; s++) {
         if (spl_sweep_get_accuracy(job->sweep, s, v)->done)
             continue;

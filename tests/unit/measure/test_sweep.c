@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "dataset/dataset.h"
+#include "image/load.h"
 #include "measure/chart.h"
 #include "measure/markup.h"
 #include "measure/peers.h"
@@ -406,18 +407,31 @@ static void test_tolerance(void **state)
 static void test_thumbnails(void **state)
 {
     (void)state;
-    uint8_t a[5 * 3 * 4] = {0}, b[5 * 3 * 4] = {0};
-    struct spl_image image = {.layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = 5, .height = 3, .pixels = a};
-    struct spl_image truth = image;
-    truth.pixels = b;
-    struct spl_encoded out;
-    assert_int_equal(spl_thumbnail_color(&image, 2, &out, NULL), 0);
-    assert_true(out.length > 4 && out.bytes[0] == 0xff && out.bytes[1] == 0xd8);
-    spl_encoded_finish(&out);
-    assert_int_equal(spl_thumbnail_error(&image, &truth, 640, &out, NULL), 0);
-    spl_encoded_finish(&out);
-    truth.width = 4;
-    assert_int_equal(spl_thumbnail_error(&image, &truth, 640, &out, NULL), SPL_E_USAGE);
+    uint8_t pixels[5 * 3 * 4];
+    memset(pixels, 255, sizeof pixels);
+    struct spl_image image = {
+        .layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = 5, .height = 3, .pixels = pixels};
+    static const struct {
+        uint32_t side, width, height;
+    } cases[] = {{640, 5, 3}, {5, 5, 3}, {4, 3, 2}, {2, 2, 1}, {1, 1, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_encoded out;
+        struct spl_image back;
+        char path[300];
+        assert_int_equal(spl_thumbnail(&image, cases[i].side, &out, NULL), 0);
+        snprintf(path, sizeof path, "%s/t.jpg", folder);
+        FILE *file = fopen(path, "w");
+        assert_int_equal(fwrite(out.bytes, 1, out.length, file), out.length);
+        fclose(file);
+        spl_encoded_finish(&out);
+        assert_int_equal(spl_image_load(path, SPL_LAYER_COLOR, &back, NULL), 0);
+        assert_int_equal(back.width, cases[i].width);
+        assert_int_equal(back.height, cases[i].height);
+        for (size_t p = 0; p < (size_t)4 * back.width * back.height;
+             p++) /* no edge pixel is mixed with what is outside */
+            assert_true(((uint8_t *)back.pixels)[p] >= 253);
+        spl_image_finish(&back);
+    }
 }
 
 static void test_page_views(void **state)
