@@ -27,7 +27,6 @@ enum {
     edge_samples = 256,  /* one in which surfaces meet */
     rows_at_once = 4,
 };
-static const uint64_t pixels_max = (uint64_t)1 << 26;
 static const double spread_max = 0.75; /* levels that a quarter may lie off the mean: the mean is closer than half */
 static const uint32_t nothing = UINT32_MAX;
 
@@ -144,7 +143,7 @@ static void begin_pixel(struct pixel *p, const struct picture *picture, uint32_t
     p->surface = nothing;
     p->mixed = false;
     spl_lens_corners(picture->lens, x, y, corners);
-    spl_beam_init(&p->beam, picture->scene, picture->lens->origin, picture->lens->nearest, corners);
+    spl_beam_init(&p->beam, picture->scene, picture->lens->origin, picture->lens->nearest, (const double(*)[3])corners);
 }
 
 /* Colour and coverage from `least` samples or more. */
@@ -252,11 +251,11 @@ int spl_exact_trace(const struct spl_scene *scene, const struct spl_lens *lens, 
     if (!samples || samples > SPL_EXACT_SAMPLES_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "samples", "%u samples a pixel side; it must be 1 to %d", samples,
                               SPL_EXACT_SAMPLES_MAX);
-    if (!pixels || pixels > pixels_max)
-        return spl_fail_field(err, SPL_E_LIMIT, "width", "an exact image of %u x %u pixels; it may have 1 to %llu",
-                              lens->width, lens->height, (unsigned long long)pixels_max);
+    if (!pixels || pixels > SPL_EXACT_PIXELS_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, "width", "an exact image of %u x %u pixels; it may have 1 to %d",
+                              lens->width, lens->height, SPL_EXACT_PIXELS_MAX);
     struct picture p = {.scene = scene, .lens = lens, .samples = 1};
-    while (p.samples < samples * samples)
+    while (p.samples < samples * samples) /* a power of four */
         p.samples *= 4;
     int result = SPL_E_NOMEM;
     p.color = add_image(images, SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, lens, err);

@@ -8,7 +8,7 @@
 #include "synth/lens.h"
 #include "synth/scene.h"
 
-enum { SPL_EXACT_SAMPLES_MAX = 64 };
+enum { SPL_EXACT_SAMPLES_MAX = 64, SPL_EXACT_PIXELS_MAX = 64 << 20 };
 
 /* Fills COLOR, DEPTH, NORMAL, ID and COVERAGE of `images` (the caller's, to be released with spl_image_finish(); RANGE
  * is zeroed, all are after a failure) with the exact picture of `camera`, which stands in world coordinates.

@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 int spl_output_open(struct spl_output *out, const char *directory, const char *name, const char *extension,
@@ -72,4 +74,28 @@ void spl_output_finish(struct spl_output *out)
     free(out->temporary);
     free(out->path);
     *out = (struct spl_output){.fd = -1};
+}
+
+int spl_output_make_directory(const char *path, struct spl_error *err)
+{
+    char *part = strdup(path);
+    if (!part)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
+    int result = 0;
+    for (char *at = part + 1; !result; at++) {
+        if (*at && *at != '/')
+            continue;
+        char kept = *at;
+        *at = 0;
+        struct stat st;
+        if (mkdir(part, 0777) && errno != EEXIST)
+            result = spl_fail_errno(err, errno, "the directory %s cannot be made", part);
+        else if (!stat(part, &st) && !S_ISDIR(st.st_mode))
+            result = spl_fail(err, SPL_E_USAGE, "%s is not a directory", part);
+        *at = kept;
+        if (!kept)
+            break;
+    }
+    free(part);
+    return result;
 }

@@ -7,8 +7,11 @@
 
 #include "base/error.h"
 
+/* Makes the directory and those above it that are missing. */
+int spl_output_make_directory(const char *path, struct spl_error *err);
+
 struct spl_output {
-    char *path, *temporary;      /* NULL while there is none */
+    char *path, *temporary; /* NULL while there is none */
     int fd;
 };
 

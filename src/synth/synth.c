@@ -3,12 +3,10 @@
  * small. */
 #include <splatd/synth.h>
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -76,30 +74,6 @@ static void cast_columns(void *context, size_t begin, size_t end, unsigned worke
         }
         s->columns[i] = column;
     }
-}
-
-static int make_directories(const char *path, struct spl_error *err)
-{
-    char *part = strdup(path);
-    if (!part)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
-    int result = 0;
-    for (char *at = part + 1; !result; at++) {
-        if (*at && *at != '/')
-            continue;
-        char kept = *at;
-        *at = 0;
-        struct stat st;
-        if (mkdir(part, 0777) && errno != EEXIST)
-            result = spl_fail_errno(err, errno, "the directory %s cannot be made", part);
-        else if (!stat(part, &st) && !S_ISDIR(st.st_mode))
-            result = spl_fail(err, SPL_E_USAGE, "%s is not a directory", part);
-        *at = kept;
-        if (!kept)
-            break;
-    }
-    free(part);
-    return result;
 }
 
 /* Default: PLY, and with it PTX from a tripod and LAS from everything that moves. */
@@ -262,7 +236,7 @@ int spl_synth(const struct spl_synth_options *options, uint64_t *points_written,
     if (!result)
         result = choose_formats(options->formats, scene, s.wanted, err);
     if (!result)
-        result = make_directories(options->directory, err);
+        result = spl_output_make_directory(options->directory, err);
     for (size_t f = 0; f < formats_count && !result; f++)
         if (s.wanted[f])
             result = spl_output_open(&s.output[f], options->directory, scene->name, formats[f]->name, err);
