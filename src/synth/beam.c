@@ -9,7 +9,7 @@
 enum { stack_max = 128 }; /* as deep as the hierarchy */
 
 /* Whether the box lies wholly on the outer side of a plane through the origin. */
-static bool outside(const double planes[4][3], const double box[2][3])
+static bool outside(double planes[4][3], double box[2][3])
 {
     for (int i = 0; i < 4; i++) {
         const double *n = planes[i];
@@ -22,13 +22,13 @@ static bool outside(const double planes[4][3], const double box[2][3])
     return false;
 }
 
-/* The box relative to `origin`; returns its distance. */
-static double relative(const double bounds[2][3], const double origin[3], double box[2][3])
+/* The box between two corners, relative to `origin`; returns its distance. */
+static double relative(const double low[3], const double high[3], const double origin[3], double box[2][3])
 {
     double square = 0;
     for (int a = 0; a < 3; a++) {
-        box[0][a] = bounds[0][a] - origin[a];
-        box[1][a] = bounds[1][a] - origin[a];
+        box[0][a] = low[a] - origin[a];
+        box[1][a] = high[a] - origin[a];
         double off = fmax(fmax(box[0][a], -box[1][a]), 0);
         square += off * off;
     }
@@ -47,7 +47,7 @@ static void insert(struct spl_beam *beam, uint32_t primitive, double from)
 }
 
 void spl_beam_init(struct spl_beam *beam, const struct spl_scene *scene, const double origin[3], double nearest,
-                   const double corners[4][3])
+                   double corners[4][3])
 {
     double planes[4][3], middle[3] = {0}, longest = 0, box[2][3];
     for (int i = 0; i < 4; i++) {
@@ -73,7 +73,7 @@ void spl_beam_init(struct spl_beam *beam, const struct spl_scene *scene, const d
     for (int depth = 1; depth && beam->count <= SPL_BEAM_MAX;) {
         uint32_t at = stack[--depth];
         const struct spl_bvh_node *node = &scene->nodes[at];
-        relative(node->bounds, origin, box);
+        relative(node->bounds[0], node->bounds[1], origin, box);
         if (outside(planes, box))
             continue;
         if (!node->count) {
@@ -84,7 +84,7 @@ void spl_beam_init(struct spl_beam *beam, const struct spl_scene *scene, const d
         for (uint32_t i = node->first; i < node->first + node->count; i++) {
             double bounds[2][3];
             spl_primitive_bounds(&scene->primitives[i], bounds);
-            double distance = relative(bounds, origin, box);
+            double distance = relative(bounds[0], bounds[1], origin, box);
             if (!outside(planes, box))
                 insert(beam, i, distance / longest);
         }

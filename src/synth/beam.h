@@ -20,7 +20,7 @@ struct spl_beam {
 /* The beam between four directions, given in the order of a walk around it and spanning less than 180 degrees; two that
  * are equal make a triangle. Directions of its rays must be no longer than the longest of them. */
 void spl_beam_init(struct spl_beam *beam, const struct spl_scene *scene, const double origin[3], double nearest,
-                   const double corners[4][3]);
+                   double corners[4][3]);
 
 /* The first hit of a ray of the beam with nearest < t < *t: updates *t and the index. */
 bool spl_beam_hit(const struct spl_beam *beam, const double direction[3], double *t, uint32_t *index);

@@ -143,7 +143,7 @@ static void begin_pixel(struct pixel *p, const struct picture *picture, uint32_t
     p->surface = nothing;
     p->mixed = false;
     spl_lens_corners(picture->lens, x, y, corners);
-    spl_beam_init(&p->beam, picture->scene, picture->lens->origin, picture->lens->nearest, (const double(*)[3])corners);
+    spl_beam_init(&p->beam, picture->scene, picture->lens->origin, picture->lens->nearest, corners);
 }
 
 /* Colour and coverage from `least` samples or more. */
