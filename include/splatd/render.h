@@ -25,8 +25,9 @@ struct spl_view {
     struct spl_camera camera;
     enum spl_method method;
     uint32_t layers;            /* bit per enum spl_layer, at least one */
-    double lod;                 /* wanted spacing of splats, pixels; 1 = one splat a pixel, 0 = every leaf splat */
-    uint32_t supersample;       /* samples per pixel side: 1, 2 or 4 */
+    double lod;                 /* wanted spacing of splats, samples; 1 = one splat a sample, 0 = every leaf splat */
+    double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size and
+                                   enlarged */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
     double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */

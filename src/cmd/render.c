@@ -51,7 +51,7 @@ static void usage(FILE *out)
             "  --layer LAYER            color, depth (along the viewing axis), range (along the ray), normal, id,\n"
             "                           coverage (color)\n"
             "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
-            "  --supersample 1|2|4      samples per pixel side (1)\n"
+            "  --supersample N          samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge (1)\n"
             "  --background COLOUR      #rrggbb, #rrggbbaa or transparent (#000000)\n"
             "  --margin M               depth behind the first surface that is blended, in splat radii (1)\n"
             "File:\n"
@@ -147,9 +147,7 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
     case OPT_LOD:
         return spl_cmd_parse_real("--lod", text, 0, 64, &a->view.lod, err);
     case OPT_SUPERSAMPLE:
-        rc = spl_cmd_parse_count("--supersample", text, 1, 4, &count, err);
-        a->view.supersample = (uint32_t)count;
-        return rc;
+        return spl_cmd_parse_real("--supersample", text, 0.25, 4, &a->view.supersample, err);
     case OPT_BACKGROUND:
         return spl_cmd_parse_color("--background", text, a->view.background, err);
     case OPT_MARGIN:

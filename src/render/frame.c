@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "image/enlarge.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/renderer.h"
@@ -20,8 +21,8 @@ static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
 
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
 static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
-    [SPL_LAYER_COLOR] = SPL_SUMS_COLOR, [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
-    [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID, [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
+    [SPL_LAYER_COLOR] = SPL_SUMS_COLOR,   [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
+    [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID,       [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
 };
 
 struct frame_job {
@@ -30,7 +31,7 @@ struct frame_job {
     const struct spl_view *view;
     uint64_t deadline_ns;
     struct spl_frame *frame;
-    struct spl_error page_error;     /* why a page could not be loaded, unless it was only the limit */
+    struct spl_error page_error; /* why a page could not be loaded, unless it was only the limit */
 };
 
 static bool ask_page(void *context, uint32_t page)
@@ -59,7 +60,7 @@ static void fill_params(struct spl_tile *tile)
         .margin = view->margin < 0 ? default_margin : (float)view->margin,
         .width = camera->width,
         .height = camera->height,
-        .supersample = view->supersample,
+        .supersample = (uint32_t)view->supersample,
         .inverse_fx = 1 / (float)camera->fx,
         .inverse_fy = 1 / (float)camera->fy,
         .inverse_low_pass_squared = 2,
@@ -88,8 +89,9 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!rc && !tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
-        return spl_fail_field(err, SPL_E_LIMIT, "lod", "at lod %g up to %llu splats would blend in one pixel; raise lod",
-                              job->view->lod, (unsigned long long)r->list.sample_splats);
+        return spl_fail_field(err, SPL_E_LIMIT, "lod",
+                              "at lod %g up to %llu splats would blend in one pixel; raise lod", job->view->lod,
+                              (unsigned long long)r->list.sample_splats);
     return rc;
 }
 
@@ -188,7 +190,7 @@ static void place_tile(const struct frame_job *job, uint32_t x, uint32_t y, uint
                        struct spl_tile *tile)
 {
     const struct spl_camera *whole = &job->view->camera;
-    uint32_t side = job->view->supersample;
+    uint32_t side = (uint32_t)job->view->supersample;
     *tile = (struct spl_tile){
         .renderer = job->renderer,
         .resident = job->resident,
@@ -215,7 +217,9 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
         if (!(view->layers >> layer & 1))
             continue;
         struct spl_image *image = &frame->images[layer];
-        *image = (struct spl_image){.layer = layer, .type = spl_readback_type(layer), .width = view->camera.width,
+        *image = (struct spl_image){.layer = layer,
+                                    .type = spl_readback_type(layer),
+                                    .width = view->camera.width,
                                     .height = view->camera.height};
         image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
         if (!image->pixels)
@@ -224,22 +228,20 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
     return SPL_OK;
 }
 
-int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                        struct spl_frame *frame, struct spl_error *err)
+/* A view with at least one sample a pixel. */
+static int render_view(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                       struct spl_frame *frame, struct spl_error *err)
 {
-    memset(frame, 0, sizeof *frame);
     uint64_t start = spl_now_ns(), loaded = renderer->residency.pages_loaded;
     struct frame_job job = {.renderer = renderer, .view = view, .frame = frame, .deadline_ns = view->deadline_ns};
-    int rc = spl_view_check(view, err);
-    if (rc)
-        return rc;
+    int rc = 0;
     job.resident = spl_residency_get(&renderer->residency, dataset);
     if (!job.resident)
         return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
     frame->stats.complete = true;
     rc = make_images(frame, view, err);
 
-    uint32_t side = view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
+    uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
     uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
     uint64_t pixels = renderer->scratch.samples / per_pixel;
     uint32_t width = view->camera.width < pixels ? view->camera.width : (uint32_t)pixels;
@@ -257,4 +259,47 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
     if (rc)
         spl_frame_finish(frame);
     return rc;
+}
+
+/* Renders a share of the size and enlarges it; a pixel's centre stays where it is in the world. */
+static int render_small(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err)
+{
+    double scale = view->supersample;
+    struct spl_view small = *view;
+    struct spl_frame coarse = {0};
+    uint64_t clock = spl_now_ns();
+    small.supersample = 1;
+    small.camera.width = (uint32_t)ceil(view->camera.width * scale);
+    small.camera.height = (uint32_t)ceil(view->camera.height * scale);
+    small.camera.fx *= scale;
+    small.camera.fy *= scale;
+    small.camera.cx *= scale;
+    small.camera.cy *= scale;
+    int rc = render_view(renderer, dataset, &small, &coarse, err);
+    if (!rc)
+        rc = make_images(frame, view, err);
+    frame->stats = coarse.stats;
+    double rendered_ms = since_ms(&clock);
+    for (int layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
+        if (coarse.images[layer].pixels)
+            spl_image_enlarge(&coarse.images[layer], scale, &frame->images[layer]);
+    double enlarged_ms = since_ms(&clock);
+    frame->stats.readback_ms += enlarged_ms;
+    frame->stats.total_ms = rendered_ms + enlarged_ms;
+    spl_frame_finish(&coarse);
+    if (rc)
+        spl_frame_finish(frame);
+    return rc;
+}
+
+int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err)
+{
+    memset(frame, 0, sizeof *frame);
+    int rc = spl_view_check(view, err);
+    if (rc)
+        return rc;
+    return view->supersample < 1 ? render_small(renderer, dataset, view, frame, err)
+                                 : render_view(renderer, dataset, view, frame, err);
 }

@@ -55,11 +55,13 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     if ((unsigned)view->method >= SPL_METHOD_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "method", "method %d does not exist", (int)view->method);
     if (!view->layers || view->layers >> SPL_LAYER_COUNT)
-        return spl_fail_field(err, SPL_E_USAGE, "layer", "layer set %#x names no layer or an unknown one", view->layers);
+        return spl_fail_field(err, SPL_E_USAGE, "layer", "layer set %#x names no layer or an unknown one",
+                              view->layers);
     if (!(view->lod >= 0 && view->lod <= 64))
         return spl_fail_field(err, SPL_E_USAGE, "lod", "lod %g is not within 0 and 64", view->lod);
-    if (view->supersample != 1 && view->supersample != 2 && view->supersample != 4)
-        return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %u is not 1, 2 or 4", view->supersample);
+    double side = view->supersample;
+    if (side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
+        return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
     if (!(view->margin <= 16))
         return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not a number up to 16", view->margin);
     return SPL_OK;

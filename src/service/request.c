@@ -37,13 +37,11 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     double margin = get(values, PARAM_margin, view->margin), supersample = get(values, PARAM_supersample, 1);
     if (given(values, PARAM_margin) && margin < 0) // negative means "default" further down
         return spl_fail_field(err, SPL_E_INPUT, "margin", "margin %g is negative", margin);
-    if (supersample != 1 && supersample != 2 && supersample != 4)
-        return spl_fail_field(err, SPL_E_INPUT, "supersample", "supersample %g is none of 1, 2, 4", supersample);
     out->layer = (enum spl_layer)get(values, PARAM_layer, SPL_LAYER_COLOR);
     view->layers = 1u << out->layer;
     view->method = (enum spl_method)get(values, PARAM_method, view->method);
     view->lod = get(values, PARAM_lod, view->lod);
-    view->supersample = (uint32_t)supersample;
+    view->supersample = supersample;
     view->margin = margin;
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)

@@ -344,6 +344,54 @@ static void small_tiles_give_the_same_image(void **state)
     done(dataset);
 }
 
+/* A wall seen aslant, at a half and a quarter of the samples: the same plane, at any size of image. */
+static void coarse_frames_show_the_same_place(void **state)
+{
+    (void)state;
+    enum { side = 200 };
+    struct make_splat *splats = calloc(side * side, sizeof *splats);
+    for (size_t i = 0; i < side * side; i++)
+        splats[i] = (struct make_splat){.position = {(double)(i % side) * 0.02 - 2, 0, (double)(i / side) * 0.02 - 2},
+                                        .normal = {0, -1, 0}, .radius = 0.02f, .color = {90, 160, 30}};
+    struct spl_dataset *dataset = make_dataset(splats, side * side);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 2, 203, 151);
+    view.background[3] = 0;
+    struct spl_frame fine;
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &fine, NULL), SPL_OK);
+    for (view.supersample = 0.5; view.supersample > 0.2; view.supersample /= 2) {
+        struct spl_frame coarse;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &coarse, NULL), SPL_OK);
+        const float *a = fine.images[SPL_LAYER_DEPTH].pixels, *b = coarse.images[SPL_LAYER_DEPTH].pixels;
+        const uint8_t *color = coarse.images[SPL_LAYER_COLOR].pixels;
+        size_t pixels = 0;
+        double sum = 0;
+        for (uint32_t y = 10; y < 140; y++) {
+            for (uint32_t x = 10; x < 190; x++) {
+                size_t at = (size_t)y * 203 + x;
+                bool inside = true; /* of the wall, by the coarsest pixel */
+                for (int dy = -8; dy <= 8; dy += 4)
+                    for (int dx = -8; dx <= 8; dx += 4)
+                        inside &= !isnan(a[at + (size_t)(203 * dy + dx)]);
+                if (!inside || isnan(b[at]))
+                    continue;
+                pixels++;
+                double off = (b[at] - a[at]) / a[at];
+                sum += off;
+                assert_true(fabs(off) < 0.02); /* half a coarse pixel of this slant */
+                assert_true(color[4 * at] == 90 && color[4 * at + 1] == 160 && color[4 * at + 2] == 30);
+            }
+        }
+        assert_true(pixels > 10000);
+        assert_true(fabs(sum / (double)pixels) < 1e-3); /* a shift by half a coarse pixel would be 1 % */
+        assert_int_equal(coarse.images[SPL_LAYER_ID].width, 203);
+        spl_frame_finish(&coarse);
+    }
+    spl_frame_finish(&fine);
+    done(dataset);
+}
+
 static void the_same_request_gives_the_same_bytes(void **state)
 {
     (void)state;
@@ -433,6 +481,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(far_coordinates_match_near_ones),
         cmocka_unit_test(a_million_splats_on_one_pixel_do_not_wrap),
         cmocka_unit_test_prestate(small_tiles_give_the_same_image, device),
+        cmocka_unit_test(coarse_frames_show_the_same_place),
         cmocka_unit_test(the_same_request_gives_the_same_bytes),
         cmocka_unit_test_prestate(a_lost_device_is_reported_and_replaced, device),
         cmocka_unit_test(views_out_of_range_name_their_field),

@@ -227,7 +227,7 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
 
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
 {
-    uint32_t side = s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0, width = s->view->camera.width;
+    uint32_t side = (uint32_t)s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0, width = s->view->camera.width;
     float nearest = INFINITY;
     uint64_t color[3] = {0};
     double normal[3] = {0}, depth = 0;
@@ -291,8 +291,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
 {
     memset(frame, 0, sizeof *frame);
     struct scene s = {.dataset = dataset, .view = view, .camera = view->camera};
-    s.camera.width *= view->supersample;
-    s.camera.height *= view->supersample;
+    s.camera.width *= (uint32_t)view->supersample;
+    s.camera.height *= (uint32_t)view->supersample;
     s.camera.fx *= view->supersample;
     s.camera.fy *= view->supersample;
     s.camera.cx *= view->supersample;

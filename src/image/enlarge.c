@@ -1,0 +1,132 @@
+/* Bilinear enlargement by rows. Where the nearest pixel is empty, so is the result (but for colour and coverage, whose
+ * alpha fades): a silhouette stays where the coarse image has it. */
+#include "image/enlarge.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/parallel.h"
+
+struct job {
+    const struct spl_image *small;
+    struct spl_image *large;
+    double scale;
+};
+
+/* The four neighbours of a pixel: [0] is the nearest. */
+struct taps {
+    size_t at[4];
+    float weight[4];
+};
+
+struct axis {
+    uint32_t near, far; /* the nearest pixel and the one on the other side */
+    float share;        /* of the far one, at most 1/2 */
+};
+
+static struct axis place(uint32_t pixel, double scale, uint32_t size)
+{
+    double position = (pixel + 0.5) * scale - 0.5, nearest = floor(position + 0.5), off = position - nearest;
+    double far = nearest + (off < 0 ? -1 : 1), last = size - 1.0;
+    return (struct axis){.near = (uint32_t)fmin(fmax(nearest, 0), last),
+                         .far = (uint32_t)fmin(fmax(far, 0), last),
+                         .share = (float)fabs(off)};
+}
+
+static struct taps place_taps(const struct axis *x, const struct axis *y, uint32_t width)
+{
+    size_t near_row = (size_t)y->near * width, far_row = (size_t)y->far * width;
+    return (struct taps){
+        .at = {near_row + x->near, near_row + x->far, far_row + x->near, far_row + x->far},
+        .weight = {(1 - x->share) * (1 - y->share), x->share * (1 - y->share), (1 - x->share) * y->share,
+                   x->share * y->share},
+    };
+}
+
+static void color(const uint8_t *from, const struct taps *t, uint8_t *to)
+{
+    float sum[3] = {0}, alpha = 0;
+    for (int i = 0; i < 4; i++) {
+        const uint8_t *p = from + 4 * t->at[i];
+        float weight = t->weight[i] * p[3];
+        for (int c = 0; c < 3; c++)
+            sum[c] += weight * p[c];
+        alpha += weight;
+    }
+    for (int c = 0; c < 3; c++)
+        to[c] = alpha > 0 ? (uint8_t)(sum[c] / alpha + 0.5f) : 0;
+    to[3] = (uint8_t)(alpha + 0.5f);
+}
+
+static float distance(const float *from, const struct taps *t, float tolerance)
+{
+    float nearest = from[t->at[0]], sum = 0, total = 0;
+    for (int i = 0; i < 4; i++) {
+        float value = from[t->at[i]];
+        if (fabsf(value - nearest) <= tolerance * nearest) { /* false for NAN */
+            sum += t->weight[i] * value;
+            total += t->weight[i];
+        }
+    }
+    return total > 0 ? sum / total : NAN;
+}
+
+static void normal(const float *from, const struct taps *t, float to[3])
+{
+    float sum[3] = {0}, length = 0;
+    const float *nearest = from + 3 * t->at[0];
+    bool empty = nearest[0] == 0 && nearest[1] == 0 && nearest[2] == 0;
+    for (int c = 0; c < 3; c++) {
+        for (int i = 0; i < 4; i++)
+            sum[c] += t->weight[i] * from[3 * t->at[i] + c];
+        length += sum[c] * sum[c];
+    }
+    for (int c = 0; c < 3; c++)
+        to[c] = empty ? 0 : length > 0 ? sum[c] / sqrtf(length) : nearest[c];
+}
+
+static float coverage(const float *from, const struct taps *t)
+{
+    float sum = 0;
+    for (int i = 0; i < 4; i++)
+        sum += t->weight[i] * from[t->at[i]];
+    return sum;
+}
+
+static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worker)
+{
+    (void)worker;
+    const struct job *j = context;
+    const void *from = j->small->pixels;
+    for (size_t y = begin; y < end; y++) {
+        struct axis row = place((uint32_t)y, j->scale, j->small->height);
+        for (uint32_t x = 0; x < j->large->width; x++) {
+            struct axis column = place(x, j->scale, j->small->width);
+            struct taps t = place_taps(&column, &row, j->small->width);
+            size_t at = y * j->large->width + x;
+            switch (j->large->layer) {
+            case SPL_LAYER_COLOR:
+                color(from, &t, (uint8_t *)j->large->pixels + 4 * at);
+                break;
+            case SPL_LAYER_DEPTH:
+            case SPL_LAYER_RANGE:
+                ((float *)j->large->pixels)[at] = distance(from, &t, 0.01f / (float)j->scale);
+                break;
+            case SPL_LAYER_NORMAL:
+                normal(from, &t, (float *)j->large->pixels + 3 * at);
+                break;
+            case SPL_LAYER_COVERAGE:
+                ((float *)j->large->pixels)[at] = coverage(from, &t);
+                break;
+            default:
+                ((uint32_t *)j->large->pixels)[at] = ((const uint32_t *)from)[t.at[0]];
+            }
+        }
+    }
+}
+
+void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large)
+{
+    struct job job = {.small = small, .large = large, .scale = scale};
+    spl_parallel_for(0, large->height, 32, enlarge_rows, &job);
+}
