@@ -1,6 +1,7 @@
 /* A dataset's profile as JSON or as a chart. Owned by the loop's thread. */
 #include <string.h>
 
+#include "measure/report.h"
 #include "service/state.h"
 
 /* Names the first parameter that is not "format" with a value we have. */
@@ -17,10 +18,23 @@ static void refuse(struct request *request)
     spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", name, "a profile takes format=json or format=svg only");
 }
 
-static void reply_with(struct request *request, const struct spl_profile *profile)
+static void reply_with_chart(struct request *request, const struct spl_profile *profile, uint64_t splats)
+{
+    struct spl_error err = {0};
+    char *svg = NULL;
+    size_t length = 0;
+    if (spl_report_chart(profile, splats, 0, NULL, &svg, &length, &err))
+        spl_reply_error(request, &err);
+    else
+        spl_reply_text(request, "image/svg+xml", svg);
+}
+
+static void reply_with(struct request *request, const struct spl_profile *profile, uint64_t splats)
 {
     if (!strcmp(request->query, "") || !strcmp(request->query, "format=json"))
         spl_reply_json(request, spl_profile_to_json(profile));
+    else if (!strcmp(request->query, "format=svg"))
+        reply_with_chart(request, profile, splats);
     else
         refuse(request);
 }
@@ -35,6 +49,6 @@ void spl_show_profile(struct request *request, const struct spl_catalog_entry *e
         spl_reply_error(request, &err);
         return;
     }
-    reply_with(request, &profile);
+    reply_with(request, &profile, entry->info->leaf_splats);
     spl_profile_finish(&profile);
 }

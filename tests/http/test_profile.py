@@ -7,6 +7,7 @@ import pathlib
 import re
 import shutil
 import tempfile
+import xml.etree.ElementTree
 
 from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run
 
@@ -71,6 +72,10 @@ def test_profile_is_served():
         assert [p["psnr"] for p in served["points"]] == [18, 22, 26, 30, 33, 36]
         assert [p["front"] for p in served["points"]] == [True, False, True, True, True, True]
         assert served["points"][0]["ssim"] is None
+        chart = d.ask(PROFILE + "?format=svg")
+        assert chart.headers["Content-Type"] == "image/svg+xml"
+        titles = [e.text for e in xml.etree.ElementTree.fromstring(chart.body).iter("{http://www.w3.org/2000/svg}text")]
+        assert "splat" in titles and "points" in titles and any("wall" in (t or "") for t in titles), titles
         for query, field in [("format=gif", "format"), ("x=1", "x"), ("format=json&x=1", "x"), ("format", "format")]:
             reply = d.ask(f"{PROFILE}?{query}")
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
