@@ -27,11 +27,11 @@ void spl_metrics_flatten(const uint32_t *pixels, size_t count, uint8_t rgb[3][SP
     }
 }
 
-/* BT.601 on the sRGB levels, around 0 to keep variances exact in floats. */
+/* BT.601 on the sRGB levels. */
 static void luma(uint8_t rgb[3][SPL_METRICS_BLOCK], size_t count, float *out)
 {
     for (size_t i = 0; i < count; i++)
-        out[i] = 0.299f * rgb[0][i] + 0.587f * rgb[1][i] + 0.114f * rgb[2][i] - 128.0f;
+        out[i] = 0.299f * rgb[0][i] + 0.587f * rgb[1][i] + 0.114f * rgb[2][i];
 }
 
 static uint64_t squares(const uint8_t *a, const uint8_t *b, size_t count)

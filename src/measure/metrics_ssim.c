@@ -17,12 +17,12 @@ enum { radius = 5, window = 2 * radius + 1, lines = 5 };
 struct work {
     const float *image, *truth;
     size_t width;
-    float weights[radius + 1]; /* by distance from the middle */
-    float *scratch;            /* `lines` of `width` a worker */
+    double weights[radius + 1]; /* by distance from the middle */
+    double *scratch;            /* `lines` of `width` a worker */
     double *rows;
 };
 
-static void weights_init(float weights[radius + 1])
+static void weights_init(double weights[radius + 1])
 {
     double sum = 0, exact[radius + 1];
     for (int i = 0; i <= radius; i++) {
@@ -30,27 +30,28 @@ static void weights_init(float weights[radius + 1])
         sum += i ? 2 * exact[i] : exact[i];
     }
     for (int i = 0; i <= radius; i++)
-        weights[i] = (float)(exact[i] / sum);
+        weights[i] = exact[i] / sum;
 }
 
-static void filter_down(const struct work *w, size_t row, float *restrict sx, float *restrict sy, float *restrict ss,
-                        float *restrict sp)
+static void filter_down(const struct work *w, size_t row, double *restrict sx, double *restrict sy, double *restrict ss,
+                        double *restrict sp)
 {
     const size_t width = w->width;
-    const float *x0 = w->image + (row + radius) * width, *y0 = w->truth + (row + radius) * width,
-                middle = w->weights[0];
+    const float *x0 = w->image + (row + radius) * width, *y0 = w->truth + (row + radius) * width;
+    const double middle = w->weights[0];
     for (size_t i = 0; i < width; i++) {
-        float x = x0[i], y = y0[i];
+        double x = (double)x0[i], y = (double)y0[i];
         sx[i] = middle * x;
         sy[i] = middle * y;
         ss[i] = middle * (x * x + y * y);
         sp[i] = middle * (x * y);
     }
     for (int k = 1; k <= radius; k++) {
-        const float *xa = x0 - (size_t)k * width, *xb = x0 + (size_t)k * width, g = w->weights[k];
+        const float *xa = x0 - (size_t)k * width, *xb = x0 + (size_t)k * width;
         const float *ya = y0 - (size_t)k * width, *yb = y0 + (size_t)k * width;
+        const double g = w->weights[k];
         for (size_t i = 0; i < width; i++) {
-            float a = xa[i], b = xb[i], c = ya[i], d = yb[i];
+            double a = (double)xa[i], b = (double)xb[i], c = (double)ya[i], d = (double)yb[i];
             sx[i] += g * (a + b);
             sy[i] += g * (c + d);
             ss[i] += g * ((a * a + b * b) + (c * c + d * d));
@@ -59,28 +60,26 @@ static void filter_down(const struct work *w, size_t row, float *restrict sx, fl
     }
 }
 
-static inline float filter_across(const float *line, const float *weights)
+static inline double filter_across(const double *line, const double *weights)
 {
-    float sum = weights[0] * line[radius];
+    double sum = weights[0] * line[radius];
     for (int k = 1; k <= radius; k++)
         sum += weights[k] * (line[radius - k] + line[radius + k]);
     return sum;
 }
 
-static void compare_row(const struct work *w, size_t row, float *scratch)
+static void compare_row(const struct work *w, size_t row, double *scratch)
 {
-    const float c1 = 6.5025f, c2 = 58.5225f; /* (0.01 * 255)^2, (0.03 * 255)^2 */
-    float *sx = scratch, *sy = sx + w->width, *ss = sy + w->width, *sp = ss + w->width, *restrict out = sp + w->width;
-    const float weights[radius + 1] = {w->weights[0], w->weights[1], w->weights[2],
-                                       w->weights[3], w->weights[4], w->weights[5]};
+    const double c1 = 6.5025, c2 = 58.5225; /* (0.01 * 255)^2, (0.03 * 255)^2 */
+    double *sx = scratch, *sy = sx + w->width, *ss = sy + w->width, *sp = ss + w->width, *restrict out = sp + w->width;
+    const double weights[radius + 1] = {w->weights[0], w->weights[1], w->weights[2],
+                                        w->weights[3], w->weights[4], w->weights[5]};
     size_t count = w->width - (window - 1);
     filter_down(w, row, sx, sy, ss, sp);
     for (size_t i = 0; i < count; i++) {
-        float mx = filter_across(sx + i, weights), my = filter_across(sy + i, weights);
-        float variances = filter_across(ss + i, weights) - (mx * mx + my * my);
-        float covariance = filter_across(sp + i, weights) - mx * my;
-        mx += 128.0f; /* the planes lie around 0 */
-        my += 128.0f;
+        double mx = filter_across(sx + i, weights), my = filter_across(sy + i, weights);
+        double variances = filter_across(ss + i, weights) - (mx * mx + my * my);
+        double covariance = filter_across(sp + i, weights) - mx * my;
         out[i] = (2 * mx * my + c1) * (2 * covariance + c2) / ((mx * mx + my * my + c1) * (variances + c2));
     }
     double sum = 0;
@@ -106,7 +105,7 @@ int spl_metrics_ssim(const float *image, const float *truth, size_t width, size_
     struct work w = {.image = image, .truth = truth, .width = width};
     int rc = SPL_E_NOMEM;
     weights_init(w.weights);
-    w.scratch = spl_alloc_raw(spl_thread_count(threads) * width, lines * sizeof(float), err);
+    w.scratch = spl_alloc_raw(spl_thread_count(threads) * width, lines * sizeof(double), err);
     w.rows = spl_alloc_raw(count, sizeof *w.rows, err);
     if (!w.scratch || !w.rows)
         goto done;
