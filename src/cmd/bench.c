@@ -63,7 +63,7 @@ static void help(void)
         "splat\n"
         "                            and 4x4 samples a pixel\n"
         "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3,4)\n"
-        "  --supersample LIST        samples a pixel side, of 1,2,4 (1,2)\n"
+        "  --supersample LIST        samples a pixel side, of 0.25,0.5,1,2,4 (0.25,0.5,1,2)\n"
         "  --repeats N               times each view and setting is timed (5)\n"
         "  --peers FILE.csv          rows name,ms,psnr of other programs, for the same chart\n"
         "  --profile FILE, --no-profile\n"
@@ -115,11 +115,11 @@ static int take_lod(struct arguments *a, const char *text, struct spl_error *err
 
 static int take_supersample(struct arguments *a, const char *text, struct spl_error *err)
 {
-    uint64_t side = 0;
-    int status = spl_cmd_parse_count("--supersample", text, 1, 4, &side, err);
-    if (!status && side == 3)
-        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 1, 2 or 4, not 3");
-    a->supersamples[a->supersample_count++] = (double)side;
+    double side = 0;
+    int status = spl_cmd_parse_real("--supersample", text, 0.25, 4, &side, err);
+    if (!status && side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
+        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 0.25, 0.5, 1, 2 or 4, not %g", side);
+    a->supersamples[a->supersample_count++] = side;
     return status;
 }
 
@@ -231,9 +231,11 @@ static int finish_sweep(struct arguments *a, struct spl_error *err)
         a->bench.lod_count = sizeof lods / sizeof *lods;
     }
     if (!a->listed[2]) {
-        a->supersamples[0] = 1;
-        a->supersamples[1] = 2;
-        a->supersample_count = 2;
+        a->supersamples[0] = 0.25;
+        a->supersamples[1] = 0.5;
+        a->supersamples[2] = 1;
+        a->supersamples[3] = 2;
+        a->supersample_count = 4;
     }
     s->views = a->set ? NULL : a->views;
     s->path = a->bench.path;

@@ -110,7 +110,7 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     out->camera = o->views->views[view].camera;
     out->method = o->settings[setting].method;
     out->lod = o->settings[setting].lod;
-    out->supersample = (uint32_t)o->settings[setting].supersample;
+    out->supersample = o->settings[setting].supersample;
     if (size == SPL_SWEEP_FULL)
         return;
     struct spl_camera *c = &out->camera;
