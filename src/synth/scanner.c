@@ -9,8 +9,9 @@
 #include "synth/vector.h"
 
 enum {
-    coarse_pulses = 1440 * 600,  /* a pass; 3.5 million over four stations tell the share of returns within 0.1 % */
-    counted_points_max = 200000, /* up to here a grid's returns are counted, above they are inferred */
+    coarse_pulses = 1440 * 600,    /* a pass; 3.5 million over four stations tell the share of returns within 0.1 % */
+    coarse_footprints = 480 * 200, /* the same where a pulse is seven rays */
+    counted_points_max = 200000,   /* up to here a grid's returns are counted, above they are inferred */
 };
 
 static double rows_per_column(const struct spl_scene *scene)
@@ -80,7 +81,8 @@ struct spl_scan_grid spl_scanner_fit(const struct spl_scene *scene, const struct
                                      uint64_t points, unsigned threads)
 {
     double ratio = rows_per_column(scene);
-    struct spl_scan_grid grid = grid_of(points > counted_points_max ? coarse_pulses : coarse_pulses / 16, ratio);
+    double coarse = scene->scanner.returns > 1 ? coarse_footprints : coarse_pulses;
+    struct spl_scan_grid grid = grid_of(points > counted_points_max ? coarse : coarse_pulses / 16, ratio);
     /* Returns of all passes for a pulse of each. */
     double share = (double)count_returns(scene, faults, &grid, threads) / ((double)grid.columns * (double)grid.rows);
     double wanted = (double)points / share;
