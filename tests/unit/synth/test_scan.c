@@ -122,6 +122,50 @@ static void counts_come_within_two_percent(void **state)
     assert_int_equal(file_count(in_folder("count")), 1); /* written over, and no PTX */
 }
 
+/* All scenes, all faults at once: what is lost is made up for by a finer grid. */
+static void every_scene_comes_within_two_percent(void **state)
+{
+    (void)state;
+    for (size_t i = 0; spl_synth_scene_name(i); i++)
+        for (int faulty = 0; faulty < 2; faulty++) {
+            struct spl_synth_options o = options_for(in_folder("every"), faulty ? 3000 : 12345);
+            o.scene = spl_synth_scene_name(i);
+            o.formats = "las";
+            o.mixed = o.dropout = o.misregister = 0.1 * faulty;
+            uint64_t points = scan(o);
+            if (fabs((double)points - (double)o.points) > 0.02 * (double)o.points)
+                fail_msg("%s: %llu points instead of %llu", o.scene, (unsigned long long)points,
+                         (unsigned long long)o.points);
+        }
+}
+
+static void faulty_scans_do_not_depend_on_threads(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {"railway", "powerline", "courtyard"};
+    const char *const names[] = {"faulty-one", "faulty-three", "faulty-other"};
+    for (size_t s = 0; s < 3; s++) {
+        for (int i = 0; i < 3; i++) {
+            struct spl_synth_options o = options_for(in_folder(names[i]), 5000);
+            o.scene = scenes[s];
+            o.formats = "ply,las";
+            o.threads = i == 1 ? 3 : 1;
+            o.seed = i == 2 ? 2 : 1;
+            o.mixed = 0.5;
+            o.dropout = 0.1;
+            o.misregister = 0.02;
+            scan(o);
+        }
+        for (int f = 0; f < 2; f++) {
+            char paths[3][160];
+            for (int i = 0; i < 3; i++)
+                snprintf(paths[i], sizeof paths[i], "%s/%s/%s.%s", folder, names[i], scenes[s], f ? "ply" : "las");
+            assert_true(same_files(paths[0], paths[1]));
+            assert_false(same_files(paths[0], paths[2]));
+        }
+    }
+}
+
 /* Reads the PTX with its own poses and casts from each station through each point: how far the surface is from it. */
 static void check_truth(const char *directory, uint64_t points, double sigma)
 {
@@ -258,6 +302,101 @@ static void our_readers_find_the_same_points_and_the_stations(void **state)
     spl_point_batch_finish(&ply);
 }
 
+static double double_at(const char *bytes)
+{
+    double value;
+    memcpy(&value, bytes, sizeof value);
+    return value;
+}
+
+/* In UTM coordinates, where floats have steps of half a metre: LAS within its half step of the doubles in the PLY, its
+ * bounds and counts as the points are. */
+static void las_and_ply_hold_far_coordinates(void **state)
+{
+    (void)state;
+    struct spl_synth_options o = options_for(in_folder("far"), 20000);
+    o.scene = "powerline";
+    uint64_t points = scan(o);
+    assert_int_equal(file_count(o.directory), 2);
+    struct spl_point_batch las, ply;
+    struct spl_cloud *las_cloud, *ply_cloud;
+    read_cloud(in_folder("far/powerline.las"), points, &las, &las_cloud);
+    read_cloud(in_folder("far/powerline.ply"), points, &ply, &ply_cloud);
+    assert_string_equal(spl_cloud_get_info(las_cloud)->format, "LAS");
+    double low[3], high[3];
+    for (size_t i = 0; i < points; i++) {
+        assert_memory_equal(las.color[i], ply.color[i], 3);
+        for (int a = 0; a < 3; a++) {
+            double p = las.position[i][a], steps = p / 0.0001;
+            assert_true(fabs(p - ply.position[i][a]) <= 0.00005 + 2e-9);
+            assert_true(fabs(steps - nearbyint(steps)) < 1e-4);
+            low[a] = i ? fmin(low[a], p) : p;
+            high[a] = i ? fmax(high[a], p) : p;
+        }
+    }
+    assert_true(low[0] > 690700 && high[0] < 691300 && low[1] > 5335900 && high[1] < 5336100);
+    size_t bytes;
+    uint64_t by_return = 0;
+    char *file = read_all(in_folder("far/powerline.las"), &bytes);
+    assert_int_equal(bytes, 375 + 36 * points);
+    for (int a = 0; a < 3; a++) {
+        assert_true(double_at(file + 179 + 16 * a) == high[a]);
+        assert_true(double_at(file + 187 + 16 * a) == low[a]);
+    }
+    for (int r = 0; r < 15; r++) {
+        uint64_t count;
+        memcpy(&count, file + 255 + 8 * r, sizeof count);
+        assert_true(r < 2 ? count > 0 : r < 3 || !count);
+        by_return += count;
+    }
+    assert_int_equal(by_return, points);
+    for (size_t i = 0; i < points; i++) {
+        const uint8_t *record = (const uint8_t *)file + 375 + 36 * i;
+        int number = record[14] & 15, of = record[14] >> 4;
+        assert_true(number >= 1 && number <= of && of <= 3);
+        assert_in_range(record[20], 1, 2); /* flight lines */
+    }
+    free(file);
+    spl_cloud_destroy(las_cloud);
+    spl_cloud_destroy(ply_cloud);
+    spl_point_batch_finish(&las);
+    spl_point_batch_finish(&ply);
+}
+
+/* A misregistered PTX: the pose is off by what was asked, and with it the points, which are still where they were for
+ * the scanner. */
+static void poses_in_a_ptx_are_off_by_what_was_asked(void **state)
+{
+    (void)state;
+    struct spl_synth_options o = options_for(in_folder("pose"), 5000);
+    o.noise = 0;
+    o.misregister = 0.04;
+    uint64_t points = scan(o);
+    struct spl_scene *scene;
+    struct spl_point_batch batch;
+    struct spl_cloud *cloud;
+    assert_int_equal(spl_scene_create("courtyard", &scene, NULL), 0);
+    read_cloud(in_folder("pose/courtyard.ptx"), points, &batch, &cloud);
+    const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+    size_t on_surface = 0;
+    for (size_t i = 0; i < points; i++) {
+        const double *station = scene->stations[batch.station[i]].position;
+        double off[3], ray[3], place[3];
+        for (int a = 0; a < 3; a++) {
+            off[a] = info->stations[batch.station[i]][4 * a + 3] - station[a];
+            place[a] = batch.position[i][a] - off[a];
+        }
+        assert_true(fabs(sqrt(dot3(off, off)) - 0.04) < 2e-6);
+        sub3(place, station, ray);
+        struct spl_hit h;
+        on_surface += spl_scene_hit(scene, station, ray, &h) && fabs(h.t - 1) < 1e-4;
+    }
+    assert_true(on_surface > points * 99 / 100);
+    spl_scene_destroy(scene);
+    spl_cloud_destroy(cloud);
+    spl_point_batch_finish(&batch);
+}
+
 static void refused(struct spl_synth_options o, int code, const char *field, const char *word)
 {
     struct spl_error err = {0};
@@ -307,6 +446,10 @@ static void bad_arguments_are_named_and_leave_nothing(void **state)
     REFUSED(directory, "/proc/no/where", SPL_E_IO, "", "/proc/no");
     REFUSED(directory, "/dev/null", SPL_E_USAGE, "", "/dev/null");
     REFUSED(directory, "/dev/null/below", SPL_E_USAGE, "", "/dev/null");
+    o.scene = "railway";
+    REFUSED(formats, "ptx", SPL_E_USAGE, "format", "railway is scanned on the move");
+    o.scene = "density";
+    REFUSED(formats, "ply,ptx", SPL_E_USAGE, "format", "ply, las");
 #undef REFUSED
     assert_int_not_equal(access(directory, F_OK), 0);
 }
@@ -451,6 +594,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(files_depend_on_the_seed_and_not_on_threads),
         cmocka_unit_test(counts_come_within_two_percent),
+        cmocka_unit_test(every_scene_comes_within_two_percent),
+        cmocka_unit_test(faulty_scans_do_not_depend_on_threads),
+        cmocka_unit_test(las_and_ply_hold_far_coordinates),
+        cmocka_unit_test(poses_in_a_ptx_are_off_by_what_was_asked),
         cmocka_unit_test(points_lie_on_the_surfaces),
         cmocka_unit_test(our_readers_find_the_same_points_and_the_stations),
         cmocka_unit_test(bad_arguments_are_named_and_leave_nothing),
