@@ -11,6 +11,8 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
+static volatile uint32_t sum; /* keeps the compiler from leaving out the reads */
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static int file = -1;
@@ -28,7 +30,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint64_t count = (uint64_t)image.width * image.height;
     require(rc || (count > 0 && count <= SPL_IMAGE_PIXELS_MAX));
     const uint32_t *words = image.pixels;
-    volatile uint32_t sum = 0;
     if (!rc)
         for (uint64_t i = 0; i < count * spl_pixel_bytes(image.type) / 4; i++)
             sum += words[i];
