@@ -157,6 +157,7 @@ static void shell(struct spl_scene *scene)
              (double[3]){inner[1] + 0.015, side ? door[1] : door[0] + 0.03, lintel});
     wall(scene, frame, (double[3]){inner[0] - 0.015, door[0], lintel - 0.03},
          (double[3]){inner[1] + 0.015, door[1], lintel});
+    wall(scene, frame, (double[3]){inner[0] - 0.015, door[0], 0}, (double[3]){inner[1] + 0.015, door[1], 0.012});
     /* The door's leaf stands open into the study. */
     spl_build_box(scene, (struct spl_skin){walnut, spl_build_object(scene, "door")},
                   (double[3]){inner[1] + 0.46, door[1] + 0.05, lintel / 2}, east, (double[3]){0.43, 0.02, 1});

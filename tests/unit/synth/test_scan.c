@@ -128,7 +128,7 @@ static void every_scene_comes_within_two_percent(void **state)
     (void)state;
     for (size_t i = 0; spl_synth_scene_name(i); i++)
         for (int faulty = 0; faulty < 2; faulty++) {
-            struct spl_synth_options o = options_for(in_folder("every"), faulty ? 3000 : 12345);
+            struct spl_synth_options o = options_for(in_folder("every"), faulty ? 2000 : 4321);
             o.scene = spl_synth_scene_name(i);
             o.formats = "las";
             o.mixed = o.dropout = o.misregister = 0.1 * faulty;
@@ -146,7 +146,7 @@ static void faulty_scans_do_not_depend_on_threads(void **state)
     const char *const names[] = {"faulty-one", "faulty-three", "faulty-other"};
     for (size_t s = 0; s < 3; s++) {
         for (int i = 0; i < 3; i++) {
-            struct spl_synth_options o = options_for(in_folder(names[i]), 5000);
+            struct spl_synth_options o = options_for(in_folder(names[i]), 2000);
             o.scene = scenes[s];
             o.formats = "ply,las";
             o.threads = i == 1 ? 3 : 1;
@@ -314,7 +314,7 @@ static double double_at(const char *bytes)
 static void las_and_ply_hold_far_coordinates(void **state)
 {
     (void)state;
-    struct spl_synth_options o = options_for(in_folder("far"), 20000);
+    struct spl_synth_options o = options_for(in_folder("far"), 8000);
     o.scene = "powerline";
     uint64_t points = scan(o);
     assert_int_equal(file_count(o.directory), 2);

@@ -1,4 +1,4 @@
-/* Rays against closed forms, the hierarchy against every primitive, and what the courtyard promises other tests. */
+/* Rays against closed forms, the hierarchy against every primitive, and what scenes promise other tests. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -6,9 +6,13 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <cmocka.h>
 
+#include <splatd/synth.h>
+
 #include "base/memory.h"
+#include "cloud/views.h"
 #include "synth/build.h"
 #include "synth/random.h"
 #include "synth/vector.h"
@@ -291,6 +295,173 @@ static void textures_are_band_limited_and_do_not_repeat(void **state)
     spl_scene_destroy(scene);
 }
 
+/* Whether all of a ball of that radius around the point is empty, by `rays` rays. */
+static bool is_free(const struct spl_scene *scene, const double at[3], double radius, int rays)
+{
+    uint64_t random = 31;
+    for (int n = 0; n < rays; n++) {
+        double d[3];
+        struct spl_hit h;
+        for (int a = 0; a < 3; a++)
+            d[a] = random_between(&random, -1, 1);
+        normalise3(d);
+        if (spl_scene_hit(scene, at, d, &h) && h.t < radius)
+            return false;
+    }
+    return true;
+}
+
+/* The share of a 16:9 view that shows a surface. */
+static double surface_share(const struct spl_scene *scene, const struct spl_named_camera *c)
+{
+    double forward[3], right[3], above[3], tall = tan(c->fov * M_PI / 360);
+    int hits = 0;
+    sub3(c->target, c->eye, forward);
+    normalise3(forward);
+    cross3(forward, (double[3]){0, 0, 1}, right);
+    assert_true(normalise3(right) > 0.01); /* not straight up or down */
+    cross3(right, forward, above);
+    for (int i = 0; i < 32 * 18; i++) {
+        double d[3], x = ((i % 32 + 0.5) / 16 - 1) * tall * 16 / 9, y = ((i / 32 + 0.5) / 9 - 1) * tall;
+        struct spl_hit h;
+        mad3(forward, x, right, d);
+        mad3(d, y, above, d);
+        hits += spl_scene_hit(scene, c->eye, d, &h);
+    }
+    return hits / (32.0 * 18);
+}
+
+/* A wall's inside is a wall, too: a camera or station in a box would see it from within. The nearest surface seen from
+ * a free place is seen from its outside, where it has one: that of boxes, cones and spheres. */
+static void every_scene_keeps_its_promises(void **state)
+{
+    (void)state;
+    size_t count = 0;
+    for (; spl_synth_scene_name(count); count++) {
+        struct spl_scene *scene = NULL;
+        const char *name = spl_synth_scene_name(count);
+        assert_int_equal(spl_scene_create(name, &scene, NULL), 0);
+        assert_true(strlen(spl_synth_scene_help(count)) > 20);
+        assert_int_equal(scene->camera_count, 8);
+        assert_true(scene->station_count >= 1 && scene->scanner.returns >= 1);
+        assert_true(scene->scanner.noise > 0 && scene->scanner.aperture > 0 && scene->scanner.range > 0);
+        for (size_t i = 0; i < scene->object_count; i++) {
+            assert_int_equal(spl_scene_find_object(scene, scene->objects[i]), i); /* names are unique */
+            bool used = false;
+            for (size_t p = 0; p < scene->primitive_count && !used; p++)
+                used = scene->primitives[p].object == i;
+            if (!used)
+                fail_msg("%s has nothing of object %s", name, scene->objects[i]);
+        }
+        for (size_t i = 0; i < scene->camera_count; i++) {
+            const struct spl_named_camera *c = &scene->cameras[i];
+            double share = surface_share(scene, c);
+            if (share < 0.3 || !is_free(scene, c->eye, 0.1, 2000))
+                fail_msg("%s: camera %s sees %.2f surface, or stands in something", name, c->name, share);
+            for (size_t k = 0; k < i; k++)
+                assert_string_not_equal(c->name, scene->cameras[k].name);
+        }
+        for (size_t i = 0; i < scene->station_count && scene->scanner.kind == SPL_SCANNER_TERRESTRIAL; i++)
+            if (!is_free(scene, scene->stations[i].position, 0.4, 2000))
+                fail_msg("%s: station %zu stands in something", name, i);
+        for (int a = 0; a < 3; a++)
+            assert_true(scene->offset[a] == floor(scene->offset[a]));
+        spl_scene_destroy(scene);
+    }
+    assert_true(count >= 8);
+    assert_null(spl_synth_scene_help(count));
+}
+
+/* What is thin, sparse or at fault by design is where its scene says. */
+static void special_places_are_what_they_claim(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = NULL;
+    struct spl_hit front, back, h;
+    assert_int_equal(spl_scene_create("thin-walls", &scene, NULL), 0);
+    const double x[4] = {-4.5, -1.5, 1.5, 4.5}, gaps[4] = {0.005, 0.01, 0.02, 0.05};
+    for (int i = 0; i < 4; i++) {
+        assert_true(spl_scene_hit(scene, (double[3]){x[i], -0.5, 1}, (double[3]){0, 1, 0}, &front));
+        assert_true(spl_scene_hit(scene, (double[3]){x[i], 0.5, 1}, (double[3]){0, -1, 0}, &back));
+        assert_near(back.position[1] - front.position[1], gaps[i], 1e-12);
+        assert_true(front.color[0] > front.color[2] && back.color[2] > back.color[0]);
+    }
+    /* Along the middle sheet's plane there is nothing of it. */
+    assert_true(spl_scene_hit(scene, (double[3]){0, -4.6, 1.2}, (double[3]){0, 1, 0}, &h));
+    assert_string_not_equal(scene->objects[h.id], "sheets");
+    spl_scene_destroy(scene);
+
+    assert_int_equal(spl_scene_create("steps", &scene, NULL), 0);
+    const double risers[10] = {0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
+    for (int i = 0; i < 10; i++)
+        for (int k = 0; k < 3; k++) { /* from above onto the middle of each tread */
+            double from[3] = {-6.75 + 1.5 * i, 3.2 - 0.35 * (2.5 - k), 9};
+            assert_true(spl_scene_hit(scene, from, (double[3]){0, 0, -1}, &h));
+            assert_near(h.position[2], risers[i] * (k + 1), 1e-12);
+        }
+    spl_scene_destroy(scene);
+
+    assert_int_equal(spl_scene_create("railway", &scene, NULL), 0);
+    assert_true(spl_scene_hit(scene, (double[3]){39, 1.5, 3}, (double[3]){0, 0, 1}, &h)); /* under the bridge */
+    assert_string_equal(scene->objects[h.id], "bridge");
+    assert_near(h.position[2], 7.55, 1e-9);
+    assert_true(spl_scene_hit(scene, (double[3]){0, 0, 1}, (double[3]){0, 0.7525, -1}, &h)); /* gauge over its height */
+    assert_string_equal(scene->objects[h.id], "rails");
+    spl_scene_destroy(scene);
+
+    assert_int_equal(spl_scene_create("interior", &scene, NULL), 0);
+    uint64_t random = 3;
+    for (int n = 0; n < 20000; n++) { /* tight: no ray leaves */
+        double d[3], at[3] = {n % 2 ? 2.4 : 8, n % 2 ? 1.6 : 2.6, 1.3};
+        for (int a = 0; a < 3; a++)
+            d[a] = random_between(&random, -1, 1);
+        assert_true(spl_scene_hit(scene, at, d, &h));
+    }
+    spl_scene_destroy(scene);
+}
+
+static void views_are_printed_in_world_coordinates(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_view_list list;
+    struct spl_scene *scene = NULL;
+    char path[] = "/tmp/splatd-views-XXXXXX", *json = NULL;
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    assert_int_equal(spl_synth_print_views("powerline", 320, 200, &json, &err), 0);
+    assert_int_equal(write(fd, json, strlen(json)), strlen(json));
+    close(fd);
+    free(json);
+    if (spl_view_list_load(&list, path, &err))
+        fail_msg("%s", err.message);
+    unlink(path);
+    assert_int_equal(spl_scene_create("powerline", &scene, NULL), 0);
+    assert_int_equal(list.count, scene->camera_count);
+    for (size_t i = 0; i < list.count; i++) {
+        const struct spl_named_camera *c = &scene->cameras[i];
+        assert_string_equal(list.views[i].name, c->name);
+        assert_int_equal(list.views[i].camera.width, 320);
+        assert_int_equal(list.views[i].camera.height, 200);
+        assert_near(list.views[i].camera.fy, 100 / tan(c->fov * M_PI / 360), 1e-9);
+        double target[3], pixel[2], depth;
+        for (int a = 0; a < 3; a++) {
+            assert_true(list.views[i].camera.eye[a] == c->eye[a] + scene->offset[a]);
+            target[a] = c->target[a] + scene->offset[a];
+        }
+        assert_true(spl_camera_project(&list.views[i].camera, target, pixel, &depth));
+        assert_near(pixel[0], 160, 1e-6);
+        assert_near(pixel[1], 100, 1e-6);
+    }
+    spl_scene_destroy(scene);
+    spl_view_list_finish(&list);
+    assert_int_equal(spl_synth_print_views("powerline", 0, 200, &json, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "size");
+    err = (struct spl_error){0};
+    assert_int_equal(spl_synth_print_views("nowhere", 320, 200, &json, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "scene");
+}
+
 static void unknown_scenes_and_refused_memory_are_errors(void **state)
 {
     (void)state;
@@ -302,7 +473,7 @@ static void unknown_scenes_and_refused_memory_are_errors(void **state)
     for (long n = 1;; n++) {
         err = (struct spl_error){0};
         spl_memory_fail_after(n);
-        int result = spl_scene_create("courtyard", &scene, &err);
+        int result = spl_scene_create("railway", &scene, &err);
         spl_memory_fail_after(0);
         if (!result)
             break;
@@ -323,6 +494,9 @@ int main(void)
         cmocka_unit_test(landmarks_are_where_tests_look_for_them),
         cmocka_unit_test(stations_stand_free_and_upright),
         cmocka_unit_test(textures_are_band_limited_and_do_not_repeat),
+        cmocka_unit_test(every_scene_keeps_its_promises),
+        cmocka_unit_test(special_places_are_what_they_claim),
+        cmocka_unit_test(views_are_printed_in_world_coordinates),
         cmocka_unit_test(unknown_scenes_and_refused_memory_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
