@@ -104,7 +104,9 @@ void spl_build_box(struct spl_scene *scene, struct spl_skin skin, const double c
         double at[3], sign = face % 2 ? -1 : 1, u[3];
         mad3(center, sign * half[n], axes[n], at);
         mad3((double[3]){0}, sign, axes[a], u);
-        spl_build_rectangle(scene, skin, at, u, axes[b], (double[2]){half[a], half[b]}, NULL);
+        /* Texture coordinates are the world's along the face: boxes in a row do not repeat each other. */
+        spl_build_rectangle(scene, skin, at, u, axes[b], (double[2]){half[a], half[b]},
+                            (double[2]){dot3(at, u), dot3(at, axes[b])});
     }
 }
 
