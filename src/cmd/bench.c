@@ -62,7 +62,7 @@ static void help(void)
         "  --photographs             the views' photographs; without either: the dataset's own render with every "
         "splat\n"
         "                            and 4x4 samples a pixel\n"
-        "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3,4)\n"
+        "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3)\n"
         "  --supersample LIST        samples a pixel side, of 0.25,0.5,1,2,4 (0.25,0.5,1,2)\n"
         "  --repeats N               times each view and setting is timed (5)\n"
         "  --peers FILE.csv          rows name,ms,psnr of other programs, for the same chart\n"
@@ -118,7 +118,7 @@ static int take_supersample(struct arguments *a, const char *text, struct spl_er
     double side = 0;
     int status = spl_cmd_parse_real("--supersample", text, 0.25, 4, &side, err);
     if (!status && side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
-        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 0.25, 0.5, 1, 2 or 4, not %g", side);
+        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 0.25, 0.5, 1, 2 or 4, not '%s'", text);
     a->supersamples[a->supersample_count++] = side;
     return status;
 }
@@ -214,7 +214,7 @@ static int take_option(struct arguments *a, int option, struct spl_error *err)
 /* With -o some defaults are others, and one dataset on one device is compared. */
 static int finish_sweep(struct arguments *a, struct spl_error *err)
 {
-    static const double lods[] = {0.5, 0.75, 1, 1.5, 2, 3, 4};
+    static const double lods[] = {0.5, 0.75, 1, 1.5, 2, 3};
     struct spl_cmd_bench_sweep *s = &a->sweep;
     if (a->bench.device_count != 1)
         return spl_fail(err, SPL_E_USAGE, "with -o one device is measured, not %zu", a->bench.device_count);

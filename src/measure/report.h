@@ -25,7 +25,7 @@ void spl_report_finish(struct spl_report *report);
 /* The whole of it; a new reference, NULL without memory. */
 json_t *spl_report_to_json(const struct spl_report *report, const struct spl_peers *peers);
 
-/* One row a setting with a header row: see api/measures.md for the columns' meaning. *csv is released with free(). */
+/* One row a setting with a header row: api/profile.md has the columns' meaning. *csv is released with free(). */
 int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *length, struct spl_error *err);
 
 /* The chart of a profile, whoever measured it: a colour a method, a curve a method and supersampling, labels are the

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 
 #include "base/clock.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "measure/calibrator.h"
 #include "measure/error_map.h"
@@ -18,6 +19,7 @@
 #include "measure/thumbnail.h"
 #include "measure/tolerance.h"
 
+enum { LOSSES_MAX = 3 };                      /* of one frame */
 #define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S) /* of rendering: a calibrator takes about 0.1 s */
 
 struct job {
@@ -123,16 +125,70 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     c->cy *= y;
 }
 
-/* Renders and accounts for the time. */
+static void close_renderer(struct job *job)
+{
+    if (job->renderer)
+        spl_renderer_remove(job->renderer, job->options->dataset);
+    spl_renderer_destroy(job->renderer);
+    job->renderer = NULL;
+}
+
+static int open_renderer(struct job *job, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    int rc = spl_renderer_create(&o->renderer, &job->renderer, err);
+    if (!rc)
+        rc = spl_renderer_add(job->renderer, o->dataset, err);
+    if (!rc)
+        rc = spl_renderer_preload(job->renderer, o->dataset, err);
+    if (!rc)
+        job->sweep->device = *spl_renderer_get_device(job->renderer);
+    return rc;
+}
+
+/* True when a device was lost on the way to `why`, has been opened anew, and the work is worth trying again. A machine
+ * that others use too loses a software device whenever a frame waits too long for its turn. */
+static bool recover(struct job *job, const struct spl_error *why, int losses)
+{
+    if ((why->code != SPL_E_DEVICE_LOST && why->code != SPL_E_TIMEOUT) || losses >= LOSSES_MAX)
+        return false;
+    spl_log_warn("%s; opening it anew", why->message);
+    close_renderer(job);
+    return !open_renderer(job, NULL);
+}
+
+/* Renders, and accounts for the time. */
 static int render(struct job *job, const struct spl_view *view, struct spl_frame *frame, double *ms,
                   struct spl_error *err)
 {
-    uint64_t begin = spl_now_ns();
-    int rc = spl_renderer_render(job->renderer, job->options->dataset, view, frame, err);
-    uint64_t taken = spl_now_ns() - begin;
-    job->rendering_ns += taken;
-    *ms = (double)taken / SPL_NS_PER_MS;
-    return rc;
+    for (int losses = 0;; losses++) {
+        struct spl_error why = {0};
+        uint64_t begin = spl_now_ns();
+        int rc = spl_renderer_render(job->renderer, job->options->dataset, view, frame, &why);
+        uint64_t taken = spl_now_ns() - begin;
+        job->rendering_ns += taken;
+        *ms = (double)taken / SPL_NS_PER_MS;
+        if (!rc)
+            return SPL_OK;
+        if (!recover(job, &why, losses))
+            return spl_fail_field(err, rc, why.field, "%s", why.message);
+    }
+}
+
+static int get_reference(struct job *job, size_t view, struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    for (int losses = 0;; losses++) {
+        struct spl_error why = {0};
+        uint64_t begin = spl_now_ns();
+        int rc = spl_reference_get(&o->reference, view, job->renderer, o->dataset, images, &why);
+        if (o->reference.kind == SPL_REFERENCE_SELF)
+            job->rendering_ns += spl_now_ns() - begin;
+        if (!rc)
+            return SPL_OK;
+        if (!recover(job, &why, losses))
+            return spl_fail_field(err, rc, why.field, "%s", why.message);
+    }
 }
 
 static void advance(struct job *job, const char *stage)
@@ -197,10 +253,7 @@ static int compare_view(struct job *job, size_t v, struct spl_error *err)
     const struct spl_camera *camera = &o->views->views[v].camera;
     struct spl_image truth[SPL_LAYER_COUNT] = {0};
     float *tolerance = spl_alloc_raw((size_t)camera->width * camera->height, sizeof *tolerance, err);
-    uint64_t begin = spl_now_ns();
-    int rc = tolerance ? spl_reference_get(&o->reference, v, job->renderer, o->dataset, truth, err) : SPL_E_NOMEM;
-    if (o->reference.kind == SPL_REFERENCE_SELF)
-        job->rendering_ns += spl_now_ns() - begin;
+    int rc = tolerance ? get_reference(job, v, truth, err) : SPL_E_NOMEM;
     if (!rc && has_pictures(o->views->count, v))
         rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &truth[SPL_LAYER_COLOR], err);
     for (size_t s = 0; !rc && s < o->setting_count; s++) {
@@ -340,19 +393,6 @@ static int open_state(struct job *job, uint64_t reference_hash, struct spl_error
     return rc;
 }
 
-static int open_renderer(struct job *job, struct spl_error *err)
-{
-    const struct spl_sweep_options *o = job->options;
-    int rc = spl_renderer_create(&o->renderer, &job->renderer, err);
-    if (!rc)
-        rc = spl_renderer_add(job->renderer, o->dataset, err);
-    if (!rc)
-        rc = spl_renderer_preload(job->renderer, o->dataset, err);
-    if (!rc)
-        job->sweep->device = *spl_renderer_get_device(job->renderer);
-    return rc;
-}
-
 static int allocate(struct spl_sweep *sweep, struct spl_error *err)
 {
     const struct spl_sweep_options *o = sweep->options;
@@ -386,9 +426,7 @@ int spl_sweep_run(const struct spl_sweep_options *options, struct spl_sweep *swe
         rc = compare_all(&job, err);
     if (!rc)
         rc = time_all(&job, err);
-    if (job.renderer)
-        spl_renderer_remove(job.renderer, options->dataset);
-    spl_renderer_destroy(job.renderer);
+    close_renderer(&job);
     spl_calibrator_destroy(job.calibrator);
     spl_tolerance_destroy(job.tolerance);
     spl_state_close(job.state);
