@@ -111,5 +111,5 @@ void spl_scanner_pulse(const struct spl_scene *scene, const struct spl_scan_grid
         sweep(scanner, station, column * grid->rows + row, grid->columns * grid->rows, pulse);
         return;
     }
-    spl_assert(!"a kind of scanner");
+    spl_assert(false && "a kind of scanner");
 }
