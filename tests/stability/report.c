@@ -1,0 +1,96 @@
+/* Prints what fails and counts the rest. Flaws of the renderer that are known and not yet mended stand in a table with
+ * their reason: they are counted apart, and one that passes is a failure of the table. Owned by one thread. */
+#include "report.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* check, scene, view, method (NULL = any), the worst figure it may come to, and why it fails. */
+static const struct known {
+    const char *check, *scene, *view, *method;
+    double bound;
+    const char *reason;
+} known[] = {
+    {"-", NULL, NULL, NULL, 0, ""},
+};
+enum { known_count = sizeof known / sizeof *known };
+
+static bool same(const char *wanted, const char *name)
+{
+    return !wanted || (name && !strcmp(wanted, name));
+}
+
+static size_t find_known(const char *check, const struct place *p)
+{
+    for (size_t i = 0; i < known_count; i++)
+        if (!strcmp(known[i].check, check) && same(known[i].scene, p->scene) && same(known[i].view, p->view) &&
+            same(known[i].method, p->method))
+            return i;
+    return known_count;
+}
+
+static void print_place(const char *check, const struct place *p)
+{
+    const char *const parts[] = {p->scene, p->view, p->method, p->layer};
+    printf("%s", check);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        if (parts[i])
+            printf(" %s", parts[i]);
+}
+
+static void judge(struct report *report, const char *check, const struct place *place, double figure, double limit,
+                  bool below, const char *why)
+{
+    bool good = below ? figure <= limit : figure >= limit;
+    size_t at = find_known(check, place);
+    if (good) {
+        report->passed++;
+        if (report->verbose) {
+            print_place(check, place);
+            printf(": %.4g of at %s %.4g\n", figure, below ? "most" : "least", limit);
+        }
+        return;
+    }
+    if (at < known_count && (below ? figure <= known[at].bound : figure >= known[at].bound)) {
+        report->known++;
+        report->known_seen[at] = true;
+        print_place(check, place);
+        printf(": %.4g, %s %.4g: expected failure: %s\n", figure, below ? "above" : "below", limit, known[at].reason);
+        return;
+    }
+    report->failed++;
+    report->caught += report->must_fail && !strcmp(report->must_fail, check);
+    printf("FAIL ");
+    print_place(check, place);
+    printf(": %.4g, must be at %s %.4g (%s)\n", figure, below ? "most" : "least", limit, why);
+}
+
+void report_at_most(struct report *report, const char *check, const struct place *place, double figure, double limit,
+                    const char *why)
+{
+    judge(report, check, place, figure, limit, true, why);
+}
+
+void report_at_least(struct report *report, const char *check, const struct place *place, double figure, double limit,
+                     const char *why)
+{
+    judge(report, check, place, figure, limit, false, why);
+}
+
+void report_broken(struct report *report, const char *check, const struct place *place, const char *message)
+{
+    report->failed++;
+    printf("FAIL ");
+    print_place(check, place);
+    printf(": %s\n", message);
+}
+
+int report_finish(struct report *report)
+{
+    printf("%zu checks passed, %zu failed, %zu expected failures\n", report->passed, report->failed, report->known);
+    if (!report->must_fail)
+        return report->failed > 0;
+    printf("the planted fault was %s by '%s'\n", report->caught ? "caught" : "NOT CAUGHT", report->must_fail);
+    return report->caught == 0;
+}

@@ -1,0 +1,194 @@
+/* Scenes, scans and datasets for the suite, made in a temporary folder that is gone again when a world is ready: a
+ * dataset stays mapped without its file. Points travel as PLY with doubles, so that they may lie anywhere. */
+#include "world.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <splatd/pack.h>
+#include <splatd/synth.h>
+
+#include "support/make_dataset.h"
+#include "synth/exact.h"
+
+enum { TRUTH_SAMPLES = 16 };
+
+static void must(int rc, const char *what, const struct spl_error *err)
+{
+    if (!rc)
+        return;
+    fprintf(stderr, "%s: %s\n", what, err->message);
+    exit(1);
+}
+
+static void *must_have(void *p)
+{
+    must(!p, "the suite", &(struct spl_error){.message = "out of memory"});
+    return p;
+}
+
+static void pack(struct world *world, const char *folder, const char *scan)
+{
+    struct spl_error err = {0};
+    char packed[512];
+    snprintf(packed, sizeof packed, "%s/world.spld", folder);
+    const struct spl_pack_options options = {.inputs = (const char *const[]){scan}, .input_count = 1, .output = packed};
+    must(spl_pack(&options, NULL, &err), world->name, &err);
+    must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);
+    unlink(packed);
+}
+
+static void synth(const struct scan *scan, const char *folder, char path[512])
+{
+    struct spl_error err = {0};
+    const struct spl_synth_options options = {.scene = scan->scene,
+                                              .directory = folder,
+                                              .points = scan->points,
+                                              .seed = 1,
+                                              .noise = scan->noise,
+                                              .mixed = scan->mixed,
+                                              .dropout = scan->dropout,
+                                              .misregister = scan->misregister,
+                                              .formats = "ply"};
+    must(spl_synth(&options, NULL, &err), scan->scene, &err);
+    snprintf(path, 512, "%s/%s.ply", folder, scan->scene);
+}
+
+void world_init(struct world *world, const struct scan *scan)
+{
+    struct spl_error err = {0};
+    char folder[256], path[512];
+    *world = (struct world){0};
+    snprintf(world->name, sizeof world->name, "%s", scan->scene);
+    must(spl_scene_create(scan->scene, &world->scene, &err), scan->scene, &err);
+    make_folder(folder);
+    synth(scan, folder, path);
+    pack(world, folder, path);
+    unlink(path);
+    rmdir(folder);
+}
+
+void world_init_points(struct world *world, const char *name, const struct point *points, size_t count)
+{
+    char folder[256], path[512];
+    *world = (struct world){0};
+    snprintf(world->name, sizeof world->name, "%s", name);
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/points.ply", folder);
+    FILE *file = must_have(fopen(path, "wb"));
+    fprintf(file,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty double x\nproperty double y\n"
+            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            count);
+    bool written = true;
+    for (size_t i = 0; i < count; i++)
+        written = fwrite(points[i].position, sizeof points[i].position, 1, file) == 1 &&
+                  fwrite(points[i].color, sizeof points[i].color, 1, file) == 1 && written;
+    if (fclose(file) || !written)
+        must(1, path, &(struct spl_error){.message = "cannot be written"});
+    pack(world, folder, path);
+    unlink(path);
+    rmdir(folder);
+}
+
+void world_finish(struct suite *suite, struct world *world)
+{
+    spl_renderer_remove(suite->renderer, world->dataset);
+    if (suite->other)
+        spl_renderer_remove(suite->other, world->dataset);
+    spl_dataset_close(world->dataset);
+    spl_scene_destroy(world->scene);
+    *world = (struct world){0};
+}
+
+/* Reads what synth wrote: floats or doubles, then a colour. */
+struct point *world_scan(const struct scan *scan, size_t *count)
+{
+    char folder[256], path[512], line[256];
+    make_folder(folder);
+    synth(scan, folder, path);
+    FILE *file = must_have(fopen(path, "rb"));
+    bool wide = false;
+    *count = 0;
+    while (fgets(line, sizeof line, file) && strcmp(line, "end_header\n")) {
+        sscanf(line, "element vertex %zu", count);
+        wide |= !strcmp(line, "property double x\n");
+    }
+    struct point *points = must_have(calloc(*count, sizeof *points));
+    for (size_t i = 0; i < *count; i++) {
+        float narrow[3];
+        bool read = wide ? fread(points[i].position, sizeof points[i].position, 1, file) == 1
+                         : fread(narrow, sizeof narrow, 1, file) == 1;
+        for (int a = 0; a < 3 && !wide; a++)
+            points[i].position[a] = narrow[a];
+        if (!read || fread(points[i].color, sizeof points[i].color, 1, file) != 1)
+            must(1, path, &(struct spl_error){.message = "is cut off"});
+    }
+    fclose(file);
+    unlink(path);
+    rmdir(folder);
+    return points;
+}
+
+struct spl_view world_look(const struct world *world, const double eye[3], const double target[3], double fov,
+                           uint32_t width, uint32_t height)
+{
+    struct spl_view view;
+    struct spl_error err = {0};
+    double from[3], to[3], up[3] = {0, 0, 1};
+    for (int a = 0; a < 3; a++) {
+        double offset = world->scene ? world->scene->offset[a] : 0;
+        from[a] = eye[a] + offset;
+        to[a] = target[a] + offset;
+    }
+    if (fabs(to[0] - from[0]) + fabs(to[1] - from[1]) < 1e-3 * fabs(to[2] - from[2]))
+        up[1] = 1, up[2] = 0;
+    spl_view_init(&view);
+    must(spl_camera_set_fov(&view.camera, fov, width, height, &err), world->name, &err);
+    must(spl_camera_look_at(&view.camera, from, to, up, &err), world->name, &err);
+    view.camera.near = 0.05;
+    view.camera.far = INFINITY;
+    view.layers = (1u << SPL_LAYER_COUNT) - 1;
+    view.background[3] = 0;
+    return view;
+}
+
+struct spl_view world_view(const struct world *world, size_t index, uint32_t width, uint32_t height)
+{
+    const struct spl_named_camera *camera = &world->scene->cameras[index];
+    return world_look(world, camera->eye, camera->target, camera->fov, width, height);
+}
+
+bool world_render(struct suite *suite, const struct world *world, const struct place *place,
+                  const struct spl_view *view, struct spl_frame *frame)
+{
+    struct spl_error err = {0};
+    struct spl_view planted = *view;
+    if (suite->plant == PLANT_HALF_PIXEL) {
+        planted.camera.cx += 0.5;
+        planted.camera.cy += 0.5;
+    }
+    if (suite->plant == PLANT_MARGIN_0)
+        planted.margin = 0;
+    int rc = spl_renderer_add(suite->renderer, world->dataset, &err);
+    if (!rc)
+        rc = spl_renderer_render(suite->renderer, world->dataset, &planted, frame, &err);
+    if (rc)
+        report_broken(&suite->report, "renders", place, err.message);
+    return !rc;
+}
+
+void truth_render(const struct world *world, const struct spl_camera *camera, struct spl_image truth[SPL_LAYER_COUNT])
+{
+    struct spl_error err = {0};
+    must(spl_exact_render(world->scene, camera, TRUTH_SAMPLES, 0, truth, &err), world->name, &err);
+}
+
+void truth_finish(struct spl_image truth[SPL_LAYER_COUNT])
+{
+    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+        spl_image_finish(&truth[i]);
+}
