@@ -13,7 +13,7 @@
 
 #include "base/memory.h"
 
-static const double spread_quantile = 0.95, spread_step = 0.05;
+static const double spread_quantile = 0.97, spread_step = 0.08;
 static const double spread_least = 0.02, spread_most = 1.5;
 static const double shared_gain = 0.1, setting_gain = 0.1, layer_gain = 0.1, fade = 0.99;
 static const double learned_most = 6.9; /* ln 1000 */
@@ -63,8 +63,8 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
                                                                        .bound = spl_profile_psnr_bound(profile, p)};
         tail += log(p->ms_q90 / p->ms);
     }
-    /* From the 90 % quantile of a normal distribution to its 95 %: 1.645 / 1.28. */
-    planner->spread = planner->count ? fmin(fmax(1.285 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
+    /* From the 90 % quantile of a normal distribution to its 97 %: 1.88 / 1.28. */
+    planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
     if (!planner->count)
         for (size_t i = 0; i < common_count; i++)
             if (!usable || usable(&common[i].setting))

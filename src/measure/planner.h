@@ -3,7 +3,7 @@
  * A setting's time is estimated as
  *     ms = (fixed_ms + ms_per_mpx · megapixels) · exp(shared + setting + layer)
  * where the three terms are learned from measured frames: how this machine is now, how this setting differs from its
- * model, how a layer other than colour does. `spread` follows the 95 % quantile of what remains, ln(measured / estimate),
+ * model, how a layer other than colour does. `spread` follows the 97 % quantile of what remains, ln(measured / estimate),
  * so that the tail, not the mean, is held against the budget. No clock, no I/O; a planner belongs to one thread. */
 #ifndef SPL_MEASURE_PLANNER_H
 #define SPL_MEASURE_PLANNER_H
@@ -54,7 +54,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err);
 void spl_planner_finish(struct spl_planner *planner);
 
-/* budget alone: the most accurate setting whose 95 % quantile stays below 1.2 times the budget and whose expected time
+/* budget alone: the most accurate setting whose 97 % quantile stays below 1.2 times the budget and whose expected time
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
  * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:

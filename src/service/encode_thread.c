@@ -10,11 +10,7 @@ static void encode(struct spl_job *job)
         return;
     const struct spl_view_request *request = &job->request;
     spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
-    uint64_t now = spl_now_ns();
-    job->encode_ms = (double)(now - began) / SPL_NS_PER_MS;
-    job->took_ms = (double)(now - job->began_ns) / SPL_NS_PER_MS;
-    if (job->plan && !job->err.code)
-        spl_plan_learn_encoding(job->plan, request, (double)(now - job->rendered_ns) / SPL_NS_PER_MS);
+    job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
 }
 
 void *spl_encode_thread_run(void *argument)

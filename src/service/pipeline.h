@@ -28,11 +28,10 @@ struct spl_job {
     struct spl_encoded encoded;
     size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
     double queue_ms, encode_ms;
-    struct spl_plan *plan;    // borrowed; may be NULL: nothing is planned
-    struct spl_choice choice; /* where request.planned */
-    double promised_ms;       /* the same */
-    uint64_t began_ns, rendered_ns;
-    double took_ms; /* from the frame's begin until it was encoded */
+    struct spl_plan *plan;          // borrowed; may be NULL: nothing is planned
+    struct spl_choice choice;       /* where request.planned */
+    double promised_ms;             /* the same */
+    uint64_t began_ns, rendered_ns; /* of the frame, planning included */
     struct spl_error err;
 };
 

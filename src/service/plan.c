@@ -2,9 +2,9 @@
  *
  * Invariant: the planner is over the profile that copy_profile() gives out, or over its own table where there is none.
  * The file is looked at whenever a view is planned, one stat() each, so that 'splatd bench' need not restart the
- * service; a file that was refused is not read again until it changes. What encoding costs is learned here as well,
- * since a budget ends with the encoded bytes: milliseconds a megapixel by layer and format, and a margin for their
- * spread. */
+ * service; a file that was refused is not read again until it changes. What follows the frame is learned here as well,
+ * since a budget ends with the reply: encoding and its queues, as milliseconds a megapixel by layer and format, and a
+ * margin for their spread. */
 #include "service/plan.h"
 
 #include <math.h>
@@ -157,7 +157,7 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);
 }
 
-void spl_plan_learn_encoding(struct spl_plan *plan, const struct spl_view_request *request, double ms)
+void spl_plan_learn_reply(struct spl_plan *plan, const struct spl_view_request *request, double ms)
 {
     pthread_mutex_lock(&plan->mutex);
     double *known = encoding_of(plan, request), step = log(ms / megapixels(request) / *known);

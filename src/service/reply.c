@@ -130,16 +130,20 @@ static void add_depth(struct request *request, const struct spl_job *job)
 static void add_plan(struct request *request, const struct spl_job *job)
 {
     const struct spl_choice *choice = &job->choice;
+    uint64_t now = spl_now_ns();
+    if (job->plan)
+        spl_plan_learn_reply(job->plan, &job->request, (double)(now - job->rendered_ns) / SPL_NS_PER_MS);
     if (!job->plan || !job->request.planned)
         return;
-    bool late = job->took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
+    double took_ms = (double)(now - job->began_ns) / SPL_NS_PER_MS;
+    bool late = took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
     char psnr[32] = "";
     if (isfinite(choice->psnr))
         snprintf(psnr, sizeof psnr, "; psnr=%.2f", choice->psnr);
     header(request, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g", spl_method_name(choice->setting.method),
            choice->setting.lod, choice->setting.supersample);
     header(request, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
-    header(request, "Splatd-Took", "ms=%.2f", job->took_ms);
+    header(request, "Splatd-Took", "ms=%.2f", took_ms);
     header(request, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");
     header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
 }

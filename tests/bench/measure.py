@@ -1,6 +1,6 @@
 """The figures of RESULTS.md, one subcommand each, on the scan of a vault (11.6 M points) that lies beside the checkout.
 
-usage: measure.py frames|scaling|http|pack|size
+usage: measure.py frames|scaling|http|pack|size|planner
 
 Prints what was measured and, where a figure has a bound, how it stands to it; exit 1 beyond a bound, 77 without the data.
 Frame times are bounded in units of the calibrator that 'splatd bench' runs beside each frame, so a slow or busy machine
@@ -13,12 +13,14 @@ import http.client
 import json
 import os
 import pathlib
+import random
 import re
 import signal
 import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 
 SPLATD = os.environ["SPLATD_BINARY"]
@@ -235,12 +237,137 @@ def size():
     bound("levels of detail add", 100 * (info["splats"] / info["leaf_splats"] - 1), 40, "%")
 
 
+def court_views(count, seed):
+    """Views from inside the courtyard that no profile has seen: anywhere a person may stand, looking anywhere."""
+    chance = random.Random(seed)
+    views = []
+    for i in range(count):
+        eye = [round(chance.uniform(-8.5, 8.5), 3), round(chance.uniform(-6.5, 6.5), 3), round(chance.uniform(1.2, 2.2), 3)]
+        target = [round(chance.uniform(-10, 10), 3), round(chance.uniform(-8, 8), 3), round(chance.uniform(0, 4), 3)]
+        views.append({"name": f"new{i:03}", "width": 1280, "height": 720,
+                      "camera": {"eye": eye, "target": target, "fov": round(chance.uniform(45, 70), 1)}})
+    return views
+
+
+def exact(folder, views):
+    """Exact images of `views`; the folder that holds them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    listed = folder / "views.json"
+    if not listed.exists() or json.loads(listed.read_text()) != {"views": views}:
+        listed.unlink(missing_ok=True)
+        (folder / "part.json").write_text(json.dumps({"views": views}))
+        subprocess.run([SPLATD, "synth", "courtyard", "--views", folder / "part.json", "-o", folder], check=True,
+                       stdout=subprocess.DEVNULL)
+        (folder / "part.json").rename(listed)
+    return folder / "truth"
+
+
+def profiled():
+    """The courtyard of 5 M points with a profile of its sample views beside it; and that profile."""
+    dataset = pathlib.Path(courtyard(5000000))
+    profile = dataset.with_suffix(".profile.json")
+    if not profile.exists() or profile.stat().st_mtime < dataset.stat().st_mtime:
+        views = json.loads(subprocess.run([SPLATD, "synth", "courtyard", "--print-views"], check=True,
+                                          stdout=subprocess.PIPE).stdout)["views"]
+        truth = exact(CACHE / "planner-sample", views)
+        subprocess.run([SPLATD, "bench", dataset, "--views", truth.parent / "views.json", "--reference", truth, "-o",
+                        CACHE / "planner-bench", "--lod", "0.5,1,2,4", "--supersample", "0.25,0.5,1", "--repeats", "3"],
+                       check=True, stdout=subprocess.DEVNULL)
+    return str(dataset), json.loads(profile.read_text())
+
+
+def planned(port, name, view, **params):
+    """A planned view: chosen setting, promises, what it took, whether the demand can be met; bytes; the client's ms."""
+    camera = view["camera"]
+    query = {"eye": ",".join(map(str, camera["eye"])), "target": ",".join(map(str, camera["target"])),
+             "fov": camera["fov"], "width": view["width"], "height": view["height"], **params}
+    path = f"/v1/datasets/{name}/view?" + "&".join(f"{k}={v}" for k, v in query.items())
+    status, headers, body, ms = get(port, path)
+    if status != 200:
+        sys.exit(f"{path}: status {status}: {body[:200]}")
+    plan = {k: dict(part.split("=") for part in headers["Splatd-" + k].split("; ")) for k in
+            ("Chosen", "Promised", "Took")}
+    return plan, headers["Splatd-Demand"], body, ms
+
+
+def keep_budgets(port, name):
+    """200 mixed requests after 20: how many end within 1.2 times the budget."""
+    chance, sizes = random.Random(2), [(1280, 720), (960, 540), (640, 360)]
+    rows = []
+    for i, view in enumerate(court_views(220, 3)):
+        budget = chance.uniform(20, 200)
+        view["width"], view["height"] = chance.choice(sizes)
+        plan, demand, _, ms = planned(port, name, view, budget=f"{budget:.1f}ms")
+        chosen = "{method} lod={lod} ss={supersample}".format(**plan["Chosen"])
+        rows.append((i, budget, float(plan["Promised"]["ms"]), float(plan["Took"]["ms"]), ms, demand, chosen))
+    counted = [r for r in rows[20:] if r[5] != "best-effort"]
+    for setting in sorted({r[6] for r in counted}, key=lambda s: -sum(r[6] == s for r in counted)):
+        print(f"  {setting}: {sum(r[6] == setting for r in counted)} times")
+    unmet = [r for r in rows[20:] if r[5] == "best-effort"]
+    print(f"{len(rows) - 20} requests after {20}; {len(unmet)} that no setting was expected to meet, of which "
+          f"{sum(r[3] <= 1.2 * r[1] for r in unmet)} ended in time all the same")
+    print(f"time used of the budget: median {statistics.median(r[3] / r[1] for r in counted):.2f}; measured / promised: "
+          f"median {statistics.median(r[3] / r[2] for r in counted):.2f}")
+    print(f"within 1.2 times the budget as the client sees it: "
+          f"{100 * sum(r[4] <= 1.2 * r[1] for r in counted) / len(counted):.1f} %")
+    bound("budgets missed by more than a fifth", 100 * sum(r[3] > 1.2 * r[1] for r in counted) / len(counted), 5, "%")
+    return rows
+
+
+def keep_psnr(port, name, profile, folder):
+    """PSNR demanded of views that are not in the profile, against exact images."""
+    views = court_views(24, 5)
+    truth = exact(CACHE / "planner-new", views)
+    chance, met, counted, unmet = random.Random(4), 0, 0, 0
+    best = max(p["psnr"] for p in profile["points"] if p["psnr"] is not None)
+    picture = folder / "view.png"
+    for view in views:
+        for _ in range(4):
+            wanted = chance.uniform(best - 14, best)
+            plan, demand, body, _ = planned(port, name, view, psnr=f"{wanted:.2f}", format="png", transparent="true")
+            if demand == "best-effort":
+                unmet += 1
+                continue
+            picture.write_bytes(body)
+            figures = json.loads(subprocess.run([SPLATD, "compare", picture, truth / (view["name"] + ".color.png"),
+                                                 "--json"], check=True, stdout=subprocess.PIPE).stdout)
+            reached = figures["psnr"] if figures["psnr"] is not None else 100
+            counted += 1
+            met += reached >= wanted
+    print(f"{counted} demands of PSNR in {len(views)} new views; {unmet} more that no setting promises")
+    bound("demands of PSNR missed", 100 * (1 - met / counted), 5, "%")
+
+
+def planner():
+    dataset, profile = profiled()
+    port, name = free_port(), pathlib.Path(dataset).stem
+    daemon = subprocess.Popen([SPLATD, "serve", "--quiet", "--listen", f"127.0.0.1:{port}", dataset])
+    try:
+        begin = time.monotonic()
+        while True:
+            try:
+                if get(port, f"/v1/datasets/{name}/profile")[0] == 200:
+                    break
+                sys.exit("the daemon does not trust the profile")
+            except OSError:
+                if daemon.poll() is not None or time.monotonic() - begin > 60:
+                    sys.exit("the daemon does not answer")
+                time.sleep(0.05)
+        keep_budgets(port, name)
+        with tempfile.TemporaryDirectory() as folder:
+            keep_psnr(port, name, profile, pathlib.Path(folder))
+    finally:
+        daemon.send_signal(signal.SIGTERM)
+        daemon.wait(30)
+
+
 if __name__ == "__main__":
-    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size}
+    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner}
     if len(sys.argv) != 2 or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)
-    scan()
+    if sys.argv[1] != "planner":
+        scan()
     figures[sys.argv[1]]()
     if beyond:
         sys.exit("beyond its bound: " + "; ".join(beyond))
