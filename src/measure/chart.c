@@ -12,7 +12,7 @@
 #include "base/memory.h"
 #include "measure/markup.h"
 
-enum { WIDTH = 720, HEIGHT = 460, LEFT = 56, RIGHT = 20, TOP = 64, BOTTOM = 52, COLORS = 6, DASHES = 4 };
+enum { WIDTH = 720, HEIGHT = 476, LEFT = 56, RIGHT = 20, TOP = 82, BOTTOM = 52, COLORS = 6, DASHES = 4 };
 
 struct box {
     double x, y, w, h;
@@ -218,26 +218,28 @@ static void write_labels(struct layout *l)
                 write_label(l, &l->places[i]);
 }
 
-/* The curves' names in a row under the title; returns nothing that could wrap: what does not fit stays in the points'
- * own texts. */
+/* The curves' names in two rows under the title; what does not fit stays in the points' own texts. */
 static void write_legend(const struct layout *l, const struct spl_chart *chart)
 {
-    double x = LEFT;
+    double x = LEFT, y = 54;
     for (size_t c = 0; c < chart->curve_count; c++) {
         const struct spl_chart_curve *curve = &chart->curves[c];
         double w = 34 + 6.8 * (double)strlen(curve->name) + 14;
-        if (x + w > WIDTH - RIGHT - 170)
+        if (x + w > WIDTH && y > 54)
             break;
+        if (x + w > WIDTH) {
+            x = LEFT;
+            y = 71;
+        }
         fprintf(l->out,
-                "<path class=\"curve s%u\" stroke-dasharray=\"%s\" d=\"M%.1f 50h26\"/><text x=\"%.1f\" y=\"54\">",
-                curve->color % COLORS, dashes[curve->dash % DASHES], x, x + 32);
+                "<path class=\"curve s%u\" stroke-dasharray=\"%s\" d=\"M%.1f %.0fh26\"/><text x=\"%.1f\" y=\"%.0f\">",
+                curve->color % COLORS, dashes[curve->dash % DASHES], x, y - 4, x + 32, y);
         spl_markup_text(l->out, curve->name);
         fputs("</text>\n", l->out);
         x += w;
     }
-    fprintf(l->out,
-            "<text class=\"soft\" x=\"%d\" y=\"54\" text-anchor=\"end\">labels: lod; filled: the front</text>\n",
-            WIDTH - RIGHT);
+    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\">labels: lod; filled: on the front</text>\n", LEFT,
+            HEIGHT - BOTTOM + 38);
 }
 
 static void write_chart(struct layout *l, const struct spl_chart *chart)

@@ -13,7 +13,7 @@ struct spl_chart_point {
     double ms, psnr;  /* milliseconds > 0; dB */
     bool front;       /* drawn filled */
     int32_t index;    /* becomes data-index of the point's group, for a page's script; -1 = none */
-    char label[32];   /* may be "" */
+    char label[64];   /* may be "" */
     char detail[160]; /* shown by a browser when the pointer rests on it; may be "" */
 };
 

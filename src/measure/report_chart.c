@@ -64,6 +64,8 @@ static void add_peers(struct build *b, const struct spl_peers *peers)
             if (!strcmp(peers->rows[j].name, name))
                 b->points[b->point_count++] =
                     (struct spl_chart_point){.ms = peers->rows[j].ms, .psnr = peers->rows[j].psnr, .index = -1};
+        /* Its points are few, and the legend may be full: the first one says whose they are. */
+        snprintf(b->points[first].label, sizeof b->points[first].label, "%s", name);
         add_curve(b, name, color++, 0, first);
     }
 }

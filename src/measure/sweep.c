@@ -19,8 +19,8 @@
 #include "measure/thumbnail.h"
 #include "measure/tolerance.h"
 
-enum { LOSSES_MAX = 3 };                      /* of one frame */
-#define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S) /* of rendering: a calibrator takes about 0.1 s */
+enum { LOSSES_MAX = 3, COMPARE_SAMPLES = 1 << 20 }; /* of one frame */
+#define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S)       /* of rendering: a calibrator takes about 0.1 s */
 
 struct job {
     struct spl_sweep *sweep;
@@ -31,6 +31,7 @@ struct job {
     struct spl_state *state;
     uint64_t rendering_ns, calibrated_ns; /* rendering_ns when the calibrator last ran */
     uint64_t done, total;                 /* frames of this stage */
+    uint64_t scratch_samples;             /* of the renderer that is open, or is to be opened anew */
 };
 
 struct spl_sweep_accuracy *spl_sweep_get_accuracy(const struct spl_sweep *s, size_t setting, size_t view)
@@ -136,7 +137,9 @@ static void close_renderer(struct job *job)
 static int open_renderer(struct job *job, struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
-    int rc = spl_renderer_create(&o->renderer, &job->renderer, err);
+    struct spl_renderer_options options = o->renderer;
+    options.scratch_samples = job->scratch_samples;
+    int rc = spl_renderer_create(&options, &job->renderer, err);
     if (!rc)
         rc = spl_renderer_add(job->renderer, o->dataset, err);
     if (!rc)
@@ -352,7 +355,13 @@ static int time_all(struct job *job, struct spl_error *err)
     job->done = job->total = 0;
     for (size_t i = 0; i < count; i++)
         job->total += !job->sweep->times[i].done;
-    int rc = job->total ? warm_up(job, err) : SPL_OK;
+    if (!job->total)
+        return SPL_OK;
+    close_renderer(job);
+    job->scratch_samples = o->renderer.scratch_samples;
+    int rc = open_renderer(job, err);
+    if (!rc)
+        rc = warm_up(job, err);
     for (size_t repeat = 0; !rc && repeat < o->repeats; repeat++)
         for (size_t v = 0; !rc && v < o->views->count; v++)
             rc = time_view(job, repeat, v, err);
@@ -410,7 +419,9 @@ int spl_sweep_run(const struct spl_sweep_options *options, struct spl_sweep *swe
     spl_assert(options->setting_count && options->views->count && options->repeats);
     uint64_t begin = spl_now_ns(), reference_hash;
     *sweep = (struct spl_sweep){.options = options};
-    struct job job = {.sweep = sweep, .options = options};
+    /* A frame of all layers, or of 16 samples a pixel, is many times the work of what is timed: in small tiles none of
+     * it keeps the device beyond its deadline. */
+    struct job job = {.sweep = sweep, .options = options, .scratch_samples = COMPARE_SAMPLES};
     int rc = spl_reference_check(&options->reference, &reference_hash, err);
     if (!rc)
         rc = allocate(sweep, err);
