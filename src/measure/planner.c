@@ -22,11 +22,11 @@ static const double first_gain = 0.5;
 
 /* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order. */
 static const struct spl_candidate common[] = {
-    {{SPL_METHOD_POINTS, 4, 1}, 6, 10, 15, NAN, 0},   {{SPL_METHOD_POINTS, 2, 1}, 6, 20, 18, NAN, 0},
-    {{SPL_METHOD_SPLAT, 8, 0.25}, 4, 12, 19, NAN, 0}, {{SPL_METHOD_SPLAT, 4, 0.25}, 5, 16, 20, NAN, 0},
-    {{SPL_METHOD_SPLAT, 4, 0.5}, 8, 35, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5}, 8, 50, 24, NAN, 0},
-    {{SPL_METHOD_SPLAT, 4, 1}, 8, 135, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1}, 8, 180, 28, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 1}, 10, 250, 30, NAN, 0},  {{SPL_METHOD_SPLAT, 1, 2}, 20, 900, 32, NAN, 0},
+    {{SPL_METHOD_POINTS, 4, 1}, 4, 10, 15, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25}, 4, 15, 17, NAN, 0},
+    {{SPL_METHOD_POINTS, 1, 0.25}, 4, 20, 20, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25}, 5, 30, 21, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 0.25}, 5, 42, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5}, 6, 72, 23, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 0.5}, 8, 90, 24, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1}, 8, 180, 25, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 1}, 10, 250, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 2}, 20, 900, 27, NAN, 0},
 };
 enum { common_count = sizeof common / sizeof *common };
 
