@@ -242,8 +242,8 @@ def court_views(count, seed):
     chance = random.Random(seed)
     views = []
     for i in range(count):
-        eye = [round(chance.uniform(-8.5, 8.5), 3), round(chance.uniform(-6.5, 6.5), 3), round(chance.uniform(1.2, 2.2), 3)]
-        target = [round(chance.uniform(-10, 10), 3), round(chance.uniform(-8, 8), 3), round(chance.uniform(0, 4), 3)]
+        eye = [round(chance.uniform(low, high), 3) for low, high in ((-8.5, 8.5), (-6.5, 6.5), (1.2, 2.2))]
+        target = [round(chance.uniform(low, high), 3) for low, high in ((-10, 10), (-8, 8), (0, 4))]
         views.append({"name": f"new{i:03}", "width": 1280, "height": 720,
                       "camera": {"eye": eye, "target": target, "fov": round(chance.uniform(45, 70), 1)}})
     return views
