@@ -39,9 +39,9 @@ static void reply_with(struct request *request, const struct spl_profile *profil
         refuse(request);
 }
 
-void spl_show_profile(struct request *request, const struct spl_catalog_entry *entry, bool post)
+void spl_show_profile(struct request *request, const struct spl_call *call)
 {
-    (void)post;
+    const struct spl_catalog_entry *entry = call->entry;
     struct spl_error err = {0};
     struct spl_profile profile;
     if (spl_plan_copy_profile(entry->plan, &profile, &err)) {

@@ -2,19 +2,23 @@
  *
  * A path is split at '/' before it is decoded, so an encoded slash never makes a segment, and an id is only ever
  * compared with those of the catalog. Owned by the loop's thread. */
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
-#include "base/clock.h"
-#include "base/memory.h"
 #include "service/state.h"
 
-enum { ALLOW_GET = 1, ALLOW_POST = 2 };
+static const char *const methods[] = {[SPL_GET] = MHD_HTTP_METHOD_GET,
+                                      [SPL_POST] = MHD_HTTP_METHOD_POST,
+                                      [SPL_PUT] = MHD_HTTP_METHOD_PUT,
+                                      [SPL_DELETE] = MHD_HTTP_METHOD_DELETE};
+enum {
+    GET = 1 << SPL_GET, /* and HEAD */
+    POST = 1 << SPL_POST,
+};
 
-static void index_page(struct request *request, const struct spl_catalog_entry *entry, bool post)
+static void index_page(struct request *request, const struct spl_call *call)
 {
-    (void)entry;
-    (void)post;
+    (void)call;
     struct spl_service *service = request->service;
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
@@ -23,10 +27,9 @@ static void index_page(struct request *request, const struct spl_catalog_entry *
                                       "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
 }
 
-static void list_datasets(struct request *request, const struct spl_catalog_entry *entry, bool post)
+static void list_datasets(struct request *request, const struct spl_call *call)
 {
-    (void)entry;
-    (void)post;
+    (void)call;
     struct spl_catalog *catalog = &request->service->catalog;
     json_t *list = json_array();
     for (size_t i = 0; i < catalog->count; i++)
@@ -34,138 +37,118 @@ static void list_datasets(struct request *request, const struct spl_catalog_entr
     spl_reply_json(request, json_pack("{s:o}", "datasets", list));
 }
 
-static void show_dataset(struct request *request, const struct spl_catalog_entry *entry, bool post)
+static void show_dataset(struct request *request, const struct spl_call *call)
 {
-    (void)post;
-    spl_reply_json(request, spl_describe_dataset(entry, true));
+    spl_reply_json(request, spl_describe_dataset(call->entry, true));
 }
 
-static void show_status(struct request *request, const struct spl_catalog_entry *entry, bool post)
+static void show_status(struct request *request, const struct spl_call *call)
 {
-    (void)entry;
-    (void)post;
+    (void)call;
     spl_reply_json(request, spl_describe_status(request->service));
 }
 
-static int parse_view(struct request *request, const struct spl_catalog_entry *entry, bool post,
-                      struct spl_view_request *view, struct spl_error *err)
-{
-    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX,
-                                       .pixels = request->service->options->pixels_max};
-    int rc =
-        post
-            ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)
-            : spl_view_request_from_query(request->query, strlen(request->query), &entry->defaults, &limits, view, err);
-    if (rc && rc != SPL_E_NOMEM)
-        err->code = SPL_E_INPUT; // whatever is wrong with a view is the client's to change
-    return rc;
-}
-
-static void make_view(struct request *request, const struct spl_catalog_entry *entry, bool post)
-{
-    struct spl_service *service = request->service;
-    struct spl_error err = {0};
-    struct spl_view_request view;
-    struct spl_job *job = NULL;
-    if (parse_view(request, entry, post, &view, &err))
-        goto refuse;
-    if (service->reply_bytes > reply_bytes_max) {
-        spl_fail(&err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
-        goto refuse;
-    }
-    if (!(job = spl_alloc(1, sizeof *job, &err)))
-        goto refuse;
-    job->dataset = entry->dataset;
-    job->plan = entry->plan;
-    job->request = view;
-    job->accepted_ns = spl_now_ns();
-    job->deadline_ns = job->accepted_ns + service->options->deadline_ms * SPL_NS_PER_MS;
-    job->owner = request;
-    if (!spl_pipeline_submit(service->pipeline, job, &err)) {
-        spl_waiting_add(request, job);
-        return;
-    }
-    spl_count(&service->counters, refused_full);
-refuse:
-    spl_job_destroy(job);
-    spl_reply_error(request, &err);
-}
-
+/* "{id}" stands for a dataset, "{name}" for any other segment. */
 static const struct route {
-    const char *pattern; /* "{id}" stands for one dataset */
+    const char *pattern;
     unsigned methods;
     bool query; /* takes parameters */
-    void (*handle)(struct request *request, const struct spl_catalog_entry *entry, bool post);
+    void (*handle)(struct request *request, const struct spl_call *call);
 } routes[] = {
-    {"/", ALLOW_GET, false, index_page},
-    {"/v1/status", ALLOW_GET, false, show_status},
-    {"/v1/datasets", ALLOW_GET, false, list_datasets},
-    {"/v1/datasets/{id}", ALLOW_GET, false, show_dataset},
-    {"/v1/datasets/{id}/profile", ALLOW_GET, true, spl_show_profile},
-    {"/v1/datasets/{id}/view", ALLOW_GET | ALLOW_POST, true, make_view},
+    {"/", GET, false, index_page},
+    {"/v1/status", GET, false, show_status},
+    {"/v1/datasets", GET, false, list_datasets},
+    {"/v1/datasets/{id}", GET, false, show_dataset},
+    {"/v1/datasets/{id}/profile", GET, true, spl_show_profile},
+    {"/v1/datasets/{id}/view", GET | POST, true, spl_make_view},
 };
 
-/* Does `path` fit `pattern`? *id is then the encoded segment that stands for {id}, if there is one. */
-static bool match(const char *pattern, const char *path, const char **id, size_t *id_length)
+/* What a path has in the holes of a pattern, still encoded. */
+struct holes {
+    const char *id, *name; // may be NULL
+    size_t id_length, name_length;
+};
+
+static bool match(const char *pattern, const char *path, struct holes *holes)
 {
-    const char *hole = strchr(pattern, '{');
-    if (!hole)
-        return !strcmp(pattern, path);
-    size_t head = (size_t)(hole - pattern);
-    if (strncmp(pattern, path, head))
-        return false;
-    *id = path + head;
-    *id_length = strcspn(*id, "/");
-    return *id_length && !strcmp(*id + *id_length, strchr(hole, '}') + 1);
+    while (*pattern) {
+        if (*pattern != '{') {
+            if (*pattern++ != *path++)
+                return false;
+            continue;
+        }
+        size_t length = strcspn(path, "/");
+        if (!length)
+            return false;
+        if (!strncmp(pattern, "{id}", 4))
+            holes->id = path, holes->id_length = length;
+        else
+            holes->name = path, holes->name_length = length;
+        pattern = strchr(pattern, '}') + 1;
+        path += length;
+    }
+    return !*path;
 }
 
-static void refuse_method(struct request *request, unsigned methods, const char *method)
+static void refuse_method(struct request *request, unsigned allowed, const char *method)
 {
-    const char *allow = methods & ALLOW_POST ? "GET, HEAD, POST" : "GET, HEAD";
-    char detail[128];
+    char allow[64] = "", detail[160];
+    for (unsigned m = 0; m < sizeof methods / sizeof *methods; m++)
+        if (allowed & 1u << m) {
+            strcat(allow, *allow ? ", " : "");
+            strcat(allow, m == SPL_GET ? "GET, HEAD" : methods[m]);
+        }
     snprintf(detail, sizeof detail, "method %.32s is not allowed here; %s are", method, allow);
     spl_reply_problem(request, MHD_HTTP_METHOD_NOT_ALLOWED, "method", "", detail);
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_ALLOW, allow);
 }
 
-static void refuse_query(struct request *request, bool post)
+static void refuse_query(struct request *request, enum spl_http_method method)
 {
     char name[64], detail[192];
     size_t length = strcspn(request->query, "=&");
     memcpy(name, request->query, length = length < sizeof name ? length : sizeof name - 1);
     name[length] = '\0';
     snprintf(detail, sizeof detail, "unknown parameter '%s'; %s", name,
-             post ? "a POST takes its parameters in the body" : "this resource takes none");
+             method == SPL_POST ? "a POST takes its parameters in the body" : "this resource takes none");
     spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", name, detail);
 }
 
-static void enter(struct request *request, const struct route *route, const char *method, const char *id,
-                  size_t id_length)
+/* Decodes what the path has in its holes; an unknown dataset is refused where the method does not make it. */
+static int fill(struct request *request, const struct holes *holes, struct spl_call *call, struct spl_error *err)
 {
-    bool post = !strcmp(method, MHD_HTTP_METHOD_POST);
-    bool get = !strcmp(method, MHD_HTTP_METHOD_GET) || !strcmp(method, MHD_HTTP_METHOD_HEAD);
-    if (!(get && route->methods & ALLOW_GET) && !(post && route->methods & ALLOW_POST)) {
+    struct spl_catalog *catalog = &request->service->catalog;
+    int rc = 0;
+    if (holes->name)
+        rc = spl_percent_decode(holes->name, holes->name_length, call->name, sizeof call->name, "name", err);
+    if (rc || !holes->id)
+        return rc;
+    rc = spl_percent_decode(holes->id, holes->id_length, call->id, sizeof call->id, "id", err);
+    if (!rc && !(call->entry = spl_catalog_find(catalog, call->id)) && call->method != SPL_PUT)
+        rc = spl_fail_field(err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", call->id);
+    return rc;
+}
+
+static void enter(struct request *request, const struct route *route, const char *method, const struct holes *holes)
+{
+    struct spl_call call = {0};
+    struct spl_error err = {0};
+    const char *wanted = strcmp(method, MHD_HTTP_METHOD_HEAD) ? method : MHD_HTTP_METHOD_GET;
+    unsigned m = 0;
+    while (m < sizeof methods / sizeof *methods && !(route->methods & 1u << m && !strcmp(wanted, methods[m])))
+        m++;
+    if (m == sizeof methods / sizeof *methods) {
         refuse_method(request, route->methods, method);
         return;
     }
-    if (request->query[0] && (post || !route->query)) {
-        refuse_query(request, post);
-        return;
-    }
-    const struct spl_catalog_entry *entry = NULL;
-    if (id) {
-        char name[256];
-        struct spl_error err = {0};
-        if (!spl_percent_decode(id, id_length, name, sizeof name, "id", &err) &&
-            !(entry = spl_catalog_find(&request->service->catalog, name)))
-            spl_fail_field(&err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", name);
-        if (!entry) {
-            spl_reply_error(request, &err);
-            return;
-        }
-    }
-    route->handle(request, entry, post);
+    call.method = (enum spl_http_method)m;
+    if (request->query[0] && (call.method == SPL_POST || !route->query))
+        refuse_query(request, call.method);
+    else if (fill(request, holes, &call, &err))
+        spl_reply_error(request, &err);
+    else
+        route->handle(request, &call);
 }
 
 void spl_route(struct request *request, const char *method)
@@ -176,10 +159,9 @@ void spl_route(struct request *request, const char *method)
         return;
     }
     for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {
-        const char *id = NULL;
-        size_t id_length = 0;
-        if (match(routes[i].pattern, request->uri, &id, &id_length)) {
-            enter(request, &routes[i], method, id, id_length);
+        struct holes holes = {0};
+        if (match(routes[i].pattern, request->uri, &holes)) {
+            enter(request, &routes[i], method, &holes);
             return;
         }
     }

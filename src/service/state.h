@@ -96,8 +96,20 @@ void spl_waiting_refuse_all(struct spl_service *service);
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);
 
+/* What a route's handler is called with; valid during the call. */
+enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET: MHD leaves the body out */
+struct spl_call {
+    enum spl_http_method method;
+    char id[256];                          /* of the dataset in the path, decoded; "" without */
+    const struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a PUT of a new one
+    char name[256];                        /* the path's other segment, decoded; "" without */
+};
+
+/* view_route.c: /v1/datasets/{id}/view. */
+void spl_make_view(struct request *request, const struct spl_call *call);
+
 /* profile_route.c: /v1/datasets/{id}/profile. */
-void spl_show_profile(struct request *request, const struct spl_catalog_entry *entry, bool post);
+void spl_show_profile(struct request *request, const struct spl_call *call);
 
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
