@@ -48,19 +48,21 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request->service));
 }
 
-/* "{id}" stands for a dataset, "{name}" for any other segment. */
+/* "{id}" stands for a dataset, "{name}" for any other segment. Methods of one pattern that need different scopes are rows
+ * of their own. */
 static const struct route {
     const char *pattern;
     unsigned methods;
-    bool query; /* takes parameters */
+    enum spl_scope scope; /* what a token must allow, for the dataset {id} where there is one */
+    bool query;           /* takes parameters */
     void (*handle)(struct request *request, const struct spl_call *call);
 } routes[] = {
-    {"/", GET, false, index_page},
-    {"/v1/status", GET, false, show_status},
-    {"/v1/datasets", GET, false, list_datasets},
-    {"/v1/datasets/{id}", GET, false, show_dataset},
-    {"/v1/datasets/{id}/profile", GET, true, spl_show_profile},
-    {"/v1/datasets/{id}/view", GET | POST, true, spl_make_view},
+    {"/", GET, SPL_SCOPE_NONE, false, index_page},
+    {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
+    {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
+    {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, false, show_dataset},
+    {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
+    {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
 };
 
 /* What a path has in the holes of a pattern, still encoded. */
@@ -130,21 +132,13 @@ static int fill(struct request *request, const struct holes *holes, struct spl_c
     return rc;
 }
 
-static void enter(struct request *request, const struct route *route, const char *method, const struct holes *holes)
+static void enter(struct request *request, const struct route *route, enum spl_http_method method,
+                  const struct holes *holes)
 {
-    struct spl_call call = {0};
+    struct spl_call call = {.method = method};
     struct spl_error err = {0};
-    const char *wanted = strcmp(method, MHD_HTTP_METHOD_HEAD) ? method : MHD_HTTP_METHOD_GET;
-    unsigned m = 0;
-    while (m < sizeof methods / sizeof *methods && !(route->methods & 1u << m && !strcmp(wanted, methods[m])))
-        m++;
-    if (m == sizeof methods / sizeof *methods) {
-        refuse_method(request, route->methods, method);
-        return;
-    }
-    call.method = (enum spl_http_method)m;
-    if (request->query[0] && (call.method == SPL_POST || !route->query))
-        refuse_query(request, call.method);
+    if (request->query[0] && (method == SPL_POST || !route->query))
+        refuse_query(request, method);
     else if (fill(request, holes, &call, &err))
         spl_reply_error(request, &err);
     else
@@ -158,12 +152,22 @@ void spl_route(struct request *request, const char *method)
                           "the URL is longer than 8 KiB; POST takes long views");
         return;
     }
+    unsigned wanted = 0, allowed = 0, count = sizeof methods / sizeof *methods;
+    const char *name = strcmp(method, MHD_HTTP_METHOD_HEAD) ? method : MHD_HTTP_METHOD_GET;
+    while (wanted < count && strcmp(name, methods[wanted]))
+        wanted++;
     for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {
         struct holes holes = {0};
-        if (match(routes[i].pattern, request->uri, &holes)) {
-            enter(request, &routes[i], method, &holes);
+        if (!match(routes[i].pattern, request->uri, &holes))
+            continue;
+        if (routes[i].methods & 1u << wanted) {
+            enter(request, &routes[i], (enum spl_http_method)wanted, &holes);
             return;
         }
+        allowed |= routes[i].methods;
     }
-    spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "", "there is nothing here; / lists what there is");
+    if (allowed)
+        refuse_method(request, allowed, method);
+    else
+        spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "", "there is nothing here; / lists what there is");
 }

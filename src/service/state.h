@@ -97,6 +97,7 @@ void spl_waiting_refuse_all(struct spl_service *service);
 void spl_route(struct request *request, const char *method);
 
 /* What a route's handler is called with; valid during the call. */
+enum spl_scope { SPL_SCOPE_NONE, SPL_SCOPE_VIEW, SPL_SCOPE_TOUR, SPL_SCOPE_ADMIN }; /* NONE: anyone, without a token */
 enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET: MHD leaves the body out */
 struct spl_call {
     enum spl_http_method method;

@@ -198,8 +198,8 @@ def test_openapi_knows_every_parameter_and_route():
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
     assert all(f"Alias {alias}." in text for _, alias, _ in rows if alias)
-    routes = re.findall(r'^    \{"(/[^"]*)", ALLOW', (ROOT / "src/service/routes.c").read_text(), re.M)
-    assert sorted(routes) == sorted(re.findall(r"^  (/\S*):$", text, re.M))
+    routes = re.findall(r'^    \{"(/[^"]*)", ', (ROOT / "src/service/routes.c").read_text(), re.M)
+    assert sorted(set(routes)) == sorted(re.findall(r"^  (/\S*):$", text, re.M))
 
 
 run(globals())
