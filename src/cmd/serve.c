@@ -1,11 +1,13 @@
-/* splatd serve: the daemon. */
+/* splatd serve: the daemon. Flags come from the service's table of parameters (service/params.def). */
 #include "cmd/cmd.h"
 
 #include <getopt.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/log.h"
-#include "cmd/options.h"
+#include "base/memory.h"
 #include "service/service.h"
 
 static void usage(FILE *out)
@@ -26,105 +28,129 @@ static void usage(FILE *out)
             "Every dataset of a directory, on any address, on a real GPU or not at all:\n"
             "  splatd serve --listen 0.0.0.0:8080 --require-gpu /srv/scans\n"
             "A free port for a test; stderr says which:\n"
-            "  splatd serve --listen 127.0.0.1:0 courtyard.spld\n\n");
+            "  splatd serve --listen 127.0.0.1:0 courtyard.spld\n"
+            "With parameters from a file, `name = value` a line; flags win over it:\n"
+            "  splatd serve --config /etc/splatd.conf --queue 64\n\n");
+    spl_parameters_print_help(out);
     fprintf(out,
-            "  -l, --listen ADDR:PORT    default 127.0.0.1:8080; IPv6 as [::1]:8080; port 0 takes a free one\n"
-            "  -d, --device D            auto, vulkan, egl, vulkan:1, a UUID or part of a name: see 'splatd devices'\n"
-            "      --require-gpu         refuse software drivers\n"
-            "      --memory-limit BYTES  of device memory (default: 3/4 of what the device reports)\n"
-            "      --queue N             views that may wait, 1 to 4096 (default 32); beyond: 503 and Retry-After\n"
-            "      --deadline MS         for a view to be ready, 1 to 600000 (default 10000); beyond: 503\n"
-            "      --encoders N          threads that encode images, 1 to 16 (default 2)\n"
-            "      --max-pixels N        of an image (default 67108864); sides go to %d\n"
-            "      --no-verify           trust the datasets' checksums: faster start\n"
-            "  -q, --quiet               only warnings and errors on stderr\n\n"
+            "  -l, -d, -q                  --listen, --device, --log-level warning\n"
+            "  -c, --config FILE           parameters of this file, named as the flags; see --manual\n"
+            "      --manual                the manual page splatd.conf(5), for man -l\n"
+            "  -h, --help\n\n"
             "SIGTERM or SIGINT finishes what runs and exits 0; a second one exits at once.\n"
-            "Exit code 1: the service could not go on (say, the device was lost too often); 2: bad input or usage.\n",
-            SPL_SERVICE_SIDE_MAX);
+            "Exit code 1: the service could not go on (say, the device was lost too often); 2: bad input or usage.\n");
 }
 
-enum { opt_require_gpu = 256, opt_memory, opt_queue, opt_deadline, opt_encoders, opt_pixels, opt_no_verify };
+/* What getopt returns for a parameter: this, its index, and for `no` the other base. */
+enum { first_parameter = 256, first_no = 4096, opt_manual = 255 };
+_Static_assert((int)SPL_PARAMETERS < first_no - first_parameter, "indices and their negations do not meet");
 
-static const struct option options[] = {
-    {"listen", required_argument, NULL, 'l'},
-    {"device", required_argument, NULL, 'd'},
-    {"require-gpu", no_argument, NULL, opt_require_gpu},
-    {"memory-limit", required_argument, NULL, opt_memory},
-    {"queue", required_argument, NULL, opt_queue},
-    {"deadline", required_argument, NULL, opt_deadline},
-    {"encoders", required_argument, NULL, opt_encoders},
-    {"max-pixels", required_argument, NULL, opt_pixels},
-    {"no-verify", no_argument, NULL, opt_no_verify},
-    {"quiet", no_argument, NULL, 'q'},
-    {"help", no_argument, NULL, 'h'},
-    {0},
+struct flags {
+    struct option *options; /* of getopt_long, closed by zeros */
+    char (*negations)[64];  /* "no-verify" */
 };
 
+static int make_flags(struct flags *flags, struct spl_error *err)
+{
+    static const struct option own[] = {{"config", required_argument, NULL, 'c'},
+                                        {"manual", no_argument, NULL, opt_manual},
+                                        {"quiet", no_argument, NULL, 'q'},
+                                        {"help", no_argument, NULL, 'h'}};
+    size_t count = sizeof own / sizeof *own;
+    flags->options = spl_alloc(2 * SPL_PARAMETERS + count + 1, sizeof *flags->options, err);
+    flags->negations = spl_alloc(SPL_PARAMETERS, sizeof *flags->negations, err);
+    if (!flags->options || !flags->negations)
+        return SPL_E_NOMEM;
+    memcpy(flags->options, own, sizeof own);
+    for (int i = 0; i < SPL_PARAMETERS; i++) {
+        const struct spl_parameter *p = &spl_parameters[i];
+        bool flag = p->type == SPL_PARAMETER_FLAG;
+        flags->options[count++] =
+            (struct option){p->name, flag ? no_argument : required_argument, NULL, first_parameter + i};
+        if (!flag)
+            continue;
+        snprintf(flags->negations[i], sizeof flags->negations[i], "no-%s", p->name);
+        flags->options[count++] = (struct option){flags->negations[i], no_argument, NULL, first_no + i};
+    }
+    return 0;
+}
+
+static void free_flags(struct flags *flags)
+{
+    free(flags->options);
+    free(flags->negations);
+}
+
+static int set(struct spl_service_options *o, size_t index, const char *text, struct spl_error *err)
+{
+    return spl_service_options_set(o, index, text, SPL_FROM_FLAG, "--", err);
+}
+
+/* One flag of the command line; SPL_E_USAGE with an empty `err` where getopt has said why. */
 static int apply(struct spl_service_options *o, int option, struct spl_error *err)
 {
-    uint64_t count = 0;
-    int rc = 0;
     switch (option) {
     case 'l':
-        o->listen = optarg;
-        return 0;
+        return set(o, SPL_PARAMETER_listen, optarg, err);
     case 'd':
-        o->renderer.device = optarg;
-        return 0;
-    case opt_require_gpu:
-        o->renderer.require_gpu = true;
-        return 0;
-    case opt_memory:
-        return spl_cmd_parse_count("--memory-limit", optarg, 1 << 20, UINT64_MAX, &o->renderer.memory_limit, err);
-    case opt_queue:
-        rc = spl_cmd_parse_count("--queue", optarg, 1, 4096, &count, err);
-        o->queue = count;
-        return rc;
-    case opt_deadline:
-        rc = spl_cmd_parse_count("--deadline", optarg, 1, 600000, &count, err);
-        o->deadline_ms = (unsigned)count;
-        return rc;
-    case opt_encoders:
-        rc = spl_cmd_parse_count("--encoders", optarg, 1, 16, &count, err);
-        o->encoders = (unsigned)count;
-        return rc;
-    case opt_pixels:
-        return spl_cmd_parse_count("--max-pixels", optarg, 1, (uint64_t)SPL_SERVICE_SIDE_MAX * SPL_SERVICE_SIDE_MAX,
-                                   &o->pixels_max, err);
-    case opt_no_verify:
-        o->verify = false;
-        return 0;
+        return set(o, SPL_PARAMETER_device, optarg, err);
     case 'q':
-        spl_log_set_level(SPL_LOG_WARN);
-        return 0;
+        return set(o, SPL_PARAMETER_log_level, "warning", err);
+    case 'c':
+        return spl_service_options_read(o, optarg, err);
+    case '?':
+        return SPL_E_USAGE;
     default:
-        return SPL_E_USAGE; // getopt has said why
+        return option >= first_no ? set(o, (size_t)(option - first_no), "false", err)
+                                  : set(o, (size_t)(option - first_parameter), optarg ? optarg : "true", err);
     }
+}
+
+/* 1 when there is nothing more to do, 0 to serve, or an error. */
+static int parse(struct spl_service_options *o, int argc, char **argv, const struct option *options,
+                 struct spl_error *err)
+{
+    for (int c; (c = getopt_long(argc, argv, "l:d:c:qh", options, NULL)) >= 0;) {
+        if (c == 'h') {
+            usage(stdout);
+            return 1;
+        }
+        if (c == opt_manual) {
+            spl_parameters_print_manual(stdout);
+            return 1;
+        }
+        int rc = apply(o, c, err);
+        if (rc)
+            return rc;
+    }
+    for (; optind < argc; optind++) {
+        int rc = set(o, SPL_PARAMETER_datasets, argv[optind], err);
+        if (rc)
+            return rc;
+    }
+    return o->datasets.count ? 0
+                             : spl_fail(err, SPL_E_USAGE, "serve needs at least one NAME.spld or a directory of them");
 }
 
 int spl_cmd_serve(int argc, char **argv)
 {
     struct spl_service_options o;
+    struct flags flags = {0};
     struct spl_error err = {0};
-    spl_service_options_init(&o);
-    for (int c; (c = getopt_long(argc, argv, "l:d:qh", options, NULL)) >= 0;) {
-        if (c == 'h') {
-            usage(stdout);
-            return 0;
-        }
-        if (!apply(&o, c, &err))
-            continue;
-        if (err.code)
-            return spl_cmd_fail(&err);
+    int rc = spl_service_options_init(&o, &err);
+    if (!rc)
+        rc = make_flags(&flags, &err);
+    if (!rc)
+        rc = parse(&o, argc, argv, flags.options, &err);
+    if (!rc) {
+        spl_log_set_level((enum spl_log_level)o.log_level);
+        rc = spl_service_run(&o, &err);
+    }
+    free_flags(&flags);
+    spl_service_options_finish(&o);
+    if (rc < 0 && !err.code) {
         fprintf(stderr, "'splatd serve --help' shows how\n");
         return 2;
     }
-    if (optind == argc) {
-        fprintf(stderr, "splatd: serve needs at least one NAME.spld or a directory of them\n");
-        return 2;
-    }
-    o.paths = argv + optind;
-    o.path_count = (size_t)(argc - optind);
-    int rc = spl_service_run(&o, &err);
-    return rc ? spl_cmd_fail(&err) : 0;
+    return rc < 0 ? spl_cmd_fail(&err) : 0;
 }

@@ -132,6 +132,7 @@ json_t *spl_describe_status(struct spl_service *service)
     set(json, "uptime_s", json_real((double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S));
     set(json, "device", describe_device(&status.device));
     set(json, "limits", describe_limits(service->options));
+    set(json, "parameters", spl_service_options_describe(service->options));
     set(json, "datasets", ids);
     set(json, "memory",
         json_pack("{s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "resident_bytes",

@@ -22,18 +22,6 @@ enum {
     drain_grace_ms = 5000, /* beyond the deadline of the last view */
 };
 
-void spl_service_options_init(struct spl_service_options *options)
-{
-    *options = (struct spl_service_options){
-        .listen = "127.0.0.1:8080",
-        .queue = 32,
-        .deadline_ms = 10000,
-        .encoders = 2,
-        .pixels_max = 64ull << 20,
-        .verify = true,
-    };
-}
-
 static void on_drain_timer(uv_timer_t *timer)
 {
     struct spl_service *service = timer->data;
@@ -165,7 +153,9 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
         plans[i] = service->catalog.entries[i].plan;
     }
     struct spl_pipeline_options options = {
-        .renderer = service->options->renderer,
+        .renderer = {.device = service->options->device,
+                     .require_gpu = service->options->require_gpu,
+                     .memory_limit = service->options->memory_limit},
         .datasets = datasets,
         .dataset_count = service->catalog.count,
         .plans = plans,
@@ -191,7 +181,8 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     if (rc)
         goto free_service;
     if ((rc = spl_listen(options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
-        (rc = spl_catalog_open(&service->catalog, options->paths, options->path_count, options->verify, err)) ||
+        (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
+                               err)) ||
         (rc = start_pipeline(service, err)))
         goto done;
     uv_run(&service->loop, UV_RUN_DEFAULT);

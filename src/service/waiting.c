@@ -66,8 +66,8 @@ void spl_waiting_complete(struct spl_service *service)
 static void give_up(struct request *request)
 {
     struct spl_error err = {0};
-    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %u ms passed before the view was ready",
-             request->service->options->deadline_ms);
+    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %llu ms passed before the view was ready",
+             (unsigned long long)request->service->options->deadline_ms);
     spl_count(&request->service->counters, deadline_missed);
     spl_reply_error(request, &err);
     let_go(request);
