@@ -23,8 +23,9 @@ static void index_page(struct request *request, const struct spl_call *call)
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
         json_array_append_new(views, json_sprintf("%s/view", service->catalog.entries[i].uri));
-    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION,
-                                      "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
+    spl_reply_json(request,
+                   json_pack("{s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "openapi",
+                             "/v1/openapi.json", "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
 }
 
 static void list_datasets(struct request *request, const struct spl_call *call)
@@ -48,8 +49,8 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request->service));
 }
 
-/* "{id}" stands for a dataset, "{name}" for any other segment. Methods of one pattern that need different scopes are rows
- * of their own. */
+/* "{id}" stands for a dataset, "{name}" for any other segment. Methods of one pattern that need different scopes are
+ * rows of their own. */
 static const struct route {
     const char *pattern;
     unsigned methods;
@@ -58,6 +59,8 @@ static const struct route {
     void (*handle)(struct request *request, const struct spl_call *call);
 } routes[] = {
     {"/", GET, SPL_SCOPE_NONE, false, index_page},
+    {"/v1/openapi.yaml", GET, SPL_SCOPE_NONE, false, spl_show_openapi_yaml},
+    {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
     {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
     {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, false, show_dataset},

@@ -112,6 +112,10 @@ void spl_make_view(struct request *request, const struct spl_call *call);
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
 
+/* openapi_route.c: /v1/openapi.yaml and .json. */
+void spl_show_openapi_yaml(struct request *request, const struct spl_call *call);
+void spl_show_openapi_json(struct request *request, const struct spl_call *call);
+
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail);

@@ -1,5 +1,5 @@
 """A daemon under test, and the client that talks to it. Every reply of status 400 or more is checked to be an RFC 9457
-problem; every daemon must end the way the test says. Standard library only."""
+problem, every reply to be what api/openapi.yaml promises (openapi.py); every daemon must end the way the test says."""
 import http.client
 import inspect
 import json
@@ -13,6 +13,8 @@ import threading
 import time
 import traceback
 import urllib.parse
+
+import openapi
 
 REAL, FAKE, WALL = (os.environ[name] for name in ("SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL"))
 VIEW = "/v1/datasets/wall/view"
@@ -75,6 +77,7 @@ class Daemon:
             own.close()
         if reply.status >= 400:
             check_problem(reply, method)
+        openapi.check(method, path, headers, body, reply)
         return reply
 
     def view(self, **params):
@@ -145,4 +148,6 @@ def run(namespace):
         except Exception:
             failed += 1
             print(f"FAIL {name}\n{traceback.format_exc()}", flush=True)
+    if not failed and len(sys.argv) == 1:
+        openapi.save(os.path.basename(sys.argv[0]))
     sys.exit(1 if failed else 0)

@@ -49,6 +49,7 @@ def test_the_deadline_ends_a_wait():
 
 def test_a_frame_slower_than_the_deadline_ends_too():
     with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=5000) as d:
+        assert d.post({"width": 16, "height": 16}).status == 503
         reply = d.ask(SMALL)
         assert reply.status == 503 and "100 ms" in reply.json()["detail"] or "deadline" in reply.json()["detail"]
 

@@ -159,6 +159,22 @@ def test_camera_forms_give_the_same_bytes():
             assert reply.body == first.body, (form, reply.headers["Splatd-Camera"], first.headers["Splatd-Camera"])
 
 
+def test_a_body_says_all_that_a_query_does():
+    look = {"eye": [3, 0.2, 1], "target": [0, 0, 1], "up": [0, 0, 1], "fov": 50}
+    size, rest = {"width": 64, "height": 48, "near": 0.5, "far": 9}, dict(
+        method="points", layer="depth", supersample=2, margin=0.5, background="102030", transparent=True, format="png",
+        lod=2, depth_scale=500)
+    with Daemon(REAL) as d:
+        by_query = d.view(eye="3,0.2,1", target="0,0,1", up="0,0,1", fov=50, **size, **{**rest, "transparent": "true"})
+        assert by_query.status == 200
+        assert d.post({"camera": {**look, **size}, **rest}).body == by_query.body
+        assert d.post({"camera": look, **size, **rest}).body == by_query.body
+        coarse, fine = (d.view(**LOOK, quality=quality, width=64, height=48).body for quality in (10, 95))
+        assert len(coarse) < len(fine)
+        same = {"camera": {k: v for k, v in look.items() if k != "fov"}, "width": 64, "height": 48, "quality": 10}
+        assert d.post(same).body == coarse
+
+
 def test_the_same_request_gives_the_same_bytes():
     with Daemon(REAL) as d:
         for form in ("jpeg", "png"):
