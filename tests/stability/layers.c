@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDTH = 320, HEIGHT = 240 };
+enum { WIDTH = 160, HEIGHT = 120 };
 
 static size_t pixels_of(const struct spl_image *image)
 {

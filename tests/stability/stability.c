@@ -1,16 +1,17 @@
 /* The stability suite: what must hold always, and how badly each method fails where it does.
  *
- *   stability invariants vulkan|egl [--whole]   limits from the truth and from arithmetic
+ *   stability invariants vulkan|egl [THEME…]    limits from the truth and from arithmetic; all themes or these
  *   stability drivers [--whole]                 Vulkan against EGL
  *   stability conditions [--whole]              measures what degrades and compares it with table.json, either way
  *   stability conditions --update [--whole]     writes the table anew; read it before it is committed
- *   stability plant half-pixel|margin-0         a planted fault: exits 0 only where the check meant for it catches it
+ *   stability plant half-pixel|margin-0|pop     a planted fault: exits 0 only where the check meant for it catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
  * prints what passes as well. Exit code 77: no such device here. */
 #include <stdio.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "themes.h"
 
 enum { SKIPPED = 77 };
@@ -19,9 +20,11 @@ static const struct {
     const char *name;
     enum plant plant;
     const char *caught_by;
+    void (*check)(struct suite *suite); /* the theme that it is in */
 } plants[] = {
-    {"half-pixel", PLANT_HALF_PIXEL, "lies-on-the-truth"},
-    {"margin-0", PLANT_MARGIN_0, "depth-unbiased"},
+    {"half-pixel", PLANT_HALF_PIXEL, "lies-on-the-truth", check_places},
+    {"margin-0", PLANT_MARGIN_0, "depth-unbiased", check_walls},
+    {"pop", PLANT_POP, "no-pop", check_motion},
 };
 
 static bool open_renderer(const char *backend, struct spl_renderer **renderer)
@@ -35,12 +38,35 @@ static bool open_renderer(const char *backend, struct spl_renderer **renderer)
     return true;
 }
 
-static int run_invariants(struct suite *suite, const char *backend)
+static const struct {
+    const char *name;
+    void (*check)(struct suite *suite);
+} themes[] = {
+    {"places", check_places}, {"walls", check_walls},   {"far-away", check_far_away}, {"levels", check_levels},
+    {"sums", check_sums},     {"motion", check_motion}, {"layers", check_layers},
+};
+
+static bool is_named(const char *const *names, const char *name)
+{
+    bool named = !*names;
+    for (; *names; names++)
+        named |= !strcmp(*names, name);
+    return named;
+}
+
+static int run_invariants(struct suite *suite, const char *backend, const char *const *wanted)
 {
     if (!open_renderer(backend, &suite->renderer))
         return SKIPPED;
-    check_surfaces(suite);
-    check_layers(suite);
+    for (size_t i = 0; i < sizeof themes / sizeof *themes; i++) {
+        if (!is_named(wanted, themes[i].name))
+            continue;
+        uint64_t begin = spl_now_ns();
+        size_t before = suite->report.passed;
+        themes[i].check(suite);
+        printf("%s: %zu checks passed, %.1f s\n", themes[i].name, suite->report.passed - before,
+               (double)(spl_now_ns() - begin) / SPL_NS_PER_S);
+    }
     return report_finish(&suite->report);
 }
 
@@ -60,7 +86,7 @@ static int run_plant(struct suite *suite, const char *name)
             suite->report.must_fail = plants[i].caught_by;
             if (!open_renderer("vulkan", &suite->renderer))
                 return SKIPPED;
-            check_surfaces(suite);
+            plants[i].check(suite);
             return report_finish(&suite->report);
         }
     return 2;
@@ -69,7 +95,7 @@ static int run_plant(struct suite *suite, const char *name)
 int main(int argc, char **argv)
 {
     struct suite suite = {0};
-    const char *words[2] = {"", ""};
+    const char *words[8] = {"", ""};
     int count = 0, rc = 2;
     bool update = false;
     for (int i = 1; i < argc; i++) {
@@ -79,18 +105,18 @@ int main(int argc, char **argv)
             suite.report.verbose = true;
         else if (!strcmp(argv[i], "--update"))
             update = true;
-        else if (count < 2)
+        else if (count < 7)
             words[count++] = argv[i];
     }
     if (!strcmp(words[0], "invariants") && *words[1])
-        rc = run_invariants(&suite, words[1]);
+        rc = run_invariants(&suite, words[1], words + 2);
     else if (!strcmp(words[0], "drivers"))
         rc = run_drivers(&suite);
     else if (!strcmp(words[0], "plant"))
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
-        fprintf(stderr, "usage: stability invariants vulkan|egl | drivers | conditions [--update] | plant "
-                        "half-pixel|margin-0 [--whole]\n");
+        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [--update] | plant "
+                        "half-pixel|margin-0|pop [--whole]\n");
     (void)update;
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);

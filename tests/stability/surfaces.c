@@ -43,7 +43,7 @@ static void check_place(struct suite *suite, const struct scan *scan)
 }
 
 /* The end of `density` that has 2000 points a square metre: 22 mm apart, a pixel is 19 mm. */
-static void check_dense_wall(struct suite *suite)
+void check_walls(struct suite *suite)
 {
     const double noise = 0.006, across = noise / sqrt(2); /* the beams come at 45 degrees */
     struct world world;
@@ -79,7 +79,7 @@ static void check_dense_wall(struct suite *suite)
 }
 
 /* The courtyard where it is, and elsewhere. */
-static void check_far_away(struct suite *suite)
+void check_far_away(struct suite *suite)
 {
     static const double far_away[3] = {5e6, -5e6, 5e6};
     size_t count;
@@ -117,12 +117,10 @@ static void check_far_away(struct suite *suite)
     world_finish(suite, &there);
 }
 
-void check_surfaces(struct suite *suite)
+void check_places(struct suite *suite)
 {
     static const char *const scenes[] = {"courtyard", "interior", "thin-walls", "railway",
                                          "powerline", "steps",    "density",    "tree"};
     for (size_t i = 0; i < (suite->whole ? sizeof scenes / sizeof *scenes : 2); i++)
         check_place(suite, &(struct scan){.scene = scenes[i], .points = 200000, .noise = -1});
-    check_dense_wall(suite);
-    check_far_away(suite);
 }

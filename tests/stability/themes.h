@@ -1,13 +1,16 @@
-/* The suite's themes, one file each. */
+/* The suite's themes: what must hold always. */
 #ifndef STABILITY_THEMES_H
 #define STABILITY_THEMES_H
 
 #include "world.h"
 
-/* What must hold always. */
-void check_layers(struct suite *suite); /* finite, in range, layers agree with each other; equal bytes on repeat */
-void check_surfaces(
-    struct suite *suite); /* dense walls have no holes, noisy ones no bias; far places are like near ones */
-void check_drivers(struct suite *suite); /* suite->renderer against suite->other */
+void check_places(struct suite *suite);   /* images lie where the truth lies */
+void check_walls(struct suite *suite);    /* dense ones have no holes, noisy ones no bias */
+void check_far_away(struct suite *suite); /* 5000 km from the origin all is as at it */
+void check_levels(struct suite *suite);   /* finer is not worse than coarser */
+void check_sums(struct suite *suite);     /* however many splats fall on a pixel, its colour is theirs */
+void check_motion(struct suite *suite);   /* no pop along a dolly, a turn, an approach */
+void check_layers(struct suite *suite);   /* finite, in range, layers agree with each other; equal bytes on repeat */
+void check_drivers(struct suite *suite);  /* suite->renderer against suite->other */
 
 #endif

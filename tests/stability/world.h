@@ -27,12 +27,12 @@ struct world {
     char name[64];
 };
 
-enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0 };
+enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP };
 
 struct suite {
     struct report report;
     struct spl_renderer *renderer, *other; /* other: to compare drivers with, may be NULL */
-    enum plant plant;                      /* done to every view that is rendered */
+    enum plant plant;                      /* done to every view that is rendered; a pop: halfway along a path */
     bool whole;
 };
 

@@ -1,0 +1,97 @@
+/* Along a path the image's error changes from frame to frame (api/measures.md: popping is its largest step). The limit
+ * is what the truth itself changes between two frames: what changes less than the motion does is not seen as a jump.
+ * Points are one sample of their pixel, each frame another, so they shimmer everywhere (table.json says how much); of
+ * them no step may stand out from the others, half as large again as their root mean square.
+ * The paths are those of a viewer at 25 frames a second: walking at 1.5 m/s, turning by 30 degrees a second; and a
+ * fall from 12 m to 1.5 m before a wall, which changes three levels of detail. */
+#include "themes.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "measure.h"
+
+enum { WIDTH = 128, HEIGHT = 96, FRAMES = 12 };
+static const double jump = 1.5; /* times the other steps */
+
+/* Frame i of a path. */
+static struct spl_view dolly(const struct world *world, int i)
+{
+    double eye[3] = {43.2 + 0.03 * i, -3, 1.7}, target[3] = {eye[0], 0, 2};
+    return world_look(world, eye, target, 50, WIDTH, HEIGHT);
+}
+
+static struct spl_view turn(const struct world *world, int i)
+{
+    double yaw = (105 - 1.2 * i) * M_PI / 180, eye[3] = {43.5, -3, 1.7};
+    return world_look(world, eye, (double[3]){eye[0] + cos(yaw), eye[1] + sin(yaw), 1.8}, 50, WIDTH, HEIGHT);
+}
+
+static struct spl_view approach(const struct world *world, int i)
+{
+    double away = 6 * pow(1.5 / 6, (double)i / (FRAMES - 1));
+    return world_look(world, (double[3]){44, -away, 2}, (double[3]){44, 0, 2}, 40, WIDTH, HEIGHT);
+}
+
+static const struct {
+    const char *name;
+    struct spl_view (*view)(const struct world *world, int i);
+} paths[] = {{"dolly", dolly}, {"turn", turn}, {"approach", approach}};
+
+static void must(int rc)
+{
+    if (rc)
+        abort();
+}
+
+static void check_path(struct suite *suite, const struct world *world, size_t p)
+{
+    struct spl_motion motion[SPL_METHOD_COUNT], own; /* own: the truth's, against an image that never changes */
+    struct spl_error err = {0};
+    uint8_t *grey = calloc((size_t)WIDTH * HEIGHT, 4);
+    struct spl_image still = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, WIDTH, HEIGHT, grey};
+    double flicker, popping, steps, step;
+    bool rendered = grey;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        spl_motion_init(&motion[method]);
+    spl_motion_init(&own);
+    for (int i = 0; i < FRAMES && rendered; i++) {
+        struct spl_view view = paths[p].view(world, i);
+        struct spl_image truth[SPL_LAYER_COUNT];
+        truth_render(world, &view.camera, truth);
+        must(spl_motion_add(&own, &truth[SPL_LAYER_COLOR], &still, 0, &err));
+        for (int method = 0; method < SPL_METHOD_COUNT && rendered; method++) {
+            struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
+            struct spl_frame frame;
+            view.method = (enum spl_method)method;
+            if (suite->plant == PLANT_POP && i >= FRAMES / 2)
+                view.lod = 16;
+            rendered = world_render(suite, world, &place, &view, &frame);
+            if (!rendered)
+                break;
+            must(spl_motion_add(&motion[method], &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR], 0, &err));
+            spl_frame_finish(&frame);
+        }
+        truth_finish(truth);
+    }
+    spl_motion_finish(&own, &steps, &step);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
+        spl_motion_finish(&motion[method], &flicker, &popping);
+        bool shimmers = method == SPL_METHOD_POINTS;
+        report_at_most(&suite->report, "no-pop", &place, popping, shimmers ? fmax(step, jump * flicker) : step,
+                       "levels; the truth's own largest step");
+        if (!shimmers)
+            report_at_most(&suite->report, "no-flicker", &place, flicker, steps, "levels; the truth's own steps");
+    }
+    free(grey);
+}
+
+void check_motion(struct suite *suite)
+{
+    struct world world;
+    world_init(&world, &(struct scan){.scene = "density", .points = suite->whole ? 1000000 : 200000, .noise = -1});
+    for (size_t p = 0; p < sizeof paths / sizeof *paths; p++)
+        check_path(suite, &world, p);
+    world_finish(suite, &world);
+}
