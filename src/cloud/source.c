@@ -54,6 +54,30 @@ fail:
     return code;
 }
 
+int spl_source_open_bytes(struct spl_source *source, const char *name, const void *bytes, size_t length,
+                          struct spl_error *err)
+{
+    *source = (struct spl_source){.fd = -1, .newline = '\n', .size = length, .end = length};
+    source->path = spl_alloc(strlen(name) + 1, 1, err);
+    source->buffer = spl_alloc_raw(SPL_SOURCE_WINDOW + 1, 1, err);
+    int code = SPL_E_NOMEM;
+    if (!source->path || !source->buffer)
+        goto fail;
+    memcpy(source->path, name, strlen(name));
+    if (length == 0 || length > SPL_SOURCE_WINDOW) {
+        code = length ? spl_source_fail(source, SPL_E_LIMIT, name, err, "%zu bytes; the limit is %d", length,
+                                        SPL_SOURCE_WINDOW)
+                      : spl_source_fail(source, SPL_E_INPUT, name, err, "is empty");
+        goto fail;
+    }
+    memcpy(source->buffer, bytes, length);
+    source->buffer[length] = 0;
+    return SPL_OK;
+fail:
+    spl_source_close(source);
+    return code;
+}
+
 void spl_source_close(struct spl_source *source)
 {
     if (source->fd >= 0)

@@ -24,6 +24,10 @@ struct spl_source {
 
 /* Opens a regular file; an empty one is refused. On failure nothing is held. */
 int spl_source_open(struct spl_source *source, const char *path, struct spl_error *err);
+
+/* The same over a copy of `bytes`, at most SPL_SOURCE_WINDOW of them; `name` stands for the path in messages. */
+int spl_source_open_bytes(struct spl_source *source, const char *name, const void *bytes, size_t length,
+                          struct spl_error *err);
 void spl_source_close(struct spl_source *source);
 
 /* The next bytes without consuming them: at least min(want, what the file has left); want <= SPL_SOURCE_WINDOW.

@@ -2,6 +2,7 @@
 #ifndef SPL_CLOUD_VIEW_LIST_H
 #define SPL_CLOUD_VIEW_LIST_H
 
+#include "cloud/source.h"
 #include "cloud/views.h"
 #include "geom/camera_json.h"
 
@@ -18,5 +19,10 @@ char *spl_view_list_print(struct spl_error *err, const char *format, ...) __attr
 
 int spl_view_list_load_json(struct spl_view_list *list, const char *path, struct spl_error *err);
 int spl_view_list_load_colmap(struct spl_view_list *list, const char *folder, struct spl_error *err);
+
+/* cameras.txt and images.txt from open sources, which stay the caller's. `folder` NULL: no photographs are looked for.
+ */
+int spl_view_list_read_colmap(struct spl_view_list *list, struct spl_source *cameras, struct spl_source *images,
+                              const char *folder, struct spl_error *err);
 
 #endif

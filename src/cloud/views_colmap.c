@@ -181,8 +181,7 @@ static int add_image(struct spl_view_list *list, const struct model *model, cons
         (rc = spl_value_check(&values[SPL_CAMERA_t], SPL_KIND_VECTOR, "t", &why)) ||
         (rc = spl_camera_from_values(values, NULL, &spl_view_list_limits, &camera, &why)))
         return fail_here(source, rc, &why, err);
-    photograph = find_photograph(folder, name, err);
-    if (!photograph)
+    if (folder && !(photograph = find_photograph(folder, name, err)))
         return SPL_E_NOMEM;
     char *dot = strrchr(name, '.'), *slash = strrchr(name, '/');
     if (dot && dot > (slash ? slash + 1 : name))
@@ -202,28 +201,32 @@ static int open_part(struct spl_source *source, const char *folder, const char *
     return rc;
 }
 
-int spl_view_list_load_colmap(struct spl_view_list *list, const char *folder, struct spl_error *err)
+int spl_view_list_read_colmap(struct spl_view_list *list, struct spl_source *cameras, struct spl_source *images,
+                              const char *folder, struct spl_error *err)
 {
     struct model model = {0};
-    struct spl_source source;
     char text[text_max];
-    int rc = open_part(&source, folder, "cameras.txt", err);
+    int rc;
+    while ((rc = next_line(cameras, text, err)) > 0 && !(rc = read_camera(&model, cameras, text, err)))
+        ;
+    while (!rc && (rc = next_line(images, text, err)) > 0) {
+        rc = add_image(list, &model, folder, images, text, err);
+        rc = rc ? rc : skip_points(images, err);
+    }
+    free(model.cameras);
+    return rc;
+}
+
+int spl_view_list_load_colmap(struct spl_view_list *list, const char *folder, struct spl_error *err)
+{
+    struct spl_source cameras, images;
+    int rc = open_part(&cameras, folder, "cameras.txt", err);
     if (rc)
         return rc;
-    while ((rc = next_line(&source, text, err)) > 0 && !(rc = read_camera(&model, &source, text, err)))
-        ;
-    spl_source_close(&source);
-    if (!rc)
-        rc = open_part(&source, folder, "images.txt", err);
-    if (rc)
-        goto done;
-    while ((rc = next_line(&source, text, err)) > 0) {
-        rc = add_image(list, &model, folder, &source, text, err);
-        if (rc || (rc = skip_points(&source, err)))
-            break;
+    if (!(rc = open_part(&images, folder, "images.txt", err))) {
+        rc = spl_view_list_read_colmap(list, &cameras, &images, folder, err);
+        spl_source_close(&images);
     }
-    spl_source_close(&source);
-done:
-    free(model.cameras);
+    spl_source_close(&cameras);
     return rc;
 }

@@ -1,0 +1,228 @@
+/* Which reader a path belongs to, and what all of them share: the size of the images, the check of each camera, the
+ * names in messages.
+ *
+ * Invariant: every camera that is taken has the reader's size and has passed spl_camera_check(). Any thread; no state.
+ */
+#include "cloud/path.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "cloud/path_reader.h"
+
+enum { width_default = 1280, height_default = 720 };
+static const double fov_default = 60;
+
+int spl_path_set_size(struct spl_path_reader *reader, double width, double height, struct spl_error *err)
+{
+    const struct spl_camera_limits *limits = reader->options->limits;
+    const uint32_t wanted[2] = {reader->options->width, reader->options->height};
+    double size[2] = {width, height};
+    for (int i = 0; i < 2; i++) {
+        const char *field = i ? "height" : "width";
+        size[i] = wanted[i] ? wanted[i] : size[i];
+        if (!(size[i] >= 1 && size[i] <= limits->side_px && size[i] == floor(size[i])))
+            return spl_fail_field(err, SPL_E_INPUT, field, "%s %g of the path is no whole number of 1 to %u pixels",
+                                  field, size[i], limits->side_px);
+    }
+    if (size[0] * size[1] > (double)limits->pixels)
+        return spl_fail_field(err, SPL_E_LIMIT, "width", "images of %.0f x %.0f are %.0f pixels; the limit is %llu",
+                              size[0], size[1], size[0] * size[1], (unsigned long long)limits->pixels);
+    reader->width = (uint32_t)size[0];
+    reader->height = (uint32_t)size[1];
+    return 0;
+}
+
+int spl_path_set_fov(const struct spl_path_reader *reader, double fov, struct spl_camera *camera, struct spl_error *err)
+{
+    const struct spl_camera_defaults *defaults = reader->options->defaults;
+    *camera = (struct spl_camera){.near = defaults ? defaults->near : SPL_CAMERA_NEAR_DEFAULT,
+                                  .far = defaults ? defaults->far : INFINITY};
+    if (isnan(fov))
+        fov = defaults ? defaults->fov : fov_default;
+    return spl_camera_set_fov(camera, fov, reader->width, reader->height, err);
+}
+
+int spl_path_take(struct spl_path_reader *reader, struct spl_camera *camera, double time, struct spl_error *err)
+{
+    double x = (double)reader->width / camera->width, y = (double)reader->height / camera->height;
+    camera->fx *= x;
+    camera->cx *= x;
+    camera->fy *= y;
+    camera->cy *= y;
+    camera->width = reader->width;
+    camera->height = reader->height;
+    int rc = spl_camera_check(camera, err);
+    return rc ? rc : spl_camera_path_add(reader->path, camera, time, err);
+}
+
+int spl_path_fail(const struct spl_path_reader *reader, size_t index, int rc, const struct spl_error *why,
+                  struct spl_error *err)
+{
+    char field[sizeof why->field];
+    if ((size_t)snprintf(field, sizeof field, "%s[%zu]%s%s", reader->list, index, why->field[0] ? "." : "",
+                         why->field) >= sizeof field)
+        snprintf(field, sizeof field, "%s[%zu]", reader->list, index);
+    return spl_fail_field(err, rc, field, "%s[%zu]: %s", reader->list, index, why->message);
+}
+
+int spl_path_get_number(const json_t *object, const char *name, double *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, name);
+    if (!json_is_number(json))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be a number; it is %s", name, spl_json_type_name(json));
+    *out = json_number_value(json);
+    return 0;
+}
+
+int spl_path_get_numbers(const json_t *object, const char *name, unsigned count, double *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, name);
+    if (!json_is_array(json) || json_array_size(json) != count)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array of %u numbers; it is %s of %zu", name, count,
+                              spl_json_type_name(json), json_array_size(json));
+    for (unsigned i = 0; i < count; i++) {
+        if (!json_is_number(json_array_get(json, i)))
+            return spl_fail_field(err, SPL_E_INPUT, name, "number %u of %s is %s", i + 1, name,
+                                  spl_json_type_name(json_array_get(json, i)));
+        out[i] = json_number_value(json_array_get(json, i));
+    }
+    return 0;
+}
+
+static int read_own_key(struct spl_path_reader *reader, json_t *view, struct spl_error *err)
+{
+    static const char *const others[] = {"camera", "time", NULL}, *const sides[] = {"width", "height"};
+    json_t *time = json_object_get(view, "time"), *camera = json_object_get(view, "camera");
+    struct spl_camera out;
+    if (time && !json_is_number(time))
+        return spl_fail_field(err, SPL_E_INPUT, "time", "time must be a number, not %s", spl_json_type_name(time));
+    for (int i = 0; i < 2; i++) // a field of view needs the shape of the outcome
+        if (!json_object_get(view, sides[i]) && !json_object_get(camera, sides[i]))
+            json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
+    int rc = spl_camera_from_json(view, others, reader->options->defaults, reader->options->limits, &out, err);
+    return rc ? rc : spl_path_take(reader, &out, time ? json_number_value(time) : NAN, err);
+}
+
+static int read_own(struct spl_path_reader *reader, const json_t *json, struct spl_error *err)
+{
+    const char *name;
+    json_t *value, *list = json_object_get(json, "keyframes");
+    reader->path->whole = !list;
+    reader->list = list ? "keyframes" : "frames";
+    json_object_foreach((json_t *)json, name, value)
+    {
+        bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed");
+        if (!number && !flag && strcmp(name, reader->list))
+            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; api/tours.md lists them",
+                                  name);
+        if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
+            return spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number above 0, at most 1000");
+        if (flag && !json_is_boolean(value))
+            return spl_fail_field(err, SPL_E_INPUT, name, "closed must be true or false, not %s",
+                                  spl_json_type_name(value));
+    }
+    list = json_object_get(json, reader->list);
+    if (!json_is_array(list))
+        return spl_fail_field(err, SPL_E_INPUT, reader->list, "%s must be an array, not %s", reader->list,
+                              spl_json_type_name(list));
+    reader->path->fps = json_number_value(json_object_get(json, "fps"));
+    reader->path->closed = json_is_true(json_object_get(json, "closed"));
+    int rc = spl_path_set_size(reader, width_default, height_default, err);
+    for (size_t i = 0; !rc && i < json_array_size(list); i++) {
+        struct spl_error why = {0};
+        if ((rc = read_own_key(reader, json_array_get(list, i), &why)))
+            spl_path_fail(reader, i, rc, &why, err);
+    }
+    return rc;
+}
+
+static int finish(struct spl_path_reader *reader, int rc, struct spl_error *err)
+{
+    if (!rc && !reader->path->count)
+        rc = spl_fail_field(err, SPL_E_INPUT, reader->list, "the path holds no camera");
+    if (rc)
+        spl_camera_path_finish(reader->path);
+    return rc;
+}
+
+static int read_json(struct spl_path_reader *reader, json_t *json, struct spl_error *err)
+{
+    if (json_object_get(json, "camera_path") || json_object_get(json, "camera_type"))
+        return spl_path_read_nerfstudio(reader, json, err);
+    if (json_object_get(json, "parameters") || json_object_get(json, "class_name"))
+        return spl_path_read_open3d(reader, json, err);
+    if (json_object_get(json, "images_txt") || json_object_get(json, "cameras_txt"))
+        return spl_path_read_colmap(reader, json, err);
+    if (json_object_get(json, "keyframes") || json_object_get(json, "frames"))
+        return read_own(reader, json, err);
+    if (json_is_object(json))
+        return spl_fail_field(err, SPL_E_INPUT, "path",
+                              "no path that is known: it has none of camera_path (nerfstudio), parameters (Open3D), "
+                              "images_txt (COLMAP), keyframes, frames");
+    if (!json_is_string(json))
+        return spl_fail_field(err, SPL_E_INPUT, "path", "a path is an object, or text for TUM; it is %s",
+                              spl_json_type_name(json));
+    struct spl_source source;
+    int rc = spl_source_open_bytes(&source, "path", json_string_value(json), json_string_length(json), err);
+    if (rc)
+        return rc;
+    rc = spl_path_read_tum(reader, &source, err);
+    spl_source_close(&source);
+    return rc;
+}
+
+int spl_camera_path_from_json(json_t *json, const struct spl_path_options *options, struct spl_camera_path *path,
+                              struct spl_error *err)
+{
+    struct spl_path_reader reader = {.options = options, .path = path, .list = "path"};
+    return finish(&reader, read_json(&reader, json, err), err);
+}
+
+static int load_file(struct spl_path_reader *reader, const char *file, struct spl_error *err)
+{
+    struct spl_source source;
+    const uint8_t *bytes;
+    size_t available;
+    int rc = spl_source_open(&source, file, err);
+    if (rc)
+        return rc;
+    rc = spl_source_peek(&source, 16, &bytes, &available, err);
+    size_t blank = 0;
+    while (!rc && blank < available && strchr(" \t\r\n", bytes[blank]) && bytes[blank])
+        blank++;
+    if (!rc && (blank == available || bytes[blank] != '{')) {
+        rc = spl_path_read_tum(reader, &source, err);
+    } else if (!rc) {
+        json_error_t where;
+        json_t *json = json_load_file(file, JSON_REJECT_DUPLICATES, &where);
+        struct spl_error why = {0};
+        if (!json)
+            rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", file, where.line, where.column,
+                          where.text);
+        else if ((rc = read_json(reader, json, &why)))
+            spl_fail_field(err, rc, why.field, "%s: %s", file, why.message);
+        json_decref(json);
+    }
+    spl_source_close(&source);
+    return rc;
+}
+
+int spl_camera_path_load(const char *file, const struct spl_path_options *options, struct spl_camera_path *path,
+                         struct spl_error *err)
+{
+    struct spl_path_reader reader = {.options = options, .path = path, .list = "path"};
+    struct stat status;
+    int rc;
+    if (!stat(file, &status) && S_ISDIR(status.st_mode)) {
+        struct spl_view_list views;
+        if (!(rc = spl_view_list_load(&views, file, err)))
+            rc = spl_path_read_views(&reader, &views, err);
+        spl_view_list_finish(rc ? NULL : &views);
+    } else {
+        rc = load_file(&reader, file, err);
+    }
+    return finish(&reader, rc, err);
+}

@@ -1,0 +1,100 @@
+/* The list of cameras itself, and how many frames are made of it. The way between them is in camera_spline.c.
+ *
+ * Invariant: all cameras have the size of the first; times, where there are any, belong to every camera and increase.
+ * Pure functions, any thread. */
+#include "geom/camera_path.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+const char *const spl_path_positions_names[] = {"centripetal", "uniform", "linear", NULL};
+const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
+const char *const spl_path_ease_names[] = {"none", "in", "out", "in-out", NULL};
+
+static const double fps_default = 30, fps_max = 1000, seconds_max = 86400;
+
+void spl_camera_path_finish(struct spl_camera_path *path)
+{
+    if (!path)
+        return;
+    free(path->cameras);
+    free(path->times);
+    *path = (struct spl_camera_path){0};
+}
+
+static int grow(struct spl_camera_path *path, struct spl_error *err)
+{
+    size_t capacity = path->capacity ? 2 * path->capacity : 16;
+    struct spl_camera *cameras = spl_realloc(path->cameras, capacity, sizeof *cameras, err);
+    if (!cameras)
+        return SPL_E_NOMEM;
+    path->cameras = cameras;
+    if (path->times || !path->count) {
+        double *times = spl_realloc(path->times, capacity, sizeof *times, err);
+        if (!times)
+            return SPL_E_NOMEM;
+        path->times = times;
+    }
+    path->capacity = capacity;
+    return 0;
+}
+
+int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,
+                        struct spl_error *err)
+{
+    const struct spl_camera *first = path->cameras;
+    if (path->count == SPL_CAMERA_PATH_MAX)
+        return spl_fail(err, SPL_E_LIMIT, "more than %d cameras", SPL_CAMERA_PATH_MAX);
+    if (path->count && (camera->width != first->width || camera->height != first->height))
+        return spl_fail_field(err, SPL_E_INPUT, "width", "%u x %u after cameras of %u x %u", camera->width,
+                              camera->height, first->width, first->height);
+    if (path->count == path->capacity && grow(path, err))
+        return SPL_E_NOMEM;
+    if (!path->count && isnan(time)) {
+        free(path->times);
+        path->times = NULL;
+    }
+    if (path->count && isnan(time) != !path->times)
+        return spl_fail_field(err, SPL_E_INPUT, "time", "a time must be given for every camera or for none");
+    if (path->times && !isfinite(time))
+        return spl_fail_field(err, SPL_E_INPUT, "time", "time %g is not finite", time);
+    if (path->times && path->count && !(time > path->times[path->count - 1]))
+        return spl_fail_field(err, SPL_E_INPUT, "time", "time %.17g is not later than the one before, %.17g", time,
+                              path->times[path->count - 1]);
+    path->cameras[path->count] = *camera;
+    if (path->times)
+        path->times[path->count] = time;
+    path->count++;
+    return 0;
+}
+
+int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, double fps, double seconds,
+                          size_t *count_out, double *fps_out, struct spl_error *err)
+{
+    bool timed = path->times && path->count > 1;
+    if (!isnan(fps) && !(fps > 0 && fps <= fps_max))
+        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps %g is outside 0 (exclusive) to %g", fps, fps_max);
+    if (!isnan(seconds) && !(seconds > 0 && seconds <= seconds_max))
+        return spl_fail_field(err, SPL_E_INPUT, "seconds", "seconds %g is outside 0 (exclusive) to %g", seconds,
+                              seconds_max);
+    if (frames && !isnan(seconds))
+        return spl_fail_field(err, SPL_E_INPUT, "seconds", "'frames' and 'seconds' exclude each other");
+    *fps_out = !isnan(fps) ? fps : path->fps > 0 ? path->fps : fps_default;
+    if (!frames && isnan(seconds) && path->whole && !(timed && !isnan(fps))) {
+        *count_out = path->count;
+        return 0;
+    }
+    if (!frames && isnan(seconds) && !timed)
+        return spl_fail_field(err, SPL_E_INPUT, "frames",
+                              "keyframes without times do not say how long the way is; give frames or seconds");
+    if (!frames && isnan(seconds))
+        seconds = path->times[path->count - 1] - path->times[0];
+    double count = frames ? (double)frames : floor(seconds * *fps_out + 0.5);
+    if (count > SPL_CAMERA_PATH_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, frames ? "frames" : "seconds", "%.0f frames; the limit is %d", count,
+                              SPL_CAMERA_PATH_MAX);
+    *count_out = count < 1 ? 1 : (size_t)count;
+    return 0;
+}

@@ -1,0 +1,67 @@
+/* A camera that moves: cameras in order, and what lies between them. Readers are in cloud/path.h. Pure functions, any
+ * thread. */
+#ifndef SPL_GEOM_CAMERA_PATH_H
+#define SPL_GEOM_CAMERA_PATH_H
+
+#include <stddef.h>
+
+#include <splatd/camera.h>
+
+#include "base/error.h"
+
+enum { SPL_CAMERA_PATH_MAX = 100000 }; /* cameras */
+
+/* Zero before use. */
+struct spl_camera_path {
+    struct spl_camera *cameras; /* all of one size */
+    double *times;              /* seconds, increasing; NULL = none are known */
+    size_t count, capacity;
+    bool whole;  /* the cameras are the frames; otherwise keyframes */
+    bool closed; /* the last is followed by the first */
+    double fps;  /* 0 = not said */
+};
+
+/* Takes NULL and zeroed paths. */
+void spl_camera_path_finish(struct spl_camera_path *path);
+
+/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size than the first, a
+ * time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX (SPL_E_LIMIT). */
+int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,
+                        struct spl_error *err);
+
+/* How positions go from one key to the next. Time between two keys is their difference in `times` where the path has
+ * them; otherwise it is proportional to the square root of their distance (centripetal: no cusps and no loops), equal
+ * (uniform), or proportional to the distance (linear: constant speed, corners at the keys). */
+enum spl_path_positions { SPL_POSITIONS_CENTRIPETAL, SPL_POSITIONS_UNIFORM, SPL_POSITIONS_LINEAR, SPL_POSITIONS_COUNT };
+enum spl_path_rotations { SPL_ROTATIONS_SQUAD, SPL_ROTATIONS_SLERP, SPL_ROTATIONS_COUNT };
+enum spl_path_ease { SPL_EASE_NONE, SPL_EASE_IN, SPL_EASE_OUT, SPL_EASE_IN_OUT, SPL_EASE_COUNT };
+
+struct spl_path_motion {
+    enum spl_path_positions positions;
+    enum spl_path_rotations rotations;
+    enum spl_path_ease ease; /* of the whole way; in: starts from rest, out: ends at rest */
+};
+
+/* NULL-terminated names, indexed by the enums. */
+extern const char *const spl_path_positions_names[], *const spl_path_rotations_names[], *const spl_path_ease_names[];
+
+/* `frames` >= 1 cameras evenly spaced in time into `out`, the caller's. An open path's first and last frame are its
+ * first and last key; a closed one's last frame is one step before its first, so that it repeats without a stop.
+ *
+ * Positions are Catmull-Rom splines over those times (Barry and Goldman's pyramid as cubic Hermite pieces), rotations
+ * squad (Shoemake) with inner points for uneven times: both pass through every key, and velocity is continuous, with
+ * linear and slerp it is not. Focal lengths go like positions, by their logarithm. A whole path asked for as many
+ * frames as it has, without ease, is handed out as it is.
+ *
+ * Refuses an empty path, and a camera that leaves what spl_camera_check() allows, naming the frame. */
+int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
+                           struct spl_camera *out, struct spl_error *err);
+
+/* Frames of a tour: `frames` (0 = not given) or `fps` times `seconds` (NAN = not given), which exclude each other. A
+ * whole path without either has as many frames as cameras, but for one with times and an fps; those and keyframes
+ * with times last as long as the times say, at `fps` or 30. `*fps_out` is what a video of it runs at: fps, the path's
+ * own, or 30. Fields "frames", "fps", "seconds". */
+int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, double fps, double seconds,
+                          size_t *count_out, double *fps_out, struct spl_error *err);
+
+#endif
