@@ -1,7 +1,8 @@
 /* The SVG chart: axes, curves, points, legend, labels. Points and labels are laid out first, in units of the picture,
  * so that a label can be tried at eight places round its point and dropped where none is free. Text widths are
- * estimates for a sans-serif face (0.56 em a character), which is all a file without fonts can know. Pure; any thread.
- */
+ * estimates for a sans-serif face (0.56 em a character), which is all a file without fonts can know. The root's
+ * data-plot (left, top, right, bottom), data-ms (logarithmic) and data-psnr say where the axes lie, for those who add
+ * points of their own. Pure; any thread. */
 #include "measure/chart.h"
 
 #include <math.h>
@@ -246,8 +247,9 @@ static void write_chart(struct layout *l, const struct spl_chart *chart)
 {
     fprintf(l->out,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"spl-chart\" viewBox=\"0 0 %d %d\" role=\"img\" "
-            "font-family=\"system-ui, sans-serif\" font-size=\"12\">\n<title>",
-            WIDTH, HEIGHT);
+            "font-family=\"system-ui, sans-serif\" font-size=\"12\" data-plot=\"%d %d %d %d\" data-ms=\"%.9g %.9g\" "
+            "data-psnr=\"%.9g %.9g\">\n<title>",
+            WIDTH, HEIGHT, LEFT, TOP, WIDTH - RIGHT, HEIGHT - BOTTOM, l->ms_low, l->ms_high, l->psnr_low, l->psnr_high);
     spl_markup_text(l->out, chart->title);
     fprintf(l->out, "</title>\n%s<rect class=\"ground\" width=\"%d\" height=\"%d\"/>\n", style, WIDTH, HEIGHT);
     fprintf(l->out, "<text x=\"%d\" y=\"20\" font-size=\"15\" font-weight=\"600\">", LEFT);

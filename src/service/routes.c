@@ -19,6 +19,10 @@ enum {
 static void index_page(struct request *request, const struct spl_call *call)
 {
     (void)call;
+    if (spl_wants_page(request)) {
+        spl_show_page(request);
+        return;
+    }
     struct spl_service *service = request->service;
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
@@ -26,6 +30,8 @@ static void index_page(struct request *request, const struct spl_call *call)
     spl_reply_json(request,
                    json_pack("{s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "openapi",
                              "/v1/openapi.json", "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
+    if (request->response)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT);
 }
 
 static void list_datasets(struct request *request, const struct spl_call *call)
@@ -59,6 +65,9 @@ static const struct route {
     void (*handle)(struct request *request, const struct spl_call *call);
 } routes[] = {
     {"/", GET, SPL_SCOPE_NONE, false, index_page},
+    {"/viewer/{name}", GET, SPL_SCOPE_NONE, false, spl_show_viewer_file},
+    {"/embed/{name}", GET, SPL_SCOPE_NONE, false, spl_show_embed},
+    {"/clients/{name}", GET, SPL_SCOPE_NONE, false, spl_show_client},
     {"/v1/openapi.yaml", GET, SPL_SCOPE_NONE, false, spl_show_openapi_yaml},
     {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},

@@ -116,6 +116,13 @@ void spl_show_profile(struct request *request, const struct spl_call *call);
 void spl_show_openapi_yaml(struct request *request, const struct spl_call *call);
 void spl_show_openapi_json(struct request *request, const struct spl_call *call);
 
+/* page_route.c: / for browsers, /viewer/, /embed/ and /clients/, all from the binary. */
+bool spl_wants_page(struct request *request); /* its Accept names text/html, and nothing of JSON before that */
+void spl_show_page(struct request *request);
+void spl_show_viewer_file(struct request *request, const struct spl_call *call);
+void spl_show_embed(struct request *request, const struct spl_call *call);
+void spl_show_client(struct request *request, const struct spl_call *call);
+
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail);

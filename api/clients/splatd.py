@@ -1,0 +1,122 @@
+"""Client of splatd. Standard library only; one file, to be copied anywhere.
+
+    from splatd import Splatd, ring
+    hall = Splatd("http://127.0.0.1:8080").dataset("hall")
+    for i, camera in enumerate(ring(hall.center, 36, radius=6, height=3)):
+        with open(f"view{i:02}.jpg", "wb") as file:
+            file.write(hall.view(**camera, width=1280, height=720, fov=50).bytes)
+
+On the command line:  python3 splatd.py http://127.0.0.1:8080 hall eye=4,5,6 target=0,0,1 layer=depth > depth.png
+"""
+import array
+import json
+import math
+import sys
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+
+
+class SplatdError(Exception):
+    """What the service refused: `status`, `field` (the parameter at fault, or ""), and its words."""
+
+    def __init__(self, status, problem):
+        self.status, self.field = status, problem.get("field", "")
+        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'no reason given'}")
+
+
+class View:
+    """An encoded image: its `bytes`, `type`, and `headers`; `camera` is the one that was used."""
+
+    def __init__(self, body, headers):
+        self.bytes, self.type, self.headers = body, headers["Content-Type"], headers
+        self.camera = json.loads(headers["Splatd-Camera"]) if headers["Splatd-Camera"] else None
+
+
+class Dataset:
+    """`info` is what /v1/datasets/{id} says."""
+
+    def __init__(self, service, info):
+        self.service, self.info, self.id = service, info, info["id"]
+        low, high = info["bounds"]["min"], info["bounds"]["max"]
+        self.center = [(a + b) / 2 for a, b in zip(low, high)]
+
+    def view(self, **params):
+        """One view. Parameters as in api/openapi.yaml; vectors are lists. A `camera` (a dict, any convention) is sent as JSON."""
+        if "camera" in params:
+            return View(*self.service.ask(self.info["view"], json.dumps(params).encode()))
+        return View(*self.service.ask(f"{self.info['view']}?{query(params)}"))
+
+    def depth(self, layer="depth", **params):
+        """(width, height, array of floats row by row): metres, NaN where nothing is."""
+        view = self.view(**params, layer=layer, format="raw")
+        values = array.array("f", view.bytes)
+        if sys.byteorder == "big":
+            values.byteswap()
+        return view.camera["width"], view.camera["height"], values
+
+    def pick(self, x, y, **params):
+        """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
+        return self.service.json(f"{self.info['uri']}/pick?{query({'x': x, 'y': y, **params})}")
+
+
+class Splatd:
+    def __init__(self, url="http://127.0.0.1:8080", token=None, timeout=60, patience=30):
+        """`patience`: seconds that a busy service is asked again, when it says when."""
+        self.url, self.timeout, self.patience = url.rstrip("/"), timeout, patience
+        self.headers = {"Authorization": f"Bearer {token}"} if token else {}
+
+    def ask(self, path, body=None):
+        """(bytes, headers) of a GET, or of a POST of JSON."""
+        headers = {**self.headers, **({"Content-Type": "application/json"} if body else {})}
+        until = time.monotonic() + self.patience
+        while True:
+            try:
+                request = urllib.request.Request(urllib.parse.urljoin(self.url + "/", path), body, headers)
+                with urllib.request.urlopen(request, timeout=self.timeout) as reply:
+                    return reply.read(), reply.headers
+            except urllib.error.HTTPError as error:
+                wait, text = error.headers["Retry-After"], error.read()
+                if not wait or time.monotonic() + int(wait) > until:
+                    try:
+                        problem = json.loads(text)
+                    except ValueError:
+                        problem = {"title": error.reason}
+                    raise SplatdError(error.code, problem) from None
+            time.sleep(int(wait))
+
+    def json(self, path):
+        return json.loads(self.ask(path)[0])
+
+    def datasets(self):
+        return [info["id"] for info in self.json("/v1/datasets")["datasets"]]
+
+    def dataset(self, name):
+        return Dataset(self, self.json(f"/v1/datasets/{urllib.parse.quote(name, safe='')}"))
+
+
+def query(params):
+    def text(value):
+        if isinstance(value, bool):
+            return str(value).lower()
+        return ",".join(map(text, value)) if isinstance(value, (list, tuple)) else str(value)
+    return urllib.parse.urlencode({name: text(value) for name, value in params.items() if value is not None}, safe=",:")
+
+
+def ring(target, count, radius, height, up=(0, 0, 1)):
+    """`count` cameras {eye, target, up} on a level circle round `target`, looking at it; z is up."""
+    for i in range(count):
+        angle = 2 * math.pi * i / count
+        eye = [target[0] + radius * math.cos(angle), target[1] + radius * math.sin(angle), target[2] + height]
+        yield {"eye": eye, "target": list(target), "up": list(up)}
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3 or not all("=" in pair for pair in sys.argv[3:]):
+        sys.exit("usage: splatd.py URL DATASET [NAME=VALUE…] > IMAGE")
+    try:
+        found = Splatd(sys.argv[1]).dataset(sys.argv[2]).view(**dict(pair.split("=", 1) for pair in sys.argv[3:]))
+    except (SplatdError, OSError) as error:
+        sys.exit(f"splatd.py: {error}")
+    sys.stdout.buffer.write(found.bytes)

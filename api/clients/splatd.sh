@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# Client of splatd: curl and awk, one file.
+#
+#   splatd.sh datasets
+#   splatd.sh info hall
+#   splatd.sh view hall view.jpg eye=4,5,6 target=0,0,1 fov=50
+#   splatd.sh view hall depth.png eye=4,5,6 target=0,0,1 layer=depth
+#   splatd.sh pick hall 640 360 eye=4,5,6 target=0,0,1
+#   splatd.sh ring hall views 36 6 3 target=0,0,1 fov=50   # views/00.jpg … 35.jpg: 36 views, 6 m round the target, 3 m above it
+#
+# SPLATD_URL names the service (http://127.0.0.1:8080), SPLATD_TOKEN a token. A busy service is asked again when it says.
+set -euo pipefail
+
+base=${SPLATD_URL:-http://127.0.0.1:8080} base=${base%/}
+usage() { sed -n '4,9s/^# \{0,3\}//p' "$0" >&2; exit 2; }
+
+# URL…: prints the reply; a refusal is told on stderr.
+ask() {
+    local body status
+    body=$(mktemp)
+    status=$(curl -sS --retry 5 --max-time 120 ${SPLATD_TOKEN:+-H "Authorization: Bearer $SPLATD_TOKEN"} -o "$body" -w '%{http_code}' "$1") ||
+        { rm -f "$body"; return 1; }
+    if [ "$status" != 200 ]; then
+        echo "splatd.sh: $status: $(sed -n 's/.*"detail": "\(.*\)",\{0,1\}$/\1/p' "$body")" >&2
+        rm -f "$body"
+        return 1
+    fi
+    cat "$body"
+    rm -f "$body"
+}
+
+# NAME=VALUE…: a query
+query() { local IFS='&'; echo "$*" | sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/+/%2B/g'; }
+
+# DATASET FILE NAME=VALUE…
+view() {
+    local id=$1 file=$2
+    shift 2
+    ask "$base/v1/datasets/$id/view?$(query "$@")" >"$file.part" && mv "$file.part" "$file" || { rm -f "$file.part"; return 1; }
+}
+
+# DATASET DIR COUNT RADIUS HEIGHT target=X,Y,Z NAME=VALUE…
+ring() {
+    local id=$1 dir=$2 count=$3 radius=$4 height=$5 target=${6#target=} i=0 eye
+    [ "target=$target" = "$6" ] || usage
+    shift 6
+    mkdir -p "$dir"
+    awk -v n="$count" -v r="$radius" -v h="$height" -v t="$target" 'BEGIN {
+        split(t, c, ",")
+        for (i = 0; i < n; i++) {
+            a = 8 * atan2(1, 1) * i / n
+            printf "%.9g,%.9g,%.9g\n", c[1] + r * cos(a), c[2] + r * sin(a), c[3] + h
+        }
+    }' | while read -r eye; do
+        view "$id" "$(printf '%s/%02d.jpg' "$dir" "$i")" "eye=$eye" "target=$target" format=jpeg "$@"
+        i=$((i + 1))
+    done
+}
+
+command=${1-}
+[ $# -gt 0 ] && shift
+case $command in
+datasets) ask "$base/v1/datasets" | sed -n 's/^ *"id": "\(.*\)",$/\1/p' ;;
+info) [ $# = 1 ] || usage; ask "$base/v1/datasets/$1"; echo ;;
+view) [ $# -ge 2 ] || usage; view "$@" ;;
+pick) [ $# -ge 3 ] || usage; id=$1 x=$2 y=$3; shift 3; ask "$base/v1/datasets/$id/pick?$(query "x=$x" "y=$y" "$@")"; echo ;;
+ring) [ $# -ge 6 ] || usage; ring "$@" ;;
+*) usage ;;
+esac

@@ -1,0 +1,116 @@
+// A look-at camera, as the service takes it: {eye, target, up, fov}, fov vertical in degrees. All functions are pure and
+// return new cameras. The camera frame is x right, y down, z forward, as in api/cameras.md; pixels count from the corner.
+
+export const add = (a, b) => a.map((x, i) => x + b[i]);
+export const sub = (a, b) => a.map((x, i) => x - b[i]);
+export const times = (a, s) => a.map((x) => x * s);
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const length = (a) => Math.hypot(...a);
+export const unit = (a) => times(a, 1 / length(a));
+export const distance = (camera) => length(sub(camera.target, camera.eye));
+
+/** The camera's axes in the world. */
+export function axes(camera) {
+  const forward = unit(sub(camera.target, camera.eye));
+  const right = unit(cross(forward, camera.up));
+  return {right, down: cross(forward, right), forward};
+}
+
+/** Focal length for an image of this height, in the height's unit. */
+export const focal = (camera, height) => height / 2 / Math.tan((camera.fov * Math.PI) / 360);
+
+/** [x, y, depth] of a world point in an image of size [width, height]; null behind the eye. */
+export function project(camera, [width, height], point) {
+  const {right, down, forward} = axes(camera);
+  const p = sub(point, camera.eye);
+  const z = dot(p, forward);
+  const f = focal(camera, height);
+  return z > 0 ? [(f * dot(p, right)) / z + width / 2, (f * dot(p, down)) / z + height / 2, z] : null;
+}
+
+/** Direction through a pixel, one long along the viewing axis. */
+export function ray(camera, [width, height], [x, y]) {
+  const {right, down, forward} = axes(camera);
+  const f = focal(camera, height);
+  return add(forward, add(times(right, (x - width / 2) / f), times(down, (y - height / 2) / f)));
+}
+
+/** Rodrigues: `v` turned by `angle` about the unit vector `axis`. */
+function turn(v, axis, angle) {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return add(add(times(v, c), times(cross(axis, v), s)), times(axis, dot(axis, v) * (1 - c)));
+}
+
+/** A viewing direction turned by yaw about `up` and by pitch, stopping short of the poles. */
+function swing(direction, up, yaw, pitch) {
+  const pole = unit(up);
+  const angle = Math.acos(Math.min(1, Math.max(-1, dot(unit(direction), pole))));
+  const wanted = Math.min(Math.PI - 0.01, Math.max(0.01, angle - pitch));
+  return turn(turn(direction, unit(cross(direction, pole)), angle - wanted), pole, yaw);
+}
+
+/** Round the target. */
+export function orbit(camera, yaw, pitch) {
+  return {...camera, eye: sub(camera.target, swing(sub(camera.target, camera.eye), camera.up, yaw, pitch))};
+}
+
+/** Turns the head: the eye stays. */
+export function look(camera, yaw, pitch) {
+  return {...camera, target: add(camera.eye, swing(sub(camera.target, camera.eye), camera.up, yaw, pitch))};
+}
+
+/** Eye and target by so much along the camera's axes; `rise` goes along `up`. */
+export function move(camera, rightward, rise, ahead) {
+  const {right, forward} = axes(camera);
+  const step = add(add(times(right, rightward), times(unit(camera.up), rise)), times(forward, ahead));
+  return {...camera, eye: add(camera.eye, step), target: add(camera.target, step)};
+}
+
+/** What lies at the target's depth follows the pointer by (dx, dy) pixels of an image of this height. */
+export function pan(camera, dx, dy, height) {
+  const {right, down} = axes(camera);
+  const scale = distance(camera) / focal(camera, height);
+  const step = add(times(right, -dx * scale), times(down, -dy * scale));
+  return {...camera, eye: add(camera.eye, step), target: add(camera.target, step)};
+}
+
+/** Comes nearer (factor < 1) to what is under `pixel` at the target's depth; never nearer to the target than `least`. */
+export function dolly(camera, factor, size, pixel, least) {
+  const d = distance(camera);
+  const {forward} = axes(camera);
+  const eye = add(camera.eye, times(ray(camera, size, pixel), d * (1 - factor)));
+  return {...camera, eye, target: add(eye, times(forward, Math.max(d * factor, least)))};
+}
+
+/** Looks at `target` from the same side as before. */
+export const aim = (camera, target) => ({...camera, eye: add(camera.eye, sub(target, camera.target)), target});
+
+/** How an image that `from` took has to be bent to stand for what `to` sees, if everything lay in the plane through the
+ * target: a CSS matrix3d; "" where part of it falls behind the eye. */
+export function warp(from, to, [width, height]) {
+  const a = axes(from), b = axes(to);
+  const [f, g, d] = [focal(from, height), focal(to, height), distance(from)];
+  const [cx, cy] = [width / 2, height / 2];
+  // Columns: what one pixel to the right, one pixel down, and pixel (0, 0) itself are in the world, from to.eye.
+  const columns = [times(a.right, d / f), times(a.down, d / f),
+    add(sub(from.eye, to.eye), add(times(a.forward, d), add(times(a.right, (-cx * d) / f), times(a.down, (-cy * d) / f))))];
+  const h = columns.map((v) => {
+    const z = dot(v, b.forward);
+    return [g * dot(v, b.right) + cx * z, g * dot(v, b.down) + cy * z, z];
+  });
+  const corners = [[0, 0], [width, 0], [0, height], [width, height]];
+  if (corners.some(([x, y]) => h[0][2] * x + h[1][2] * y + h[2][2] < 0.05 * d)) return "";
+  const m = h.map((column) => column.map((x) => x / h[2][2]));
+  return `matrix3d(${[m[0][0], m[0][1], 0, m[0][2], m[1][0], m[1][1], 0, m[1][2], 0, 0, 1, 0, m[2][0], m[2][1], 0, 1]})`;
+}
+
+/** Coordinates rounded to what a pixel can tell at this distance. */
+export function rounded(camera) {
+  const digits = Math.min(12, Math.max(0, 4 - Math.floor(Math.log10(distance(camera)))));
+  const round = (v) => v.map((x) => Number(x.toFixed(digits)) + 0);
+  return {eye: round(camera.eye), target: round(camera.target), up: camera.up.map((x) => Number(x.toFixed(6)) + 0),
+    fov: Number(camera.fov.toFixed(3))};
+}
+
+export const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);

@@ -1,0 +1,37 @@
+// What is on screen as text: the URL's fragment, and a command that fetches the same picture.
+
+const VECTORS = ["eye", "target", "up"], NUMBERS = ["fov", "lod", "supersample"], TEXTS = ["dataset", "layer", "method", "budget"];
+
+/** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. */
+export function parse(fragment) {
+  const found = {};
+  for (const [name, text] of new URLSearchParams(fragment.replace(/^#/, "").replaceAll("+", "%2B"))) {
+    const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
+    if (VECTORS.includes(name) && numbers.length === 3 && numbers.every(Number.isFinite)) found[name] = numbers;
+    else if (NUMBERS.includes(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
+    else if (TEXTS.includes(name)) found[name] = text;
+  }
+  return found;
+}
+
+/** The same command on every shell that knows single quotes. */
+export function curl(url, layer) {
+  const absolute = new URL(url, location.href).href.replaceAll("%2C", ",").replaceAll("'", "%27");
+  return `curl -o ${layer === "color" ? "view" : layer}.jpg '${absolute}'`;
+}
+
+/** Without a secure context there is no clipboard API; the old command still works there. */
+export async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    const area = document.createElement("textarea");
+    area.value = text;
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    return done;
+  }
+}

@@ -1,0 +1,166 @@
+// The page: fills the controls from what the service says and ties them to the stage.
+
+import {Chart} from "./chart.js";
+import {attach} from "./input.js";
+import {copy, curl, parse} from "./link.js";
+import {notices} from "./notice.js";
+import {Points, coordinates, metres} from "./points.js";
+import {askJson, query, setToken} from "./service.js";
+import {Stage} from "./stage.js";
+import {Tour} from "./tour.js";
+import {editTour} from "./tour_editor.js";
+
+const $ = (id) => document.getElementById(id);
+const SETTINGS = ["layer", "method", "lod", "supersample", "budget"];
+
+const stage = new Stage($("stage"));
+const points = new Points(stage, document.querySelector(".marks"));
+const chart = new Chart($("chart"));
+const tour = new Tour(stage);
+attach(stage);
+
+function say(text) {
+  $("said").textContent = "";
+  $("said").getBoundingClientRect(); // so that the same words are shown, and read, again
+  $("said").textContent = text;
+}
+
+function choices(select, names, value) {
+  select.replaceChildren(...names.map((name) => new Option(name, name, false, name === value)));
+}
+
+const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+
+/** What the controls say, as parameters of a view; a budget chooses the others. */
+function readSettings() {
+  const settings = Object.fromEntries(SETTINGS.map((name) => [name, $(name).value]));
+  for (const name of ["method", "lod", "supersample"]) $(name).disabled = settings.budget !== "";
+  stage.coarse = $("moving").value;
+  return settings;
+}
+
+function writeLink() {
+  const {eye, target, up, fov} = stage.params();
+  const {budget, ...setting} = stage.settings;
+  history.replaceState(null, "", `#${query({dataset: stage.dataset.id, eye, target, up, fov, layer: setting.layer,
+    ...(budget ? {budget} : setting)})}`);
+}
+
+/** Opens what the fragment names, else the first dataset. */
+async function open() {
+  const wanted = parse(location.hash);
+  try {
+    const [{datasets}, {limits, device}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
+    const ids = datasets.map(({id}) => id);
+    const id = wanted.dataset ?? ids[0];
+    choices($("dataset"), ids.includes(id) || !id ? ids : [...ids, id], id);
+    $("about").title = `${device.backend}: ${device.name}`;
+    if (!id) return stage.report(Object.assign(new Error("No dataset is served yet"), {kind: "gone"}));
+    const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
+    stage.pixels = limits.pixels;
+    choices($("layer"), dataset.layers, wanted.layer ?? "color");
+    choices($("method"), dataset.methods, wanted.method ?? "splat");
+    for (const name of ["lod", "supersample", "budget"]) $(name).value = wanted[name] ?? (name === "budget" ? "" : 1);
+    stage.settings = readSettings();
+    const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
+    $("about").textContent = `${thousands(dataset.points)} points, ${size} m`;
+    document.title = `${id} – splatd`;
+    stage.element.ariaLabel = `View of ${id}`;
+    stage.report(null);
+    const camera = Object.fromEntries(["eye", "target", "up", "fov"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]));
+    stage.open(dataset, camera);
+    points.clear();
+    tour.open(id);
+    await chart.open(dataset);
+  } catch (problem) {
+    stage.report(problem);
+  }
+}
+
+function showFrame({detail: frame}) {
+  const distances = ["depth", "range"].includes(stage.settings.layer) && frame.near !== null;
+  $("legend").hidden = !distances;
+  const [near, far] = $("legend").querySelectorAll("span");
+  if (distances) [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} m`);
+  const took = frame.stages.frame + (frame.stages.encode ?? 0);
+  $("facts").textContent = `${frame.width} × ${frame.height}, ${took.toFixed(0)} ms${frame.full ? "" : ", coarse"}`;
+  chart.show(frame, frame.full ? stage.settings : {});
+  if (!frame.full) return;
+  const {chosen, promised, demand} = frame;
+  $("chosen").textContent = chosen ? `Chosen: ${chosen.method}, level ${chosen.lod}, ${chosen.supersample} samples a side`
+    + `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}` : "";
+  writeLink();
+}
+
+function showPoints({detail}) {
+  const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
+  if (points.distance !== null) rows.push(["A – B", metres(points.distance)]);
+  $("points").replaceChildren(...rows.flat().map((text, i) => {
+    const cell = document.createElement(i % 2 ? "dd" : "dt");
+    cell.textContent = text;
+    return cell;
+  }));
+  $("clear").disabled = !points.list.length;
+  if (typeof detail === "string") say(detail);
+  else say(points.distance === null ? `Point at ${coordinates(detail.position)}`
+    : `Point at ${coordinates(detail.position)}; distance ${metres(points.distance)}`);
+}
+
+/** Double click: turns towards what is there, which is then what one orbits. */
+async function lookAt({detail: pixel}) {
+  points.undo();
+  const found = await points.find(pixel).catch(() => null);
+  if (!found) return say("Nothing there");
+  const {eye, target} = stage.camera;
+  const began = performance.now();
+  const step = (now) => {
+    const t = Math.min(1, Math.max(0, (now - began) / 300));
+    const s = t * t * (3 - 2 * t);
+    stage.setCamera({...stage.camera, eye, target: target.map((x, i) => x + s * (found.position[i] - x))});
+    if (t < 1) requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+}
+
+async function copied(text, what) {
+  say((await copy(text)) ? `${what} copied` : text);
+}
+
+stage.addEventListener("frame", showFrame);
+stage.addEventListener("click", ({detail}) => points.add(detail));
+stage.addEventListener("dblclick", lookAt);
+points.addEventListener("change", showPoints);
+notices(stage, $("notice"), $("again"), open);
+stage.addEventListener("state", ({detail: problem}) => {
+  $("token").hidden = problem?.kind !== "token";
+});
+editTour(tour, say);
+
+for (const name of [...SETTINGS, "moving"])
+  $(name).addEventListener("change", () => $(name).checkValidity() && stage.dataset && stage.set(readSettings()));
+for (const radio of document.querySelectorAll("[name=drag]"))
+  radio.addEventListener("change", () => (stage.drag = radio.value));
+stage.drag = document.querySelector("[name=drag]:checked").value; // browsers keep it over a reload
+$("dataset").addEventListener("change", () => {
+  location.hash = query({dataset: $("dataset").value, layer: $("layer").value});
+});
+$("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
+$("link").addEventListener("click", () => copied(location.href, "Link"));
+$("curl").addEventListener("click", () => stage.dataset && copied(curl(stage.url(), stage.settings.layer), "Command"));
+$("clear").addEventListener("click", () => points.clear());
+$("token").addEventListener("submit", (event) => {
+  event.preventDefault();
+  setToken($("token").querySelector("input").value);
+  $("token").hidden = true;
+  open();
+});
+function fold(button, target, shown) {
+  target.hidden = !shown;
+  button.ariaExpanded = String(shown);
+}
+$("toggle").addEventListener("click", () => fold($("toggle"), $("panel"), $("panel").hidden));
+$("accuracy").addEventListener("click", () => fold($("accuracy"), $("chart"), $("chart").hidden));
+addEventListener("keydown", (event) => event.key === "Escape" && points.list.length && points.clear());
+addEventListener("hashchange", open);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.refresh());
+open();

@@ -1,0 +1,26 @@
+// What stands over the picture when there is none, or none that is new.
+
+const TITLES = {busy: "The service is busy", rebuilding: "The device is being rebuilt", gone: "Not there",
+  refused: "Refused", token: "A token is needed", offline: "No connection"};
+
+/** Shows the stage's state in `box`; its button asks again, by `open` when nothing is open yet. */
+export function notices(stage, box, again, open) {
+  let counting = 0;
+  stage.addEventListener("state", ({detail: problem}) => {
+    clearInterval(counting);
+    box.hidden = !problem;
+    if (!problem) return;
+    let seconds = Math.ceil(problem.seconds ?? 0);
+    box.querySelector("p").textContent = `${TITLES[problem.kind] ?? "Failed"}: ${problem.message}`;
+    const tell = () => {
+      box.querySelector("small").textContent = !problem.seconds ? "" : seconds > 0 ? `Trying again in ${seconds} s` : "Trying again";
+      seconds--;
+    };
+    tell();
+    again.hidden = Boolean(problem.seconds) && Boolean(stage.dataset);
+    if (!problem.seconds) return;
+    counting = setInterval(tell, 1000);
+    if (!stage.dataset) setTimeout(open, problem.seconds * 1000); // else the stage does
+  });
+  again.addEventListener("click", open);
+}

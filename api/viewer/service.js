@@ -1,0 +1,47 @@
+// Asks the service. What it refuses becomes a Problem that says what kind it is and when to come back.
+
+export class Problem extends Error {
+  constructor(kind, message, seconds = 0, field = "") {
+    super(message);
+    this.kind = kind; // "busy", "rebuilding", "gone", "refused", "token", "offline"
+    this.seconds = seconds; // 0: asking again does not help
+    this.field = field;
+  }
+}
+
+const TOKEN = "splatd-token";
+export const setToken = (token) => sessionStorage.setItem(TOKEN, token);
+
+function kindOf(status, problem) {
+  if (status === 401 || status === 403) return "token";
+  if (status === 404) return "gone";
+  if (problem.type?.endsWith(":device-lost") || problem.type?.endsWith(":no-device")) return "rebuilding";
+  return status >= 500 || status === 429 ? "busy" : "refused";
+}
+
+/** fetch() that throws Problems; 304s never come here. */
+export async function ask(path, options = {}) {
+  const token = sessionStorage.getItem(TOKEN);
+  const headers = {Accept: "application/json, image/*, */*;q=0.5", ...(token && {Authorization: `Bearer ${token}`}),
+    ...options.headers};
+  let reply;
+  try {
+    reply = await fetch(path, {...options, headers});
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Problem("offline", "The service cannot be reached");
+  }
+  if (reply.ok) return reply;
+  const problem = await reply.json().catch(() => ({}));
+  const wait = reply.status >= 500 || reply.status === 429 ? Number(reply.headers.get("Retry-After")) || 2 : 0;
+  throw new Problem(kindOf(reply.status, problem), problem.detail ?? `${reply.status} ${reply.statusText}`, wait,
+    problem.field ?? "");
+}
+
+export const askJson = async (path, options) => (await ask(path, options)).json();
+
+/** Parameters of a view as a query, vectors joined by commas; what is null or "" is left out. */
+export function query(params) {
+  return Object.entries(params).filter(([, value]) => value != null && value !== "")
+    .map(([name, value]) => `${name}=${[value].flat().map(encodeURIComponent).join(",")}`).join("&");
+}

@@ -1,0 +1,193 @@
+// The picture: asks for frames of the newest camera, one at a time, and shows them.
+//
+// While the camera moves, frames are coarse and the last one is bent to where the camera is by now, so that motion is as
+// smooth as the screen; once it rests, one full frame replaces them. A full frame that is overtaken by motion is
+// cancelled, which lets the service drop it. Events: "camera" (it changed), "frame" (detail: what the reply said),
+// "state" (detail: a Problem, or null when all is well).
+
+import {rounded, same, warp} from "./camera.js";
+import {Problem, ask, query} from "./service.js";
+
+const REST_MS = 160;
+const COARSE = {auto: {budget: "60ms"}, half: {supersample: 0.5}, quarter: {supersample: 0.25}, full: {}};
+const PARTIAL_MS = 400; // until a frame with missing parts is asked for again
+
+/** What the headers of a view say, as numbers. */
+function readHeaders(headers) {
+  const list = (text) => Object.fromEntries((text ?? "").split(";").map((part) => part.trim().split("=")));
+  const stages = {};
+  for (const [, name, ms] of (headers.get("Server-Timing") ?? "").matchAll(/(\w+);dur=([\d.]+)/g)) stages[name] = Number(ms);
+  const number = (name) => (headers.has(name) ? Number(headers.get(name)) : null);
+  return {stages, chosen: headers.has("Splatd-Chosen") ? list(headers.get("Splatd-Chosen")) : null,
+    promised: list(headers.get("Splatd-Promised")), demand: headers.get("Splatd-Demand"), took: list(headers.get("Splatd-Took")),
+    near: number("Splatd-Depth-Near"), far: number("Splatd-Depth-Far"), device: headers.get("Splatd-Device"),
+    complete: headers.get("Splatd-Complete") !== "false"};
+}
+
+export class Stage extends EventTarget {
+  /** `element` holds a canvas; `pixels` is the most that the service renders. */
+  constructor(element) {
+    super();
+    this.element = element;
+    this.canvas = element.querySelector("canvas");
+    this.dataset = null; // as /v1/datasets/{id} describes it
+    this.camera = null;
+    this.settings = {}; // method, lod, supersample, budget, layer: as parameters of a view
+    this.coarse = "auto";
+    this.pixels = 2 ** 23;
+    this.shown = null; // {camera, size, full, …headers} of the frame on screen
+    this.flight = null; // {abort, full, version}
+    this.version = 0; // of settings and size
+    this.restAt = 0;
+    this.timer = 0;
+    this.failures = 0;
+    this.blocked = false; // nothing is asked before the timer
+    new ResizeObserver(() => this.refresh()).observe(element);
+    addEventListener("online", () => this.retry());
+    document.addEventListener("visibilitychange", () => this.pump());
+  }
+
+  /** CSS pixels. */
+  get size() {
+    return [Math.max(1, this.element.clientWidth), Math.max(1, this.element.clientHeight)];
+  }
+
+  /** Shows another dataset, from `camera` or its default view. */
+  open(dataset, camera) {
+    const {eye, target, up, fov} = dataset.default_view;
+    this.dataset = dataset;
+    this.shown = null;
+    this.canvas.hidden = true;
+    this.home = rounded({eye, target, up, fov});
+    this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
+    this.camera = {...this.home, ...camera};
+    this.dispatchEvent(new Event("camera"));
+    this.refresh();
+  }
+
+  /** Puts the camera elsewhere as part of a motion. */
+  setCamera(camera) {
+    if (!this.dataset || !camera.eye.every(Number.isFinite) || !camera.target.every(Number.isFinite)) return;
+    this.camera = camera;
+    this.restAt = performance.now() + REST_MS;
+    this.unblock();
+    if (this.flight?.full) this.flight.abort.abort();
+    this.bend();
+    this.dispatchEvent(new Event("camera"));
+    this.pump();
+  }
+
+  set(settings) {
+    Object.assign(this.settings, settings);
+    this.refresh();
+  }
+
+  /** Asks for a full frame of what is there now. */
+  refresh() {
+    this.version++;
+    this.unblock();
+    if (this.shown) this.shown.full = false;
+    if (this.flight) this.flight.abort.abort();
+    this.bend();
+    this.pump();
+  }
+
+  /** What was refused for good may be asked again once something is different. */
+  unblock() {
+    if (!this.problem?.seconds) this.blocked = false;
+  }
+
+  /** After an error: now, not later. */
+  retry() {
+    if (!this.blocked) return;
+    this.blocked = false;
+    this.pump();
+  }
+
+  get moving() {
+    return performance.now() < this.restAt;
+  }
+
+  /** The parameters of a view of this camera: `full` as at rest, else as in motion. */
+  params(full = true) {
+    const [width, height] = this.size;
+    const ratio = Math.min(devicePixelRatio, 2, Math.sqrt(this.pixels / (width * height)));
+    const {layer, budget, ...setting} = this.settings;
+    const coarse = COARSE[this.coarse];
+    const quality = full ? (budget ? {budget} : setting) : coarse.budget ? coarse : {...setting, ...coarse};
+    return {...rounded(this.camera), width: Math.max(1, Math.floor(width * ratio)), height: Math.max(1, Math.floor(height * ratio)),
+      layer, ...quality, background: getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
+      format: "jpeg"};
+  }
+
+  url(full = true, changed = {}) {
+    return `${this.dataset.view}?${query({...this.params(full), ...changed})}`;
+  }
+
+  later(ms) {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      this.blocked = false;
+      this.pump();
+    }, ms);
+  }
+
+  /** Asks for the frame that is missing, if one is and none is on its way. */
+  async pump() {
+    if (!this.dataset || this.flight || this.blocked || document.hidden) return;
+    const full = !this.moving;
+    if (!full) this.later(this.restAt - performance.now() + 1);
+    if (this.shown && same(this.shown.camera, rounded(this.camera)) && (this.shown.full || !full)) return;
+    const flight = (this.flight = {abort: new AbortController(), full, version: this.version});
+    const [dataset, camera, size] = [this.dataset, rounded(this.camera), this.size];
+    try {
+      const reply = await ask(this.url(full), {signal: flight.abort.signal});
+      const bitmap = await createImageBitmap(await reply.blob());
+      if (dataset === this.dataset) this.show(bitmap, {camera, size, full: full && flight.version === this.version, ...readHeaders(reply.headers)});
+      bitmap.close();
+      this.failures = 0;
+      this.report(null);
+    } catch (error) {
+      if (error.name !== "AbortError") this.fail(error);
+    }
+    this.flight = null;
+    this.pump();
+  }
+
+  show(bitmap, shown) {
+    this.shown = shown;
+    this.canvas.width = bitmap.width;
+    this.canvas.height = bitmap.height;
+    this.canvas.getContext("2d").drawImage(bitmap, 0, 0);
+    this.canvas.hidden = false;
+    this.bend();
+    this.dispatchEvent(new CustomEvent("frame", {detail: {...shown, width: bitmap.width, height: bitmap.height}}));
+    if (shown.full && !shown.complete) {
+      shown.full = false;
+      this.blocked = true;
+      this.later(PARTIAL_MS);
+    }
+  }
+
+  /** Bends the frame on screen to the newest camera. */
+  bend() {
+    if (!this.shown) return;
+    const {camera, size} = this.shown;
+    const here = same(size, this.size) && same(camera, rounded(this.camera));
+    this.canvas.style.transform = here ? "" : warp(camera, this.camera, this.size);
+  }
+
+  fail(error) {
+    const problem = error instanceof Problem ? error : new Problem("refused", `The image cannot be shown: ${error.message}`);
+    this.blocked = true;
+    if (problem.kind === "offline") problem.seconds = Math.min(15, 2 ** this.failures);
+    this.failures++;
+    if (problem.seconds) this.later(problem.seconds * 1000);
+    this.report(problem);
+  }
+
+  report(problem) {
+    if (problem || this.problem) this.dispatchEvent(new CustomEvent("state", {detail: problem}));
+    this.problem = problem;
+  }
+}
