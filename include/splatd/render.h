@@ -86,8 +86,24 @@ const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer 
 int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
-/* Loads every page that fits, so that the first frame is as fast as the others. */
+/* Loads every page that fits, so that the first frame is as fast as the others. Only the first page, which views cannot do
+ * without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when it does not fit. */
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+
+/* The same in steps, for a renderer that has frames to make in between: loads page `page` (0, 1, …); *more: go on with the
+ * next. */
+int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
+                              bool *more, struct spl_error *err);
+
+/* What is on the device: pages of `dataset` (NULL: none) and everything there. */
+struct spl_residency_info {
+    uint64_t bytes;         /* pages of `dataset` */
+    uint64_t limit_bytes;   /* the memory limit */
+    uint64_t taken_bytes;   /* of it; spl_renderer_get_memory() */
+    uint64_t pages_evicted; /* of all datasets, to make room for others, since the renderer was made */
+};
+void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline. On success the caller owns `frame` (spl_frame_finish), on
  * failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */

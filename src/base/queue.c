@@ -17,6 +17,7 @@ struct spl_queue {
     size_t capacity;
     size_t first, length; // guarded by: mutex
     bool closed;          // guarded by: mutex
+    bool interrupted;     // guarded by: mutex
     void *items[];        // guarded by: mutex
 };
 
@@ -101,7 +102,7 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
 {
     void *item = NULL;
     pthread_mutex_lock(&queue->mutex);
-    while (!queue->closed && !queue->length)
+    while (!queue->closed && !queue->length && !queue->interrupted)
         if (!wait_until(&queue->filled, &queue->mutex, deadline_ns))
             break;
     if (queue->length) {
@@ -109,9 +110,19 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
         queue->first = (queue->first + 1) % queue->capacity;
         queue->length--;
         pthread_cond_signal(&queue->drained);
+    } else {
+        queue->interrupted = false;
     }
     pthread_mutex_unlock(&queue->mutex);
     return item;
+}
+
+void spl_queue_interrupt(struct spl_queue *queue)
+{
+    pthread_mutex_lock(&queue->mutex);
+    queue->interrupted = true;
+    pthread_cond_signal(&queue->filled);
+    pthread_mutex_unlock(&queue->mutex);
 }
 
 void spl_queue_close(struct spl_queue *queue)

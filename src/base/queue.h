@@ -24,8 +24,12 @@ bool spl_queue_try_push(struct spl_queue *queue, void *item);
  * failure the caller keeps `item` (not NULL). */
 int spl_queue_push(struct spl_queue *queue, void *item, uint64_t deadline_ns, struct spl_error *err);
 
-/* The oldest item; NULL when none came until `deadline_ns` (0 = never waits) or the queue is closed and empty. */
+/* The oldest item; NULL when none came until `deadline_ns` (0 = never waits), the queue is closed and empty, or empty
+ * and a consumer was interrupted. */
 void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns);
+
+/* Makes one pop() on an empty queue, the one that waits or the next, return NULL. */
+void spl_queue_interrupt(struct spl_queue *queue);
 
 /* Refuses further items and wakes everyone; what is inside can still be popped. */
 void spl_queue_close(struct spl_queue *queue);

@@ -62,21 +62,43 @@ void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset
     spl_residency_remove(&renderer->residency, dataset);
 }
 
-int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
+int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
+                              bool *more, struct spl_error *err)
 {
     struct spl_resident_dataset *resident = spl_residency_get(&renderer->residency, dataset);
+    *more = false;
     if (!resident)
         return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
+    if (page >= resident->page_count || (page > 0 && !spl_residency_has_room(&renderer->residency, resident, page)))
+        return SPL_OK; /* the rest comes as views need it */
     spl_residency_begin_frame(&renderer->residency);
-    for (uint32_t page = 0; page < resident->page_count; page++) {
-        struct spl_error why = {0};
-        int rc = spl_residency_ask(&renderer->residency, resident, page, &why);
-        if (page > 0 && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM))
-            return SPL_OK; /* the rest comes as views need it */
-        if (rc)
-            return spl_fail(err, rc, "%s", why.message);
-    }
-    return SPL_OK;
+    struct spl_error why = {0};
+    int rc = spl_residency_ask(&renderer->residency, resident, page, &why);
+    if (page > 0 && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM))
+        return SPL_OK;
+    *more = !rc && page + 1 < resident->page_count;
+    return rc ? spl_fail(err, rc, "%s", why.message) : SPL_OK;
+}
+
+int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    bool more = true;
+    int rc = SPL_OK;
+    for (uint32_t page = 0; more && !rc; page++)
+        rc = spl_renderer_preload_page(renderer, dataset, page, &more, err);
+    return rc;
+}
+
+void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                struct spl_residency_info *info)
+{
+    struct spl_resident_dataset *resident = dataset ? spl_residency_get(&renderer->residency, dataset) : NULL;
+    *info = (struct spl_residency_info){
+        .bytes = resident ? spl_residency_get_bytes(resident) : 0,
+        .limit_bytes = spl_gpu_get_limits(renderer->gpu)->memory_bytes,
+        .taken_bytes = spl_gpu_get_memory(renderer->gpu),
+        .pages_evicted = renderer->residency.pages_evicted,
+    };
 }
 
 uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer)

@@ -95,6 +95,7 @@ static bool evict_one(struct spl_residency *residency)
     if (!oldest)
         return false;
     drop_page(residency, oldest);
+    residency->pages_evicted++;
     return true;
 }
 
@@ -133,6 +134,31 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
     return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
 }
 
+/* A word more than the page has: a zero-width field at its very end still loads its word. */
+static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t page)
+{
+    size_t bytes;
+    spl_dataset_get_page(resident->dataset, page, &bytes);
+    return bytes + 4;
+}
+
+bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
+                            uint32_t page)
+{
+    bool staged = !spl_gpu_get_device(residency->gpu)->software && !residency->staging;
+    uint64_t needed = (bytes_of(resident, page) + 15) / 16 * 16 * (staged ? 2 : 1);
+    return resident->pages[page].buffer ||
+           spl_gpu_get_memory(residency->gpu) + needed <= spl_gpu_get_limits(residency->gpu)->memory_bytes;
+}
+
+uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
+{
+    uint64_t bytes = 0;
+    for (uint32_t page = 0; page < resident->page_count; page++)
+        bytes += resident->pages[page].buffer ? bytes_of(resident, page) : 0;
+    return bytes;
+}
+
 int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
                       struct spl_error *err)
 {
@@ -143,8 +169,8 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     size_t bytes;
     const uint32_t *words = spl_dataset_get_page(resident->dataset, page, &bytes);
     bool software = spl_gpu_get_device(residency->gpu)->software;
-    /* one word more: a zero-width field at the very end still loads its word */
-    int rc = make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes + 4, &slot->buffer, err);
+    int rc = make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes_of(resident, page),
+                         &slot->buffer, err);
     if (rc)
         return rc;
     if (software)

@@ -27,7 +27,7 @@ struct spl_residency {
     struct spl_resident_dataset *datasets;
     size_t dataset_count, dataset_capacity;
     uint64_t frame;                     /* pages asked for in this frame are never evicted */
-    uint64_t pages_loaded;              /* since init */
+    uint64_t pages_loaded, pages_evicted; /* since init */
 };
 
 void spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu);
@@ -38,6 +38,13 @@ void spl_residency_remove(struct spl_residency *residency, const struct spl_data
 
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
+
+/* Is page `page` resident, or does it fit without evicting another? */
+bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
+                            uint32_t page);
+
+/* Bytes of the pages of `resident` that are on the device. */
+uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident);
 
 /* Starts a frame: what was asked for before may be evicted again. */
 void spl_residency_begin_frame(struct spl_residency *residency);

@@ -44,18 +44,31 @@ static void set(json_t *object, const char *name, json_t *value)
     json_object_set_new(object, name, value);
 }
 
+json_t *spl_describe_slot(const struct spl_catalog_slot *slot)
+{
+    json_t *json = slot->current ? spl_describe_dataset(slot->current, false) : json_object();
+    const char *state = slot->current ? "ready" : slot->reason[0] ? "failed" : "loading";
+    set(json, "id", json_string(slot->id));
+    set(json, "state", json_string(state));
+    if (slot->reason[0])
+        set(json, "reason", json_string(slot->reason));
+    return json;
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
     json_t *json = json_object();
     set(json, "id", json_string(info->id));
     set(json, "version", json_sprintf("%016llx", (unsigned long long)info->version));
+    set(json, "state", json_string("ready"));
     set(json, "uri", json_string(entry->uri));
     set(json, "view", json_sprintf("%s/view", entry->uri));
     set(json, "unit", json_string("m"));
     set(json, "splats", count(info->splats));
     set(json, "points", count(info->points));
     set(json, "bytes", count(info->file_bytes));
+    set(json, "resident_bytes", count(atomic_load(&entry->resident_bytes)));
     set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
     if (!full)
         return json;
@@ -126,7 +139,7 @@ json_t *spl_describe_status(struct spl_service *service)
     const char *state = service->draining ? "stopping" : states[spl_pipeline_get_state(service->pipeline)];
     json_t *json = json_object(), *ids = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
-        json_array_append_new(ids, json_string(service->catalog.entries[i].info->id));
+        json_array_append_new(ids, json_string(service->catalog.slots[i].id));
     set(json, "version", json_string(SPLATD_VERSION));
     set(json, "state", json_string(state));
     set(json, "uptime_s", json_real((double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S));
@@ -135,8 +148,9 @@ json_t *spl_describe_status(struct spl_service *service)
     set(json, "parameters", spl_service_options_describe(service->options));
     set(json, "datasets", ids);
     set(json, "memory",
-        json_pack("{s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "resident_bytes",
-                  count(resident_bytes()), "reply_bytes", count(service->reply_bytes)));
+        json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
+                  count(status.device_limit_bytes), "resident_bytes", count(resident_bytes()), "reply_bytes",
+                  count(service->reply_bytes)));
     set(json, "queues",
         json_pack("{s:o, s:o}", "render", describe_queue(status.render_length, status.render_capacity), "encode",
                   describe_queue(status.encode_length, status.encode_capacity)));

@@ -1,8 +1,9 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets. More than `rebuilds_max` losses within `rebuild_window_ns` end the
- * process, for its supervisor to decide.
+ * new renderer is made from the mapped datasets. Versions of datasets are added a page at a time between frames, so
+ * that nobody waits for them. More than `rebuilds_max` losses within `rebuild_window_ns` end the process, for its
+ * supervisor to decide.
  *
  * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
  * lost, K times in all (1 when left out). */
@@ -24,6 +25,8 @@ struct gpu {
     uint64_t losses_ns[rebuilds_max]; /* times of the latest losses, ring */
     uint64_t losses;
     uint64_t frames, inject_every, inject_left, inject_at;
+    TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
+    uint64_t pages_evicted;                  /* of this renderer, as counted so far */
 };
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
@@ -32,36 +35,109 @@ static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state sta
     pipeline->options.wake(pipeline->options.wake_context);
 }
 
+/* Publishes what is on the device; a page that came may have driven out those of any dataset. */
+static void publish_residency(struct gpu *gpu)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_residency_info info;
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_renderer_get_residency(gpu->renderer, entry->dataset, &info);
+        atomic_store(&entry->resident_bytes, info.bytes);
+    }
+    spl_renderer_get_residency(gpu->renderer, NULL, &info);
+    atomic_store(&pipeline->device_bytes, info.taken_bytes);
+    atomic_store(&pipeline->device_limit_bytes, info.limit_bytes);
+    atomic_fetch_add(&pipeline->options.counters->pages_evicted, info.pages_evicted - gpu->pages_evicted);
+    gpu->pages_evicted = info.pages_evicted;
+}
+
 static int build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
-    const struct spl_pipeline_options *options = &pipeline->options;
-    int rc = spl_renderer_create(&options->renderer, &gpu->renderer, err);
+    struct spl_catalog_entry *entry;
+    int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
     if (rc)
         return rc;
+    gpu->pages_evicted = 0;
     pthread_mutex_lock(&pipeline->mutex);
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
-    for (size_t i = 0; options->plans && i < options->dataset_count; i++)
-        spl_plan_set_device(options->plans[i], spl_renderer_get_device(gpu->renderer));
-    for (size_t i = 0; !rc && i < options->dataset_count; i++)
-        rc = spl_renderer_add(gpu->renderer, options->datasets[i], err);
-    for (size_t i = 0; !rc && i < options->dataset_count && !spl_queue_is_closed(pipeline->render); i++)
-        rc = spl_renderer_preload(gpu->renderer, options->datasets[i], err);
-    if (!rc)
-        atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
-    return rc;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        entry->pages_wanted = 0;
+        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
+            return rc;
+    }
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        if (spl_queue_is_closed(pipeline->render))
+            break;
+        if (!entry->loading && (rc = spl_renderer_preload(gpu->renderer, entry->dataset, err)))
+            return rc;
+    }
+    publish_residency(gpu);
+    return 0;
 }
 
 static void tear_down(struct gpu *gpu)
 {
+    struct spl_catalog_entry *entry;
     if (!gpu->renderer)
         return;
-    for (size_t i = 0; i < gpu->pipeline->options.dataset_count; i++)
-        spl_renderer_remove(gpu->renderer, gpu->pipeline->options.datasets[i]);
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    spl_renderer_remove(gpu->renderer, entry->dataset);
     spl_renderer_destroy(gpu->renderer);
     gpu->renderer = NULL;
     atomic_store(&gpu->pipeline->device_bytes, 0);
+}
+
+static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    TAILQ_REMOVE(&gpu->entries, entry, resident);
+    publish_residency(gpu);
+}
+
+/* Gives back an entry that was to be added; the last unref() need not come here any more. */
+static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+{
+    entry->err = *why;
+    entry->loading = false;
+    entry->release = NULL;
+    spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
+}
+
+/* Takes up what the loop wants added and lets go of what nobody refers to any more. */
+static void take_orders(struct gpu *gpu)
+{
+    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
+        if (entry->state == SPL_ENTRY_LEAVING) {
+            let_entry_go(gpu, entry);
+            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+            continue;
+        }
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        TAILQ_INSERT_TAIL(&gpu->entries, entry, resident);
+        entry->pages_wanted = 0;
+        entry->loading = true;
+        struct spl_error err = {0};
+        if (spl_renderer_add(gpu->renderer, entry->dataset, &err)) {
+            let_entry_go(gpu, entry);
+            refuse_entry(gpu, entry, &err);
+        }
+    }
+}
+
+static struct spl_catalog_entry *find_loading(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    if (entry->loading)
+        return entry;
+    return NULL;
 }
 
 /* Answers everything that waits. */
@@ -118,6 +194,25 @@ static bool recover(struct gpu *gpu, const struct spl_error *why)
     return true;
 }
 
+/* Loads one page of an entry; false when the thread must end. */
+static bool load_page(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    bool more;
+    struct spl_error err = {0};
+    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, entry->pages_wanted++, &more, &err);
+    if (rc == SPL_E_DEVICE_LOST)
+        return recover(gpu, &err);
+    publish_residency(gpu);
+    if (rc) {
+        let_entry_go(gpu, entry);
+        refuse_entry(gpu, entry, &err);
+    } else if (!more) {
+        entry->loading = false;
+        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
+    }
+    return true;
+}
+
 static void inject(struct gpu *gpu)
 {
     if (!gpu->inject_left || gpu->frames < gpu->inject_at)
@@ -161,7 +256,10 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
         job->rendered_ns = spl_now_ns();
         uint64_t took = job->rendered_ns - began, mean = atomic_load(&pipeline->frame_ns);
         atomic_store(&pipeline->frame_ns, mean ? (7 * mean + took) / 8 : took);
-        atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
+        if (job->frame.stats.pages_loaded)
+            publish_residency(gpu);
+        else
+            atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
         job->stats = job->frame.stats;
         if (job->plan && !job->stats.pages_loaded) // loading is no property of the setting
             spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
@@ -172,22 +270,43 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
 }
 
+static void run(struct gpu *gpu)
+{
+    struct spl_queue *render = gpu->pipeline->render;
+    for (;;) {
+        take_orders(gpu);
+        struct spl_catalog_entry *loading = find_loading(gpu);
+        struct spl_job *job = spl_queue_pop(render, loading ? 0 : SPL_NEVER);
+        if (!job && spl_queue_is_closed(render))
+            break;
+        if (job && !serve(gpu, job))
+            break;
+        if (loading && !load_page(gpu, loading))
+            break;
+    }
+}
+
 void *spl_gpu_thread_run(void *argument)
 {
     struct gpu gpu = {.pipeline = argument};
+    const struct spl_pipeline_options *options = &gpu.pipeline->options;
     struct spl_error err = {0};
     const char *plan = getenv("SPLATD_INJECT_LOSS_AFTER");
     if (plan && sscanf(plan, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
+    TAILQ_INIT(&gpu.entries);
+    for (size_t i = 0; i < options->entry_count; i++)
+        TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
     if (build(&gpu, &err)) {
         give_up(&gpu, &err);
     } else {
         set_state(gpu.pipeline, SPL_PIPELINE_READY);
-        for (struct spl_job *job; (job = spl_queue_pop(gpu.pipeline->render, SPL_NEVER));)
-            if (!serve(&gpu, job))
-                break;
+        run(&gpu);
     }
     tear_down(&gpu);
+    err = (struct spl_error){.code = SPL_E_CANCELLED, .message = "the service is stopping"};
+    for (struct spl_catalog_entry *entry; (entry = find_loading(&gpu));)
+        refuse_entry(&gpu, entry, &err);
     return NULL;
 }

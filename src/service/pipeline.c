@@ -17,6 +17,7 @@ void spl_job_destroy(struct spl_job *job)
         return;
     spl_frame_finish(&job->frame);
     spl_encoded_finish(&job->encoded);
+    spl_catalog_entry_unref(job->entry);
     free(job);
 }
 
@@ -71,6 +72,57 @@ void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
     pipeline->options.wake(pipeline->options.wake_context);
 }
 
+static void order(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry, enum spl_entry_state state)
+{
+    pthread_mutex_lock(&pipeline->mutex);
+    entry->state = state;
+    STAILQ_INSERT_TAIL(&pipeline->orders, entry, link);
+    pthread_mutex_unlock(&pipeline->mutex);
+    spl_queue_interrupt(pipeline->render);
+}
+
+static void on_released(struct spl_catalog_entry *entry, void *context)
+{
+    order(context, entry, SPL_ENTRY_LEAVING);
+}
+
+void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
+{
+    entry->release = on_released;
+    entry->release_context = pipeline;
+    order(pipeline, entry, SPL_ENTRY_LOADING);
+}
+
+struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline)
+{
+    pthread_mutex_lock(&pipeline->mutex);
+    struct spl_catalog_entry *entry = STAILQ_FIRST(&pipeline->orders);
+    if (entry)
+        STAILQ_REMOVE_HEAD(&pipeline->orders, link);
+    pthread_mutex_unlock(&pipeline->mutex);
+    return entry;
+}
+
+void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry,
+                                enum spl_entry_state state)
+{
+    pthread_mutex_lock(&pipeline->mutex);
+    entry->state = state;
+    STAILQ_INSERT_TAIL(&pipeline->changes, entry, link);
+    pthread_mutex_unlock(&pipeline->mutex);
+    pipeline->options.wake(pipeline->options.wake_context);
+}
+
+struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline)
+{
+    pthread_mutex_lock(&pipeline->mutex);
+    struct spl_catalog_entry *entry = STAILQ_FIRST(&pipeline->changes);
+    if (entry)
+        STAILQ_REMOVE_HEAD(&pipeline->changes, link);
+    pthread_mutex_unlock(&pipeline->mutex);
+    return entry;
+}
+
 int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err)
 {
     spl_assert(options->queue && options->encoders && options->encoders <= ENCODERS_MAX);
@@ -80,6 +132,8 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     pipeline->options = *options;
     if (!options->frame_bytes_max)
         pipeline->options.frame_bytes_max = (size_t)1 << 30;
+    STAILQ_INIT(&pipeline->orders);
+    STAILQ_INIT(&pipeline->changes);
     pthread_mutex_init(&pipeline->mutex, NULL);
     pthread_condattr_t monotonic;
     pthread_condattr_init(&monotonic);
@@ -98,6 +152,10 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
             goto fail;
         }
     }
+    for (size_t i = 0; i < options->entry_count; i++) {
+        options->entries[i]->release = on_released;
+        options->entries[i]->release_context = pipeline;
+    }
     if ((rc = pthread_create(&pipeline->gpu_thread, NULL, spl_gpu_thread_run, pipeline))) {
         rc = spl_fail_errno(err, rc, "cannot start the gpu thread");
         goto fail;
@@ -106,8 +164,22 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     *out = pipeline;
     return 0;
 fail:
+    for (size_t i = 0; i < options->entry_count; i++)
+        options->entries[i]->release = NULL;
     spl_pipeline_destroy(pipeline);
     return rc;
+}
+
+/* Once the gpu thread has gone. The last unref() of one that was on its way adds it to the orders. */
+static void destroy_entries(struct spl_pipeline *pipeline)
+{
+    for (struct spl_catalog_entry *entry;
+         (entry = spl_pipeline_take_order(pipeline)) || (entry = spl_pipeline_take_change(pipeline));) {
+        if (entry->state == SPL_ENTRY_LEAVING || entry->state == SPL_ENTRY_GONE)
+            spl_catalog_entry_destroy(entry);
+        else
+            spl_catalog_entry_unref(entry);
+    }
 }
 
 void spl_pipeline_destroy(struct spl_pipeline *pipeline)
@@ -125,6 +197,7 @@ void spl_pipeline_destroy(struct spl_pipeline *pipeline)
     if (pipeline->done)
         for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
             spl_job_destroy(job);
+    destroy_entries(pipeline);
     spl_queue_destroy(pipeline->done);
     spl_queue_destroy(pipeline->encode);
     spl_queue_destroy(pipeline->render);
@@ -166,6 +239,7 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
 {
     *status = (struct spl_pipeline_status){
         .device_bytes = atomic_load(&pipeline->device_bytes),
+        .device_limit_bytes = atomic_load(&pipeline->device_limit_bytes),
         .render_length = spl_queue_get_length(pipeline->render),
         .render_capacity = spl_queue_get_capacity(pipeline->render),
         .encode_length = spl_queue_get_length(pipeline->encode),

@@ -26,7 +26,8 @@ static void index_page(struct request *request, const struct spl_call *call)
     struct spl_service *service = request->service;
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
-        json_array_append_new(views, json_sprintf("%s/view", service->catalog.entries[i].uri));
+        if (service->catalog.slots[i].current)
+            json_array_append_new(views, json_sprintf("%s/view", service->catalog.slots[i].current->uri));
     spl_reply_json(request,
                    json_pack("{s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "openapi",
                              "/v1/openapi.json", "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
@@ -40,7 +41,7 @@ static void list_datasets(struct request *request, const struct spl_call *call)
     struct spl_catalog *catalog = &request->service->catalog;
     json_t *list = json_array();
     for (size_t i = 0; i < catalog->count; i++)
-        json_array_append_new(list, spl_describe_dataset(&catalog->entries[i], false));
+        json_array_append_new(list, spl_describe_slot(&catalog->slots[i]));
     spl_reply_json(request, json_pack("{s:o}", "datasets", list));
 }
 
@@ -139,9 +140,15 @@ static int fill(struct request *request, const struct holes *holes, struct spl_c
     if (rc || !holes->id)
         return rc;
     rc = spl_percent_decode(holes->id, holes->id_length, call->id, sizeof call->id, "id", err);
-    if (!rc && !(call->entry = spl_catalog_find(catalog, call->id)) && call->method != SPL_PUT)
-        rc = spl_fail_field(err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", call->id);
-    return rc;
+    if (rc || (call->entry = spl_catalog_find(catalog, call->id)) || call->method == SPL_PUT)
+        return rc;
+    const struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, call->id);
+    if (slot && slot->reason[0])
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' cannot be served: %.350s", call->id,
+                              slot->reason);
+    if (slot)
+        return spl_fail_field(err, SPL_E_BUSY, "id", "dataset '%s' is being loaded; come back later", call->id);
+    return spl_fail_field(err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", call->id);
 }
 
 static void enter(struct request *request, const struct route *route, enum spl_http_method method,

@@ -65,10 +65,14 @@ static void announce(struct spl_service *service)
     spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
                  status.device.driver, status.device.software ? ", software" : "");
     for (size_t i = 0; i < service->catalog.count; i++) {
-        const struct spl_dataset_info *info = service->catalog.entries[i].info;
-        spl_log_info("dataset %s: %llu splats, %llu bytes, %s/view", info->id, (unsigned long long)info->splats,
-                     (unsigned long long)info->file_bytes, service->catalog.entries[i].uri);
+        const struct spl_catalog_entry *entry = service->catalog.slots[i].current;
+        if (entry)
+            spl_log_info("dataset %s: %llu splats, %llu bytes, %s/view", entry->info->id,
+                         (unsigned long long)entry->info->splats, (unsigned long long)entry->info->file_bytes,
+                         entry->uri);
     }
+    if (!service->catalog.count)
+        spl_log_warn("no dataset yet; 'splatd pack' makes one");
     spl_log_info("listening on %s", service->url);
     spl_log_info("ready");
 }
@@ -82,7 +86,9 @@ static void on_wake(uv_async_t *handle)
             drain(service);
         else
             announce(service);
+        spl_library_start(service);
     }
+    spl_library_take_changes(service);
     spl_waiting_complete(service);
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
         service->failure = *spl_pipeline_get_failure(service->pipeline);
@@ -109,7 +115,8 @@ static void raise_descriptor_limit(void)
 static int init_loop(struct spl_service *service, struct spl_error *err)
 {
     static const int numbers[] = {SIGTERM, SIGINT};
-    uv_timer_t *timers[] = {&service->http_timer, &service->wait_timer, &service->slow_timer, &service->drain_timer};
+    uv_timer_t *timers[] = {&service->http_timer, &service->wait_timer, &service->slow_timer, &service->drain_timer,
+                            &service->library.timer};
     int rc = uv_loop_init(&service->loop);
     if (rc)
         return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
@@ -144,21 +151,19 @@ static void finish_loop(struct spl_service *service)
 
 static int start_pipeline(struct spl_service *service, struct spl_error *err)
 {
-    const struct spl_dataset **datasets = service->datasets = spl_alloc(service->catalog.count, sizeof *datasets, err);
-    struct spl_plan **plans = service->plans = spl_alloc(service->catalog.count, sizeof *plans, err);
-    if (!datasets || !plans)
+    struct spl_catalog_entry **entries = service->entries = spl_alloc(service->catalog.count, sizeof *entries, err);
+    size_t count = 0;
+    if (!entries)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < service->catalog.count; i++) {
-        datasets[i] = service->catalog.entries[i].dataset;
-        plans[i] = service->catalog.entries[i].plan;
-    }
+    for (size_t i = 0; i < service->catalog.count; i++)
+        if (service->catalog.slots[i].current)
+            entries[count++] = service->catalog.slots[i].current;
     struct spl_pipeline_options options = {
         .renderer = {.device = service->options->device,
                      .require_gpu = service->options->require_gpu,
                      .memory_limit = service->options->memory_limit},
-        .datasets = datasets,
-        .dataset_count = service->catalog.count,
-        .plans = plans,
+        .entries = entries,
+        .entry_count = count,
         .queue = service->options->queue,
         .encoders = service->options->encoders,
         .counters = &service->counters,
@@ -190,10 +195,10 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     if ((rc = service->failure.code) && err)
         *err = service->failure;
 done:
+    spl_library_stop(service);
+    spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_pipeline_destroy(service->pipeline);
-    free(service->datasets);
-    free(service->plans);
-    spl_catalog_finish(&service->catalog);
+    free(service->entries);
     if (service->listen_fd >= 0)
         close(service->listen_fd);
     finish_loop(service);

@@ -16,18 +16,27 @@ struct spl_pipeline {
     size_t encode_started;
     bool gpu_started;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
-    _Atomic uint64_t device_bytes, frame_ns;
+    _Atomic uint64_t device_bytes, device_limit_bytes, frame_ns;
     atomic_int state;         /* enum spl_pipeline_state */
     struct spl_error failure; /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
     pthread_cond_t released;
-    size_t frame_bytes;            // guarded by: mutex; pixels of all frames between gpu and encode
-    struct spl_device_info device; // guarded by: mutex
+    size_t frame_bytes;                       // guarded by: mutex; pixels of all frames between gpu and encode
+    struct spl_device_info device;            // guarded by: mutex
+    STAILQ_HEAD(, spl_catalog_entry) orders;  // guarded by: mutex; for the gpu thread: LOADING or LEAVING
+    STAILQ_HEAD(, spl_catalog_entry) changes; // guarded by: mutex; for the loop
 };
 
 /* Thread bodies; `argument` is the pipeline. */
 void *spl_gpu_thread_run(void *argument);
 void *spl_encode_thread_run(void *argument);
+
+/* The oldest entry that the gpu thread is to add or to let go of, or NULL. */
+struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline);
+
+/* Hands an entry back to the loop. */
+void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry,
+                                enum spl_entry_state state);
 
 /* Hands a job back to the loop, with `err` set or `encoded` filled. */
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);

@@ -51,11 +51,20 @@ struct request {
     unsigned status;
 };
 
+/* Looks at the served paths and brings the catalog up to date with them. */
+struct library {
+    uv_timer_t timer;
+    size_t tasks;          /* in the thread pool */
+    bool looking;          /* one of them is a look */
+    bool stopped;          /* nothing new is begun, what comes back is thrown away */
+    struct spl_error last; /* of the last look, so that it is logged once */
+};
+
 struct spl_service {
     const struct spl_service_options *options;
     struct spl_catalog catalog;
-    const struct spl_dataset **datasets; /* of the catalog, for the pipeline */
-    struct spl_plan **plans;             /* the same */
+    struct spl_catalog_entry **entries; /* of the catalog at start, for the pipeline */
+    struct library library;
     struct spl_pipeline *pipeline;
     struct spl_counters counters;
     uint64_t started_ns;
@@ -93,6 +102,11 @@ void spl_waiting_complete(struct spl_service *service); /* answers every job tha
 void spl_waiting_sweep(struct spl_service *service);    /* deadlines and departures */
 void spl_waiting_refuse_all(struct spl_service *service);
 
+/* library.c: datasets that come, change and go while the service runs. */
+void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */
+void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
+void spl_library_stop(struct spl_service *service);         /* waits for the thread pool; idempotent */
+
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);
 
@@ -101,9 +115,9 @@ enum spl_scope { SPL_SCOPE_NONE, SPL_SCOPE_VIEW, SPL_SCOPE_TOUR, SPL_SCOPE_ADMIN
 enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET: MHD leaves the body out */
 struct spl_call {
     enum spl_http_method method;
-    char id[256];                          /* of the dataset in the path, decoded; "" without */
-    const struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a PUT of a new one
-    char name[256];                        /* the path's other segment, decoded; "" without */
+    char id[256];                    /* of the dataset in the path, decoded; "" without */
+    struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or PUT and DELETE, which look for themselves
+    char name[256];                  /* the path's other segment, decoded; "" without */
 };
 
 /* view_route.c: /v1/datasets/{id}/view. */
@@ -132,6 +146,7 @@ void spl_reply_text(struct request *request, const char *type, char *body); /* 2
 void spl_reply_view(struct request *request, struct spl_job *job);          /* takes job->encoded */
 
 /* describe.c: new references; NULL without memory. */
+json_t *spl_describe_slot(const struct spl_catalog_slot *slot);
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full);
 json_t *spl_describe_status(struct spl_service *service);
 

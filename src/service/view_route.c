@@ -34,6 +34,7 @@ void spl_make_view(struct request *request, const struct spl_call *call)
     }
     if (!(job = spl_alloc(1, sizeof *job, &err)))
         goto refuse;
+    job->entry = spl_catalog_entry_ref(call->entry);
     job->dataset = entry->dataset;
     job->plan = entry->plan;
     job->request = view;

@@ -1,6 +1,8 @@
-/* make_wall NAME.spld…: a coloured wall of 40 × 40 splats, two levels, in the plane x = 0. */
+/* make_wall [--small] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two levels, in the plane
+ * x = 0. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "support/make_dataset.h"
 
@@ -18,7 +20,8 @@ int main(int argc, char **argv)
             .color = {(uint8_t)(i % side * 6), (uint8_t)(i / side * 6), 90},
         };
     }
-    for (int i = 1; i < argc; i++)
-        make_dataset_file(argv[i], splats, side * side, 2);
+    int small = argc > 1 && !strcmp(argv[1], "--small");
+    for (int i = 1 + small; i < argc; i++)
+        make_dataset_file(argv[i], splats, side * side / (1 + small), 2);
     return 0;
 }

@@ -59,9 +59,24 @@ void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset
     (void)dataset;
 }
 
+int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
+                              bool *more, struct spl_error *err)
+{
+    *more = false;
+    return page ? 0 : spl_renderer_add(renderer, dataset, err);
+}
+
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
 {
     return spl_renderer_add(renderer, dataset, err);
+}
+
+void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                struct spl_residency_info *info)
+{
+    (void)renderer;
+    *info = (struct spl_residency_info){
+        .bytes = dataset ? 1 << 16 : 0, .limit_bytes = 1 << 30, .taken_bytes = spl_renderer_get_memory(renderer)};
 }
 
 static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_view *view, struct spl_error *err)

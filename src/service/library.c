@@ -1,0 +1,260 @@
+/* Datasets that come, change and go while the service runs.
+ *
+ * A timer has the thread pool list the served paths. A file is opened once two looks in a row found the same bytes
+ * there, so that one that is being copied is left alone; it is opened and verified in the pool, made resident by the
+ * gpu thread, and only then takes the place of the version before it, which lives until its last request is answered.
+ * A file that is gone for two looks is dropped the same way; one that is refused is logged once and not opened again
+ * until it changes. Everything here but the two functions run_* belongs to the loop's thread. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "service/state.h"
+
+enum { looks_before_drop = 2 };
+
+/* One listing of the served paths; belongs to the pool while it runs. */
+struct look {
+    uv_work_t work;
+    struct spl_service *service;
+    struct spl_catalog_files files;
+    struct spl_error err;
+};
+
+/* One dataset being opened, or being closed; the same. */
+struct opening {
+    uv_work_t work;
+    struct spl_service *service;
+    char id[sizeof((struct spl_catalog_slot *)0)->id];
+    char *path;
+    bool verify;
+    struct spl_file_mark mark;
+    struct spl_catalog_entry *entry; // may be NULL
+    struct spl_error err;
+};
+
+static void refuse(struct spl_catalog_slot *slot, const struct spl_error *err)
+{
+    slot->busy = false;
+    slot->next = NULL;
+    spl_catalog_set_reason(slot, err->message);
+    spl_log_warn("dataset %s %s: %s", slot->id, slot->current ? "keeps its version" : "is not served", err->message);
+}
+
+static void free_opening(struct opening *opening)
+{
+    free(opening->path);
+    free(opening);
+}
+
+static void run_opening(uv_work_t *work)
+{
+    struct opening *opening = work->data;
+    spl_catalog_entry_open(opening->path, opening->verify, &opening->entry, &opening->err);
+}
+
+static void after_opening(uv_work_t *work, int status)
+{
+    (void)status;
+    struct opening *opening = work->data;
+    struct spl_service *service = opening->service;
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, opening->id);
+    service->library.tasks--;
+    if (slot && opening->err.code && !service->library.stopped) {
+        slot->opened = opening->mark;
+        refuse(slot, &opening->err);
+    } else if (slot && opening->entry && !service->library.stopped) {
+        slot->opened = opening->mark;
+        slot->next = opening->entry;
+        spl_pipeline_add(service->pipeline, opening->entry);
+        opening->entry = NULL;
+    }
+    spl_catalog_entry_unref(opening->entry);
+    free_opening(opening);
+}
+
+static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot)
+{
+    struct opening *opening = spl_alloc(1, sizeof *opening, NULL);
+    if (!opening || !(opening->path = strdup(slot->path))) {
+        free(opening);
+        return; // the next look tries again
+    }
+    opening->work.data = opening;
+    opening->service = service;
+    opening->verify = service->options->verify;
+    opening->mark = slot->seen;
+    snprintf(opening->id, sizeof opening->id, "%s", slot->id);
+    if (uv_queue_work(&service->loop, &opening->work, run_opening, after_opening)) {
+        free_opening(opening);
+        return;
+    }
+    slot->busy = true;
+    service->library.tasks++;
+}
+
+static void run_closing(uv_work_t *work)
+{
+    struct opening *closing = work->data;
+    spl_catalog_entry_destroy(closing->entry);
+}
+
+static void after_closing(uv_work_t *work, int status)
+{
+    (void)status;
+    struct opening *closing = work->data;
+    closing->service->library.tasks--;
+    free_opening(closing);
+}
+
+/* Unmapping takes a while; here where there is no other way. */
+static void close_entry(struct spl_service *service, struct spl_catalog_entry *entry)
+{
+    struct opening *closing = spl_alloc(1, sizeof *closing, NULL);
+    if (closing) {
+        closing->work.data = closing;
+        closing->service = service;
+        closing->entry = entry;
+        if (!uv_queue_work(&service->loop, &closing->work, run_closing, after_closing)) {
+            service->library.tasks++;
+            return;
+        }
+    }
+    free(closing);
+    spl_catalog_entry_destroy(entry);
+}
+
+static void put_in_place(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry)
+{
+    const struct spl_dataset_info *info = entry->info;
+    spl_log_info("dataset %s: version %016llx %s, %llu splats, %llu bytes", slot->id, (unsigned long long)info->version,
+                 slot->current ? "replaces the one before" : "is served", (unsigned long long)info->splats,
+                 (unsigned long long)info->file_bytes);
+    spl_catalog_entry_unref(slot->current);
+    slot->current = entry;
+    slot->next = NULL;
+    slot->busy = false;
+    slot->reason[0] = '\0';
+}
+
+void spl_library_take_changes(struct spl_service *service)
+{
+    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_change(service->pipeline));) {
+        if (entry->state == SPL_ENTRY_GONE) {
+            close_entry(service, entry);
+            continue;
+        }
+        struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, entry->info->id);
+        if (slot && slot->next == entry && entry->state == SPL_ENTRY_RESIDENT) {
+            put_in_place(slot, entry);
+            continue;
+        }
+        if (slot && slot->next == entry)
+            refuse(slot, &entry->err);
+        spl_catalog_entry_unref(entry);
+    }
+}
+
+/* One file of a look, which makes its slot or brings it up to date. */
+static void meet(struct spl_service *service, const struct spl_catalog_file *file)
+{
+    char id[sizeof((struct spl_catalog_slot *)0)->id];
+    size_t length;
+    const char *stem = spl_catalog_id_of(file->path, &length);
+    struct spl_error err = {0};
+    if (!stem)
+        return;
+    snprintf(id, sizeof id, "%.*s", (int)length, stem);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, id);
+    if (!slot) {
+        if (!(slot = spl_catalog_add_slot(&service->catalog, id, file->path, &err))) {
+            spl_log_warn("dataset %s is not served: %s", id, err.message);
+            return;
+        }
+        slot->in_directory = file->in_directory;
+        slot->seen = file->mark;
+        return; // opened when the next look finds the same
+    }
+    if (strcmp(slot->path, file->path))
+        return; // the same id elsewhere waits until this file is gone
+    slot->missed = 0;
+    bool settled = spl_file_mark_is_equal(&slot->seen, &file->mark);
+    slot->seen = file->mark;
+    if (settled && !slot->busy && !spl_file_mark_is_equal(&slot->opened, &file->mark))
+        open_slot(service, slot);
+}
+
+static void drop_missing(struct spl_service *service, const struct spl_catalog_files *files)
+{
+    struct spl_catalog *catalog = &service->catalog;
+    for (size_t i = catalog->count; i-- > 0;) {
+        struct spl_catalog_slot *slot = &catalog->slots[i];
+        bool found = false;
+        for (size_t f = 0; f < files->count && !found; f++)
+            found = !strcmp(slot->path, files->items[f].path);
+        if (found || slot->busy || ++slot->missed < looks_before_drop)
+            continue;
+        spl_log_info("dataset %s: its file is gone, no longer served", slot->id);
+        spl_catalog_remove_slot(catalog, slot);
+    }
+}
+
+static void run_look(uv_work_t *work)
+{
+    struct look *look = work->data;
+    const struct spl_service_options *options = look->service->options;
+    spl_catalog_list(options->datasets.items, options->datasets.count, &look->files, &look->err);
+}
+
+static void after_look(uv_work_t *work, int status)
+{
+    (void)status;
+    struct look *look = work->data;
+    struct spl_service *service = look->service;
+    struct library *library = &service->library;
+    library->tasks--;
+    library->looking = false;
+    if (look->err.code && strcmp(library->last.message, look->err.message))
+        spl_log_warn("datasets are left as they are: %s", look->err.message);
+    library->last = look->err;
+    for (size_t i = 0; i < look->files.count && !look->err.code && !library->stopped; i++)
+        meet(service, &look->files.items[i]);
+    if (!look->err.code && !library->stopped)
+        drop_missing(service, &look->files);
+    spl_catalog_files_finish(&look->files);
+    free(look);
+}
+
+static void on_timer(uv_timer_t *timer)
+{
+    struct spl_service *service = timer->data;
+    struct look *look = service->library.looking ? NULL : spl_alloc(1, sizeof *look, NULL);
+    if (!look)
+        return;
+    look->work.data = look;
+    look->service = service;
+    if (uv_queue_work(&service->loop, &look->work, run_look, after_look)) {
+        free(look);
+        return;
+    }
+    service->library.looking = true;
+    service->library.tasks++;
+}
+
+void spl_library_start(struct spl_service *service)
+{
+    uint64_t interval_ms = service->options->watch_ms;
+    service->library.timer.data = service;
+    if (interval_ms)
+        uv_timer_start(&service->library.timer, on_timer, interval_ms, interval_ms);
+}
+
+void spl_library_stop(struct spl_service *service)
+{
+    service->library.stopped = true;
+    uv_timer_stop(&service->library.timer);
+    while (service->library.tasks)
+        uv_run(&service->loop, UV_RUN_ONCE);
+}

@@ -1,0 +1,185 @@
+"""Datasets that come, change and go while the daemon runs: picked up, replaced under load, dropped, refused when broken."""
+import json
+import os
+import pathlib
+import shutil
+import tempfile
+import threading
+import time
+
+from harness import FAKE, REAL, WALL, Daemon, eventually, run
+
+WATCH = ("--watch", "30")
+
+
+def folder():
+    return tempfile.TemporaryDirectory()
+
+
+def put(directory, name, data):
+    """As somebody careful would: written elsewhere, then renamed."""
+    hidden = pathlib.Path(directory, "." + name)
+    hidden.write_bytes(data)
+    hidden.rename(pathlib.Path(directory, name + ".spld"))
+
+
+def wall():
+    return pathlib.Path(WALL).read_bytes()
+
+
+def other():
+    """Another valid dataset: its version differs from the wall's."""
+    return pathlib.Path(os.environ["SPLATD_WALL_2"]).read_bytes()
+
+
+def listed(d):
+    return {dataset["id"]: dataset for dataset in d.ask("/v1/datasets").json()["datasets"]}
+
+
+def small(d, name, **kw):
+    return d.ask(f"/v1/datasets/{name}/view?width=16&height=16", **kw)
+
+
+def test_an_empty_directory_fills_up():
+    with folder() as home, Daemon(REAL, *WATCH, datasets=[home]) as d:
+        assert listed(d) == {} and d.ask("/").json()["views"] == []
+        put(home, "a", wall())
+        eventually(lambda: listed(d).get("a", {}).get("state") == "ready")
+        assert small(d, "a").status == 200
+        full = d.ask("/v1/datasets/a").json()
+        assert full["state"] == "ready" and 0 < full["page_bytes"] <= full["resident_bytes"], full
+        put(home, "b", other())
+        eventually(lambda: listed(d).get("b", {}).get("state") == "ready")
+        assert listed(d)["a"]["version"] != listed(d)["b"]["version"] and list(listed(d)) == ["a", "b"]
+        before = d.status()["memory"]["device_bytes"]
+        os.unlink(os.path.join(home, "a.spld"))
+        eventually(lambda: "a" not in listed(d))
+        assert small(d, "a").status == 404 and small(d, "b").status == 200
+        eventually(lambda: d.status()["memory"]["device_bytes"] < before)
+
+
+def test_a_replaced_file_is_a_new_version_and_no_request_fails():
+    with folder() as home:
+        put(home, "a", wall())
+        with Daemon(FAKE, *WATCH, "--queue", "256", datasets=[home], FAKE_FRAME_MS=3) as d:
+            versions, failures, stop = set(), [], threading.Event()
+
+            def load():
+                connection = d.connect()
+                while not stop.is_set():
+                    reply = small(d, "a", connection=connection)
+                    if reply.status != 200:
+                        failures.append(reply.body)
+            threads = [threading.Thread(target=load) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for i in range(6):
+                before = listed(d)["a"]["version"]
+                put(home, "a", other() if i % 2 == 0 else wall())
+                eventually(lambda: listed(d)["a"]["version"] != before)
+                versions.add(listed(d)["a"]["version"])
+            stop.set()
+            for thread in threads:
+                thread.join()
+            assert not failures and len(versions) == 2, (failures[:3], versions)
+
+
+def test_the_old_version_finishes_what_it_began():
+    with folder() as home:
+        put(home, "a", wall())
+        with Daemon(FAKE, *WATCH, datasets=[home], FAKE_FRAME_MS=700) as d:
+            replies = []
+            asking = [threading.Thread(target=lambda: replies.append(small(d, "a").status)) for _ in range(3)]
+            for thread in asking:
+                thread.start()
+            eventually(lambda: d.status()["queues"]["render"]["length"] == 2)
+            os.unlink(os.path.join(home, "a.spld"))
+            eventually(lambda: listed(d) == {})
+            for thread in asking:
+                thread.join()
+            assert replies == [200, 200, 200], replies
+
+
+def test_a_broken_file_is_said_once_and_skipped():
+    broken = bytearray(wall())
+    broken[-5000] ^= 1
+    with folder() as home:
+        put(home, "bad", broken)
+        put(home, "good", wall())
+        with Daemon(FAKE, *WATCH, datasets=[home]) as d:
+            assert listed(d)["bad"]["state"] == "failed" and "bad.spld" in listed(d)["bad"]["reason"]
+            assert home not in json.dumps(listed(d)), "clients read where the files lie"
+            put(home, "late", broken[:1000])
+            eventually(lambda: listed(d).get("late", {}).get("state") == "failed")
+            reply = small(d, "late")
+            assert reply.status == 404 and "truncated" in reply.json()["detail"], reply.body
+            put(home, "good", broken)
+            eventually(lambda: "reason" in listed(d)["good"])
+            assert listed(d)["good"]["state"] == "ready" and small(d, "good").status == 200
+            time.sleep(0.3)
+            for name in ("bad", "late", "good"):
+                said = [line for line in d.lines if f"dataset {name} " in line and "warning" in line]
+                assert len(said) == 1, said
+            put(home, "bad", wall())
+            put(home, "good", other())
+            eventually(lambda: listed(d)["bad"]["state"] == "ready" and "reason" not in listed(d)["good"])
+
+
+def test_partial_files_and_foreign_names_are_left_alone():
+    with folder() as home, Daemon(FAKE, "--watch", "200", datasets=[home]) as d:
+        data = wall()
+        with open(os.path.join(home, "slow.spld"), "wb") as file:  # a copy in progress
+            for at in range(0, len(data), len(data) // 20 + 1):
+                file.write(data[at:at + len(data) // 20 + 1])
+                file.flush()
+                time.sleep(0.05)
+                assert listed(d).get("slow", {}).get("state") in (None, "loading")
+        eventually(lambda: listed(d)["slow"]["state"] == "ready")
+        for name in (".hidden.spld", "no\nline.spld", "blank .spld", "x.spld.part", "ü.spld", "a" * 200 + ".spld"):
+            pathlib.Path(home, name).write_bytes(data)
+        os.mkdir(os.path.join(home, "folder.spld"))
+        os.symlink("/nowhere", os.path.join(home, "dangling.spld"))
+        eventually(lambda: listed(d).get("folder", {}).get("state") == "failed")
+        assert set(listed(d)) == {"slow", "folder"}, listed(d)
+
+
+def test_a_directory_that_cannot_be_listed_drops_nothing():
+    with folder() as top:
+        home = os.path.join(top, "home")
+        os.mkdir(home)
+        put(home, "a", wall())
+        shutil.copy(WALL, os.path.join(top, "named.spld"))
+        with Daemon(FAKE, *WATCH, datasets=[home, os.path.join(top, "named.spld")]) as d:
+            assert set(listed(d)) == {"a", "named"}
+            put(top, "named", other())  # a file that was named itself is watched as well
+            before = listed(d)["named"]["version"]
+            eventually(lambda: listed(d)["named"]["version"] != before)
+            os.rename(home, home + ".away")
+            eventually(lambda: "a" not in listed(d))
+            os.rename(home + ".away", home)
+            eventually(lambda: listed(d).get("a", {}).get("state") == "ready")
+
+
+def test_many_changes_leave_nothing_behind():
+    with folder() as home, Daemon(FAKE, "--watch", "20", datasets=[home]) as d:
+        put(home, "a", wall())
+        eventually(lambda: listed(d).get("a", {}).get("state") == "ready")
+        descriptors = len(os.listdir(f"/proc/{d.process.pid}/fd"))
+        for i in range(10):
+            before = listed(d)["a"]["version"]
+            put(home, "a", other() if i % 2 == 0 else wall())
+            eventually(lambda: listed(d)["a"]["version"] != before)
+        maps = pathlib.Path(f"/proc/{d.process.pid}/maps")
+        eventually(lambda: maps.read_text().count(home) == 1)
+        assert len(os.listdir(f"/proc/{d.process.pid}/fd")) <= descriptors
+
+
+def test_sigterm_while_datasets_are_opened():
+    for _ in range(5):
+        with folder() as home:
+            with Daemon(FAKE, "--watch", "5", datasets=[home]) as d:
+                for i in range(20):
+                    put(home, f"d{i}", wall())
+
+
+run(globals())
