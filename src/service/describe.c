@@ -89,7 +89,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     return json;
 }
 
-static uint64_t resident_bytes(void)
+uint64_t spl_resident_bytes(void)
 {
     unsigned long long size = 0, resident = 0;
     FILE *file = fopen("/proc/self/statm", "r");
@@ -149,7 +149,7 @@ json_t *spl_describe_status(struct spl_service *service)
     set(json, "datasets", ids);
     set(json, "memory",
         json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
-                  count(status.device_limit_bytes), "resident_bytes", count(resident_bytes()), "reply_bytes",
+                  count(status.device_limit_bytes), "resident_bytes", count(spl_resident_bytes()), "reply_bytes",
                   count(service->reply_bytes)));
     set(json, "queues",
         json_pack("{s:o, s:o}", "render", describe_queue(status.render_length, status.render_capacity), "encode",

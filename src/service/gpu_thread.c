@@ -58,6 +58,7 @@ static int build(struct gpu *gpu, struct spl_error *err)
     struct spl_pipeline *pipeline = gpu->pipeline;
     struct spl_catalog_entry *entry;
     int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
+    spl_pipeline_touch(pipeline);
     if (rc)
         return rc;
     gpu->pages_evicted = 0;
@@ -77,6 +78,7 @@ static int build(struct gpu *gpu, struct spl_error *err)
             break;
         if (!entry->loading && (rc = spl_renderer_preload(gpu->renderer, entry->dataset, err)))
             return rc;
+        spl_pipeline_touch(pipeline);
     }
     publish_residency(gpu);
     return 0;
@@ -173,6 +175,7 @@ static bool may_rebuild(struct gpu *gpu)
 static bool recover(struct gpu *gpu, const struct spl_error *why)
 {
     struct spl_error err = *why;
+    spl_pipeline_touch(gpu->pipeline);
     set_state(gpu->pipeline, SPL_PIPELINE_REBUILDING);
     for (;;) {
         spl_log_warn("device lost: %s", err.message);
@@ -235,6 +238,7 @@ static int plan(struct spl_job *job)
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
+    spl_pipeline_touch(pipeline);
     job->queue_ms = (double)(spl_now_ns() - job->accepted_ns) / SPL_NS_PER_MS;
     if (spl_job_is_over(job) || spl_pipeline_reserve_frame(pipeline, job)) {
         spl_pipeline_finish_job(pipeline, job);
@@ -249,6 +253,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     uint64_t began = spl_now_ns();
     job->request.view.deadline_ns = job->deadline_ns;
     int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
+    spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
     if (!rc) {
         gpu->frames++;

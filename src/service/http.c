@@ -157,6 +157,8 @@ static enum MHD_Result send_reply(struct request *request)
     if (request->service->draining)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     count_reply(request);
+    spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
+                        (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
     enter(request->connection, PHASE_WRITING);
     return MHD_queue_response(request->handle, request->status, request->response);
 }

@@ -46,16 +46,16 @@ static int open_socket(const struct addrinfo *info)
     return -1;
 }
 
-int spl_listen(const char *address, int *fd, char *url, size_t url_capacity, struct spl_error *err)
+int spl_listen(const char *flag, const char *address, int *fd, char *url, size_t url_capacity, struct spl_error *err)
 {
     char text[256], *host, *port;
     if (strlen(address) >= sizeof text || !split(strcpy(text, address), &host, &port) || strtol(port, NULL, 10) > 65535)
-        return spl_fail_field(err, SPL_E_USAGE, "--listen",
-                              "'%.200s' is no ADDR:PORT; write 127.0.0.1:8080 or [::1]:8080", address);
+        return spl_fail_field(err, SPL_E_USAGE, flag,
+                              "%s: '%.200s' is no ADDR:PORT; write 127.0.0.1:8080 or [::1]:8080", flag, address);
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *found = NULL;
     int rc = getaddrinfo(host, port, &hints, &found);
     if (rc)
-        return spl_fail_field(err, SPL_E_USAGE, "--listen", "cannot find the address '%s': %s", host, gai_strerror(rc));
+        return spl_fail_field(err, SPL_E_USAGE, flag, "cannot find the address '%s': %s", host, gai_strerror(rc));
     *fd = -1;
     for (const struct addrinfo *info = found; info && *fd < 0; info = info->ai_next)
         *fd = open_socket(info);

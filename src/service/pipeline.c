@@ -64,8 +64,21 @@ static void release_frame(struct spl_pipeline *pipeline, struct spl_job *job)
     pthread_mutex_unlock(&pipeline->mutex);
 }
 
+void spl_pipeline_touch(struct spl_pipeline *pipeline)
+{
+    atomic_store(&pipeline->moved_ns, spl_now_ns());
+}
+
+uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline)
+{
+    uint64_t moved = atomic_load(&pipeline->moved_ns), now = spl_now_ns();
+    bool busy = atomic_load(&pipeline->in_flight) || spl_pipeline_get_state(pipeline) == SPL_PIPELINE_REBUILDING;
+    return busy && now > moved ? now - moved : 0;
+}
+
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
 {
+    spl_pipeline_touch(pipeline);
     release_frame(pipeline, job);
     bool room = spl_queue_try_push(pipeline->done, job);
     spl_assert(room);
@@ -208,6 +221,8 @@ void spl_pipeline_destroy(struct spl_pipeline *pipeline)
 
 int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err)
 {
+    if (!atomic_load(&pipeline->in_flight))
+        spl_pipeline_touch(pipeline); // the end of idleness is no hang
     if (atomic_fetch_add(&pipeline->in_flight, 1) < spl_queue_get_capacity(pipeline->done) &&
         spl_queue_try_push(pipeline->render, job))
         return 0;

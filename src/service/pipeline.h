@@ -95,6 +95,10 @@ struct spl_pipeline_status {
 };
 void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status);
 
+/* For how long nothing has moved although there is work: a job inside, or a device that is being reopened. 0 when idle.
+ * A pulse for health checks. Any thread. */
+uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline);
+
 /* Seconds after which a refused request may be repeated with hope, at least 1. */
 unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline);
 

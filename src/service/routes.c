@@ -179,6 +179,7 @@ void spl_route(struct request *request, const char *method)
         struct holes holes = {0};
         if (!match(routes[i].pattern, request->uri, &holes))
             continue;
+        request->route = routes[i].pattern;
         if (routes[i].methods & 1u << wanted) {
             enter(request, &routes[i], (enum spl_http_method)wanted, &holes);
             return;

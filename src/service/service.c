@@ -13,7 +13,9 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/health.h"
 #include "service/listen.h"
+#include "service/ops.h"
 #include "service/state.h"
 
 enum {
@@ -48,14 +50,23 @@ static void drain(struct spl_service *service)
     uv_timer_start(&service->drain_timer, on_drain_timer, drain_check_ms, drain_check_ms);
 }
 
+static void on_leave(uv_timer_t *timer)
+{
+    drain(timer->data);
+}
+
 static void on_signal(uv_signal_t *handle, int number)
 {
     struct spl_service *service = handle->data;
-    if (service->draining)
+    if (service->leaving)
         _exit(1);
+    service->leaving = true;
     spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
                  service->requests_open);
-    drain(service);
+    if (service->options->drain_delay_ms && service->daemon)
+        uv_timer_start(&service->drain_timer, on_leave, service->options->drain_delay_ms, 0);
+    else
+        drain(service);
 }
 
 static void announce(struct spl_service *service)
@@ -115,8 +126,8 @@ static void raise_descriptor_limit(void)
 static int init_loop(struct spl_service *service, struct spl_error *err)
 {
     static const int numbers[] = {SIGTERM, SIGINT};
-    uv_timer_t *timers[] = {&service->http_timer, &service->wait_timer, &service->slow_timer, &service->drain_timer,
-                            &service->library.timer};
+    uv_timer_t *timers[] = {&service->http_timer,    &service->wait_timer, &service->slow_timer, &service->drain_timer,
+                            &service->library.timer, &service->look_timer, &service->ops_timer};
     int rc = uv_loop_init(&service->loop);
     if (rc)
         return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
@@ -185,16 +196,19 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     int rc = init_loop(service, err);
     if (rc)
         goto free_service;
-    if ((rc = spl_listen(options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
+    if ((rc = spl_ops_start(service, err)) ||
+        (rc = spl_listen("--listen", options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
         (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
                                err)) ||
         (rc = start_pipeline(service, err)))
         goto done;
+    spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);
     spl_http_stop(service);
     if ((rc = service->failure.code) && err)
         *err = service->failure;
 done:
+    spl_ops_stop(service);
     spl_library_stop(service);
     spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_pipeline_destroy(service->pipeline);

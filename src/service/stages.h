@@ -17,6 +17,7 @@ struct spl_pipeline {
     bool gpu_started;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
     _Atomic uint64_t device_bytes, device_limit_bytes, frame_ns;
+    _Atomic uint64_t moved_ns; /* when a thread last began or ended a step of its work */
     atomic_int state;         /* enum spl_pipeline_state */
     struct spl_error failure; /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
@@ -37,6 +38,9 @@ struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline)
 /* Hands an entry back to the loop. */
 void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry,
                                 enum spl_entry_state state);
+
+/* Says that work goes on; called at every step that could hang. */
+void spl_pipeline_touch(struct spl_pipeline *pipeline);
 
 /* Hands a job back to the loop, with `err` set or `encoded` filled. */
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);

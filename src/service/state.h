@@ -8,6 +8,7 @@
 #include <uv.h>
 
 #include "service/catalog.h"
+#include "service/latency.h"
 #include "service/pipeline.h"
 #include "service/service.h"
 
@@ -40,6 +41,7 @@ struct request {
     struct MHD_Connection *handle;
     struct connection *connection;
     uint64_t id, began_ns;
+    const char *route; /* its pattern; NULL when there is none */
     char *uri;         /* path, cut at '?'; NULL when the URI was too long */
     const char *query; /* inside uri, "" when there is none */
     char *body;        // may be NULL
@@ -67,6 +69,7 @@ struct spl_service {
     struct library library;
     struct spl_pipeline *pipeline;
     struct spl_counters counters;
+    struct spl_latencies latencies;
     uint64_t started_ns;
     char url[192];
     int listen_fd; /* -1 once MHD has it */
@@ -79,13 +82,18 @@ struct spl_service {
     uv_timer_t wait_timer;  /* deadlines and departures, while requests wait */
     uv_timer_t slow_timer;  /* connections that take too long */
     uv_timer_t drain_timer; /* while stopping */
+    uv_timer_t look_timer;  /* health.c */
+    struct MHD_Daemon *ops; // may be NULL
+    uv_poll_t ops_poll;
+    uv_timer_t ops_timer;
 
     struct MHD_Daemon *daemon; // may be NULL
     LIST_HEAD(, connection) connections;
     LIST_HEAD(, request) waiting;
     size_t waiting_count, requests_open, connections_open;
     size_t reply_bytes; /* of views that clients have not read yet */
-    bool draining;
+    bool leaving;       /* asked to stop: /readyz says no */
+    bool draining;      /* nothing more is accepted */
     uint64_t drain_began_ns;
     struct spl_error failure;
 };
@@ -149,5 +157,7 @@ void spl_reply_view(struct request *request, struct spl_job *job);          /* t
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full);
 json_t *spl_describe_status(struct spl_service *service);
+
+uint64_t spl_resident_bytes(void); /* of this process, 0 when unknown */
 
 #endif

@@ -45,10 +45,24 @@ static void let_go(struct request *request)
     resume(request);
 }
 
+/* Latencies of what was rendered, for whoever waited. */
+static void observe(struct spl_service *service, const struct request *request, const struct spl_job *job)
+{
+    const char *route = request ? request->route : NULL;
+    if (!job->rendered_ns)
+        return;
+    spl_latency_observe(&service->latencies, route, SPL_LATENCY_QUEUE, job->queue_ms / 1000);
+    spl_latency_observe(&service->latencies, route, SPL_LATENCY_FRAME,
+                        (double)(job->rendered_ns - job->began_ns) / SPL_NS_PER_S);
+    if (!job->err.code)
+        spl_latency_observe(&service->latencies, route, SPL_LATENCY_ENCODE, job->encode_ms / 1000);
+}
+
 void spl_waiting_complete(struct spl_service *service)
 {
     for (struct spl_job *job; (job = spl_pipeline_take(service->pipeline));) {
         struct request *request = job->owner;
+        observe(service, request, job);
         if (request) {
             if (job->err.code == SPL_E_TIMEOUT)
                 spl_count(&service->counters, deadline_missed);

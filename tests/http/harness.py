@@ -45,23 +45,26 @@ def check_problem(reply, method):
 class Daemon:
     """with Daemon(REAL) as d: …   ends it with SIGTERM and expects exit code 0, unless the test stopped it itself."""
 
-    def __init__(self, binary, *args, datasets=(WALL,), **environment):
+    def __init__(self, binary, *args, datasets=(WALL,), wait_for=" ready\n", **environment):
         self.process = subprocess.Popen(
-            [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0", *args, *datasets],
+            [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0",
+             *([] if "--ops-listen" in args else ["--ops-listen", "127.0.0.1:0"]), *args, *datasets],
             stderr=subprocess.PIPE, text=True, env={**os.environ, **{k: str(v) for k, v in environment.items()}})
-        self.lines, self.port, self.code = [], None, None
+        self.lines, self.port, self.ops_port, self.code = [], None, None, None
         ready = queue.Queue()
-        threading.Thread(target=self._read, args=(ready,), daemon=True).start()
+        threading.Thread(target=self._read, args=(ready, wait_for), daemon=True).start()
         if not ready.get(timeout=60):
             self.code = self.process.wait(10)
             raise AssertionError(f"exit code {self.code} before ready:\n" + "".join(self.lines))
 
-    def _read(self, ready):
+    def _read(self, ready, wait_for):
         for line in self.process.stderr:
             self.lines.append(line)
             if found := re.search(r"listening on http://[^ ]*:(\d+)/", line):
                 self.port = int(found.group(1))
-            if line.endswith(" ready\n"):
+            if found := re.search(r"health and metrics on http://[^ ]*:(\d+)/", line):
+                self.ops_port = int(found.group(1))
+            if wait_for in line:
                 ready.put(True)
         ready.put(False)
 
@@ -78,6 +81,15 @@ class Daemon:
         if reply.status >= 400:
             check_problem(reply, method)
         openapi.check(method, path, headers, body, reply)
+        return reply
+
+    def ops(self, path, method="GET", timeout=60):
+        """Asks the second listener."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.ops_port, timeout=timeout)
+        connection.request(method, path)
+        answer = connection.getresponse()
+        reply = Reply(answer.status, answer.headers, answer.read())
+        connection.close()
         return reply
 
     def view(self, **params):

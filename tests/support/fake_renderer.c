@@ -1,7 +1,8 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
  * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), losses on
- * demand, failures to open after FAKE_OPEN_LIMIT times. TSan sees all of it, which it cannot with a driver that
- * compiles its own code. */
+ * demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, and FAKE_HANG_MS that the first frame
+ * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
+ * its own code. */
 #include <splatd/render.h>
 
 #include <stdlib.h>
@@ -14,7 +15,7 @@
 
 struct spl_renderer {
     struct spl_device_info device;
-    bool lose_next, lost;
+    bool lose_next, lost, hung;
 };
 
 static long setting(const char *name, long otherwise)
@@ -28,6 +29,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     static long opened;
     if (options->require_gpu || opened++ >= setting("FAKE_OPEN_LIMIT", 1000))
         return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
+    usleep((useconds_t)setting("FAKE_OPEN_MS", 0) * 1000);
     if (!(*out = spl_alloc(1, sizeof **out, err)))
         return SPL_E_NOMEM;
     (*out)->device =
@@ -118,6 +120,10 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
     if (renderer->lose_next || renderer->lost) {
         renderer->lost = true;
         return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
+    }
+    if (!renderer->hung) {
+        renderer->hung = true;
+        usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
     }
     uint64_t until = spl_now_ns() + frame_ns(view);
     while (spl_remaining_ns(until)) {
