@@ -1,43 +1,200 @@
-/* One line, one write(2): lines of several threads never mix. */
+/* Lines are put together in a buffer of their own thread's stack and written with one write(2) of less than PIPE_BUF
+ * bytes, when poll(2) says that it will not block. The mutex keeps a second thread from taking the room that poll has
+ * promised the first; it is held for one write that does not block. */
 #include "base/log.h"
 
+#include <math.h>
+#include <poll.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdint.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-static _Atomic(int) log_level = SPL_LOG_INFO;
+enum { line_max = 2048, end_room = 8 }; /* what closes a string, an object and the line always fits */
+
+static _Atomic(int) log_level = SPL_LOG_INFO, log_format = SPL_LOG_TEXT;
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static uint64_t dropped; // guarded by: mutex
+
+static const char *const level_names[] = {"error", "warning", "info", "debug"};
+
+struct line {
+    char text[line_max];
+    size_t used;
+};
 
 void spl_log_set_level(enum spl_log_level level)
 {
     atomic_store(&log_level, (int)level);
 }
 
+bool spl_log_is_on(enum spl_log_level level)
+{
+    return (int)level <= atomic_load(&log_level);
+}
+
+void spl_log_set_format(enum spl_log_format format)
+{
+    atomic_store(&log_format, (int)format);
+}
+
+static void add_char(struct line *line, char c)
+{
+    if (line->used < line_max - end_room)
+        line->text[line->used++] = c;
+}
+
+static void add_plain(struct line *line, const char *text)
+{
+    for (; *text; text++)
+        add_char(line, *text);
+}
+
+/* Text from anywhere: no control characters; in JSON ASCII only, since nobody has checked that it is UTF-8. */
+static void add_outside(struct line *line, const char *text, bool json)
+{
+    for (; *text; text++) {
+        unsigned char c = (unsigned char)*text;
+        bool bad = c < 0x20 || c == 0x7f || (json && c > 0x7f), escape = json && (c == '"' || c == '\\');
+        if (line->used + escape + 1 >= line_max - end_room)
+            return; // an escape stays in one piece
+        if (escape)
+            add_char(line, '\\');
+        add_char(line, bad ? '?' : *text);
+    }
+}
+
+/* Ends a string even where the line is full. */
+static void close_with(struct line *line, const char *end)
+{
+    size_t length = strlen(end);
+    if (line->used + length < line_max) {
+        memcpy(line->text + line->used, end, length);
+        line->used += length;
+    }
+}
+
+static void add_string(struct line *line, const char *text)
+{
+    add_char(line, '"');
+    add_outside(line, text, true);
+    close_with(line, "\"");
+}
+
+static void add_number(struct line *line, double number)
+{
+    char text[40];
+    if (!isfinite(number))
+        number = 0;
+    snprintf(text, sizeof text, floor(number) == number && fabs(number) < 1e15 ? "%.0f" : "%.3f", number);
+    add_plain(line, text);
+}
+
+static void add_time(struct line *line)
+{
+    char text[64];
+    struct timespec now;
+    struct tm utc;
+    clock_gettime(CLOCK_REALTIME, &now);
+    gmtime_r(&now.tv_sec, &utc);
+    size_t used = strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(text + used, sizeof text - used, ".%03ldZ", now.tv_nsec / 1000000);
+    add_plain(line, text);
+}
+
+static void make_json(struct line *line, enum spl_log_level level, const char *message,
+                      const struct spl_log_field *fields, size_t count)
+{
+    add_plain(line, "{\"time\":\"");
+    add_time(line);
+    add_plain(line, "\",\"level\":\"");
+    add_plain(line, level_names[level]);
+    add_plain(line, "\",\"message\":");
+    add_string(line, message);
+    for (size_t i = 0; i < count; i++) {
+        if (line->used + strlen(fields[i].name) + 48 > line_max - end_room)
+            break; // no room for a name and a number
+        add_plain(line, ",\"");
+        add_plain(line, fields[i].name);
+        add_plain(line, "\":");
+        if (fields[i].text)
+            add_string(line, fields[i].text);
+        else
+            add_number(line, fields[i].number);
+    }
+    close_with(line, "}");
+}
+
+static void make_text(struct line *line, enum spl_log_level level, const char *message,
+                      const struct spl_log_field *fields, size_t count)
+{
+    if (!isatty(STDERR_FILENO)) {
+        add_time(line);
+        add_char(line, ' ');
+    }
+    add_plain(line, "splatd: ");
+    add_plain(line, level_names[level]);
+    add_plain(line, ": ");
+    add_outside(line, message, false);
+    for (size_t i = 0; i < count; i++) {
+        add_char(line, ' ');
+        add_plain(line, fields[i].name);
+        add_char(line, '=');
+        if (!fields[i].text)
+            add_number(line, fields[i].number);
+        else if (!*fields[i].text || strpbrk(fields[i].text, " \"=\\"))
+            add_string(line, fields[i].text);
+        else
+            add_outside(line, fields[i].text, false);
+    }
+}
+
+static void make(struct line *line, enum spl_log_level level, const char *message, const struct spl_log_field *fields,
+                 size_t count)
+{
+    line->used = 0;
+    (atomic_load(&log_format) == SPL_LOG_JSON ? make_json : make_text)(line, level, message, fields, count);
+    close_with(line, "\n");
+}
+
+/* False when it would block or fails. */
+static bool put(const struct line *line)
+{
+    struct pollfd fd = {.fd = STDERR_FILENO, .events = POLLOUT};
+    return poll(&fd, 1, 0) == 1 && fd.revents & POLLOUT &&
+           write(STDERR_FILENO, line->text, line->used) == (ssize_t)line->used;
+}
+
+void spl_log_fields(enum spl_log_level level, const char *message, const struct spl_log_field *fields, size_t count)
+{
+    struct line line;
+    if (!spl_log_is_on(level))
+        return;
+    pthread_mutex_lock(&mutex);
+    if (dropped) {
+        struct spl_log_field lines = {"lines", NULL, (double)dropped};
+        make(&line, SPL_LOG_WARN, "stderr did not take log lines, they are lost", &lines, 1);
+        if (put(&line))
+            dropped = 0;
+    }
+    make(&line, level, message, fields, count);
+    if (dropped || !put(&line))
+        dropped++;
+    pthread_mutex_unlock(&mutex);
+}
+
 void spl_log(enum spl_log_level level, const char *format, ...)
 {
-    static const char *const names[] = {"error", "warning", "info", "debug"};
-    if ((int)level > atomic_load(&log_level))
+    char message[1024];
+    if (!spl_log_is_on(level))
         return;
-    char line[1024];
-    int used = 0;
-    if (!isatty(STDERR_FILENO)) {
-        struct timespec now;
-        struct tm utc;
-        clock_gettime(CLOCK_REALTIME, &now);
-        gmtime_r(&now.tv_sec, &utc);
-        used = (int)strftime(line, sizeof line, "%Y-%m-%dT%H:%M:%S", &utc);
-        used += snprintf(line + used, sizeof line - used, ".%03ldZ ", now.tv_nsec / 1000000);
-    }
-    used += snprintf(line + used, sizeof line - used, "splatd: %s: ", names[level]);
     va_list args;
     va_start(args, format);
-    int more = vsnprintf(line + used, sizeof line - used - 1, format, args);
+    vsnprintf(message, sizeof message, format, args);
     va_end(args);
-    used += more < 0 ? 0 : more;
-    if (used > (int)sizeof line - 2)
-        used = (int)sizeof line - 2;
-    line[used++] = '\n';
-    if (write(STDERR_FILENO, line, used) < 0)
-        return; /* nowhere left to say it */
+    spl_log_fields(level, message, NULL, 0);
 }

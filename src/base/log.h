@@ -1,14 +1,36 @@
-/* Leveled messages to stderr: one line each, timestamped only when stderr is no terminal. Any thread; never blocks on a
- * lock of ours (each line is one write). */
+/* Leveled messages to stderr, as text or JSON: one line each, one write, so that lines of several threads never mix.
+ * Any thread. Never blocks on who reads: a line that stderr does not take at once is dropped and counted, and the next
+ * line that gets through says how many were. What came from outside cannot break a line: control characters become '?'.
+ */
 #ifndef SPL_BASE_LOG_H
 #define SPL_BASE_LOG_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
 enum spl_log_level { SPL_LOG_ERROR, SPL_LOG_WARN, SPL_LOG_INFO, SPL_LOG_DEBUG };
+enum spl_log_format {
+    SPL_LOG_TEXT, /* TIME splatd: LEVEL: MESSAGE name=value…, without TIME on a terminal */
+    SPL_LOG_JSON, /* {"time", "level", "message", name: value…} */
+};
 
 /* Messages above `level` are dropped; SPL_LOG_INFO at start. */
 void spl_log_set_level(enum spl_log_level level);
+bool spl_log_is_on(enum spl_log_level level);
+
+/* SPL_LOG_TEXT at start. */
+void spl_log_set_format(enum spl_log_format format);
 
 void spl_log(enum spl_log_level level, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+struct spl_log_field {
+    const char *name; /* a plain word */
+    const char *text; // may be NULL: the value is `number`
+    double number;
+};
+
+/* A message with named values. A line is at most 2 KiB; values beyond are cut, later fields left out. */
+void spl_log_fields(enum spl_log_level level, const char *message, const struct spl_log_field *fields, size_t count);
 
 #define spl_log_error(...) spl_log(SPL_LOG_ERROR, __VA_ARGS__)
 #define spl_log_warn(...) spl_log(SPL_LOG_WARN, __VA_ARGS__)

@@ -144,6 +144,7 @@ int spl_cmd_serve(int argc, char **argv)
         rc = parse(&o, argc, argv, flags.options, &err);
     if (!rc) {
         spl_log_set_level((enum spl_log_level)o.log_level);
+        spl_log_set_format((enum spl_log_format)o.log_format);
         rc = spl_service_run(&o, &err);
     }
     free_flags(&flags);

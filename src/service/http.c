@@ -69,18 +69,19 @@ static bool refuse_many_parameters(struct request *request, const char *uri)
 {
     static const char body[] =
         "{\"type\": \"urn:splatd:error:limit\", \"title\": \"URI Too Long\", \"status\": 414, \"detail\": "
-        "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%llu\", \"field\": \"url\"}";
+        "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%s\", \"field\": \"url\"}";
     unsigned count = 0;
     for (; *uri && count <= parameters_max; uri++)
         count += *uri == '&';
     if (count <= parameters_max)
         return false;
-    char text[sizeof body + 20], reply[sizeof text + 160];
-    int length = snprintf(text, sizeof text, body, (unsigned long long)request->id);
+    char text[sizeof body + sizeof request->id], reply[sizeof text + 256];
+    int length = snprintf(text, sizeof text, body, request->id);
     length = snprintf(reply, sizeof reply,
                       "HTTP/1.1 414 URI Too Long\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                      "Content-Length: %d\r\n\r\n%s",
-                      length, text);
+                      "X-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
+                      request->id, length, text);
+    request->status = MHD_HTTP_URI_TOO_LONG;
     if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
         spl_count(&request->service->counters, replies_4xx);
     shutdown(request->connection->fd, SHUT_RDWR);
@@ -112,7 +113,8 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
         *mark = '\0';
         request->query = mark + 1;
     }
-    request->id = spl_count(&service->counters, requests) + 1;
+    request->number = spl_count(&service->counters, requests) + 1;
+    spl_request_set_id(request, NULL);
     enter(request->connection, PHASE_READING);
     service->requests_open++;
     request->abandoned = refuse_many_parameters(request, uri);
@@ -123,11 +125,11 @@ static void on_completed(void *context, struct MHD_Connection *handle, void **re
                          enum MHD_RequestTerminationCode code)
 {
     (void)handle;
-    (void)code;
     struct spl_service *service = context;
     struct request *request = *request_context;
     if (!request)
         return;
+    spl_access_log_write(request, code);
     spl_assert(!request->job);
     enter(request->connection, PHASE_IDLE);
     service->requests_open--;
@@ -156,6 +158,7 @@ static enum MHD_Result send_reply(struct request *request)
         return MHD_NO;
     if (request->service->draining)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
+    MHD_add_response_header(request->response, "X-Request-Id", request->id);
     count_reply(request);
     spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
@@ -205,7 +208,6 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
                                   const char *version, const char *data, size_t *length, void **request_context)
 {
     (void)context;
-    (void)handle;
     (void)url;
     (void)version;
     struct request *request = *request_context;
@@ -213,6 +215,8 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         return MHD_NO;
     if (!request->started) {
         request->started = true;
+        snprintf(request->method, sizeof request->method, "%s", method);
+        spl_request_set_id(request, MHD_lookup_connection_value(handle, MHD_HEADER_KIND, "X-Request-Id"));
         return refuse_announced_body(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {

@@ -69,7 +69,7 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
 {
     json_t *json = json_pack("{s:o, s:s, s:i, s:o, s:o}", "type", json_sprintf("urn:splatd:error:%s", type), "title",
                              MHD_get_reason_phrase_for(status), "status", (int)status, "detail", outside_text(detail),
-                             "instance", json_sprintf("urn:splatd:request:%llu", (unsigned long long)request->id));
+                             "instance", json_sprintf("urn:splatd:request:%s", request->id));
     if (json && field[0])
         json_object_set_new(json, "field", outside_text(field));
     char *text = json ? json_dumps(json, JSON_INDENT(1)) : NULL;
@@ -80,8 +80,8 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
 void spl_reply_error(struct request *request, const struct spl_error *err)
 {
     const struct spl_code_info *info = spl_code_get_info(err->code);
-    if (info->http_status >= 500 && !info->retry)
-        spl_log_error("request %llu: %s", (unsigned long long)request->id, err->message);
+    if (info->http_status >= 500 && !info->retry && spl_access_log_admit(request->service))
+        spl_log_error("request %s: %s", request->id, err->message);
     // 413 is about bodies; a parameter beyond a limit is the client's to change, like any other
     unsigned status = err->code == SPL_E_LIMIT && err->field[0] ? MHD_HTTP_BAD_REQUEST : (unsigned)info->http_status;
     spl_reply_problem(request, status, info->name, err->field, err->message);

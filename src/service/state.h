@@ -7,6 +7,7 @@
 #include <sys/queue.h>
 #include <uv.h>
 
+#include "service/access_log.h"
 #include "service/catalog.h"
 #include "service/latency.h"
 #include "service/pipeline.h"
@@ -31,7 +32,8 @@ struct connection {
     struct spl_service *service;
     int fd; // owned by: MHD
     enum phase phase;
-    uint64_t since_ns; /* when the phase began */
+    uint64_t since_ns;   /* when the phase began */
+    uint64_t sent_bytes; /* at the end of the last request that was logged */
 };
 
 /* One request, from its first line until its reply is written. */
@@ -40,8 +42,11 @@ struct request {
     struct spl_service *service;
     struct MHD_Connection *handle;
     struct connection *connection;
-    uint64_t id, began_ns;
+    uint64_t number, began_ns;
+    char id[65]; /* X-Request-Id of the reply */
+    char method[16];
     const char *route; /* its pattern; NULL when there is none */
+    const char *cache; /* for the log: "hit", "miss", …; NULL where no cache was asked */
     char *uri;         /* path, cut at '?'; NULL when the URI was too long */
     const char *query; /* inside uri, "" when there is none */
     char *body;        // may be NULL
@@ -70,6 +75,7 @@ struct spl_service {
     struct spl_pipeline *pipeline;
     struct spl_counters counters;
     struct spl_latencies latencies;
+    struct spl_access_log access_log;
     uint64_t started_ns;
     char url[192];
     int listen_fd; /* -1 once MHD has it */

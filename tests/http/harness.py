@@ -45,7 +45,7 @@ def check_problem(reply, method):
 class Daemon:
     """with Daemon(REAL) as d: …   ends it with SIGTERM and expects exit code 0, unless the test stopped it itself."""
 
-    def __init__(self, binary, *args, datasets=(WALL,), wait_for=" ready\n", **environment):
+    def __init__(self, binary, *args, datasets=(WALL,), wait_for=r"( |\"message\":\")ready(\"})?\n", **environment):
         self.process = subprocess.Popen(
             [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0",
              *([] if "--ops-listen" in args else ["--ops-listen", "127.0.0.1:0"]), *args, *datasets],
@@ -64,7 +64,7 @@ class Daemon:
                 self.port = int(found.group(1))
             if found := re.search(r"health and metrics on http://[^ ]*:(\d+)/", line):
                 self.ops_port = int(found.group(1))
-            if wait_for in line:
+            if re.search(wait_for, line):
                 ready.put(True)
         ready.put(False)
 

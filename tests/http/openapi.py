@@ -15,7 +15,19 @@ import jsonschema
 import yaml
 
 PATH = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]) / "api" / "openapi.yaml"
-DOCUMENT = yaml.safe_load(PATH.read_text(encoding="utf-8"))
+
+
+class Strict(yaml.SafeLoader):
+    """Refuses a key that stands twice in a mapping, where YAML would take the last."""
+
+    def construct_mapping(self, node, deep=False):
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        twice = [key for key in keys if keys.count(key) > 1]
+        assert not twice, f"api/openapi.yaml, line {node.start_mark.line + 1}: {twice[0]} stands twice below"
+        return super().construct_mapping(node, deep)
+
+
+DOCUMENT = yaml.load(PATH.read_text(encoding="utf-8"), Strict)
 METHODS = ("get", "put", "post", "delete", "options", "patch")
 # Of the protocol or of any server; the document need not name them.
 PLAIN_HEADERS = {"content-type", "content-length", "connection", "date", "transfer-encoding"}

@@ -2,6 +2,7 @@
 one. That sum is made of what the others have left, so run the whole suite: meson test --suite http.
 
 usage: test_openapi.py NAME…   the other tests"""
+import http.client
 import os
 import pathlib
 import sys
@@ -45,7 +46,10 @@ def test_the_document_is_sound():
 
 def test_what_is_not_documented_is_found():
     def fault_of(method, target, status=200, headers={}, body=b"", sent=None):
-        reply = harness.Reply(status, {"Content-Type": "application/json", **headers}, body)
+        message = http.client.HTTPMessage()  # names without regard to case
+        for name, text in {"Content-Type": "application/json", "X-Request-Id": "1", **headers}.items():
+            message[name] = text
+        reply = harness.Reply(status, message, body)
         try:
             openapi.check(method, target, {"Content-Type": "application/json"}, sent, reply)
         except AssertionError as fault:
@@ -58,7 +62,8 @@ def test_what_is_not_documented_is_found():
         (("GET", "/", 200, {}, index.replace(b"[]", b"5")), "views: 5 is not of type 'array'"),
         (("GET", "/", 204), "204"), (("POST", "/"), "POST /"), (("GET", "/nowhere"), "/nowhere"),
         (("GET", "/", 404), "application/problem+json"), (("GET", "/", 200, {"X-New": "1"}, index), "X-New"),
-        (("GET", "/", 200, image, index), "image/png"), (("GET", harness.VIEW + "?width=64", 200, image), ""),
+        (("GET", "/", 200, image, index), "image/png"),
+        (("GET", "/", 200, {"X-Request-Id": "a b"}, index), "X-Request-Id"), (("GET", harness.VIEW + "?width=64", 200, image), ""),
         (("GET", harness.VIEW + "?poi=1,2,3", 200, image), ""), (("GET", harness.VIEW + "?poi=1,2", 200, image), "poi"),
         (("GET", harness.VIEW + "?width=0", 200, image), "width"),
         (("GET", harness.VIEW + "?shade=1", 200, image), "'?shade'"),
