@@ -20,8 +20,7 @@ export class Chart {
     this.caption.textContent = "Not measured yet: splatd bench does.";
     if (!dataset.profile) return;
     const [profile, svg] = await Promise.all([askJson(dataset.profile), ask(`${dataset.profile}?format=svg`).then((r) => r.text())]);
-    const root = new DOMParser().parseFromString(svg, "image/svg+xml").documentElement;
-    const numbers = (name) => (root.getAttribute(name) ?? "").split(" ").map(Number);
+    const numbers = (name) => svg.match(new RegExp(`<svg[^>]* ${name}="([^"]*)"`))[1].split(" ").map(Number);
     const [, , width, height] = numbers("viewBox");
     const [left, top, right, bottom] = numbers("data-plot");
     this.profile = profile;
