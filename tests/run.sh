@@ -83,7 +83,7 @@ sanitiser_runs() {
 deploy/install-packages.sh build run test
 
 if build normal gcc $strict; then
-    suites normal rules unit gpu golden fuzz http fault stability
+    suites normal rules unit gpu golden fuzz http e2e fault stability
 fi
 if [ "$mode" = --quick ]; then
     finish

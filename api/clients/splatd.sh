@@ -18,7 +18,7 @@ usage() { sed -n '4,9s/^# \{0,3\}//p' "$0" >&2; exit 2; }
 ask() {
     local body status
     body=$(mktemp)
-    status=$(curl -sS --retry 5 --max-time 120 ${SPLATD_TOKEN:+-H "Authorization: Bearer $SPLATD_TOKEN"} -o "$body" -w '%{http_code}' "$1") ||
+    status=$(curl -sS --retry 5 --max-time 120 -K <(printf '%s' "${SPLATD_TOKEN:+header = \"Authorization: Bearer $SPLATD_TOKEN\"}") -o "$body" -w '%{http_code}' "$1") ||
         { rm -f "$body"; return 1; }
     if [ "$status" != 200 ]; then
         echo "splatd.sh: $status: $(sed -n 's/.*"detail": "\(.*\)",\{0,1\}$/\1/p' "$body")" >&2

@@ -53,7 +53,7 @@ export function attach(stage) {
     else if (stage.drag === "look") {
       const scale = (stage.camera.fov * Math.PI) / 180 / height; // what is under the pointer stays there
       turn(dx * scale, dy * scale);
-    } else turn((-dx * Math.PI) / height, (dy * Math.PI) / height);
+    } else turn((-dx * Math.PI) / height, (-dy * Math.PI) / height);
   });
 
   const release = (event) => {

@@ -1,0 +1,141 @@
+"""The clients of api/clients/ against real daemons, and the examples of their README as they are printed there."""
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import types
+
+HERE = pathlib.Path(__file__)
+CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
+sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
+from harness import FAKE, REAL, Daemon, run, together
+from splatd import Splatd, SplatdError, ring
+
+POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
+SMALL = dict(width=65, height=49)
+JPEG = b"\xff\xd8\xff"
+
+
+def url(daemon):
+    return f"http://127.0.0.1:{daemon.port}"
+
+
+def shell(daemon, *arguments, code=0, folder=None):
+    done = subprocess.run([CLIENTS / "splatd.sh", *arguments], capture_output=True, timeout=120, cwd=folder,
+                          env={**os.environ, "SPLATD_URL": url(daemon) + "/"})
+    assert done.returncode == code, (arguments, done)
+    return done.stdout, done.stderr.decode()
+
+
+def test_python_views():
+    with Daemon(REAL) as d:
+        service = Splatd(url(d) + "/")
+        assert service.datasets() == ["wall"]
+        wall = service.dataset("wall")
+        view = wall.view(**POSE, **SMALL, transparent=False)
+        assert view.bytes.startswith(JPEG) and view.type == "image/jpeg"
+        assert view.camera["eye"] == [3, 0, 1] and view.camera["width"] == 65
+        matrix = [0, 0, 1, 3, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1]
+        assert wall.view(camera={"matrix": matrix, "convention": "opengl", "fov": 60}, **SMALL).bytes == view.bytes
+        width, height, metres = wall.depth(**POSE, **SMALL)
+        assert (width, height, len(metres)) == (65, 49, 65 * 49)
+        assert abs(metres[24 * 65 + 32] - 3) < 0.01 and math.isnan(metres[0])
+        eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
+        assert all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes) and len(set(map(tuple, eyes))) == 4
+
+
+def test_python_refusals():
+    with Daemon(REAL) as d:
+        service = Splatd(url(d))
+        for status, field, ask in [(400, "lod", lambda: service.dataset("wall").view(lod=-1)),
+                                   (404, "id", lambda: service.dataset("no such/thing")),
+                                   (400, "target", lambda: service.dataset("wall").view(eye=[0, 0, 1], target=[0, 0, 1])),
+                                   (400, "shade", lambda: service.dataset("wall").view(camera=dict(shade=1)))]:
+            try:
+                ask()
+                raise RuntimeError("nothing was refused")
+            except SplatdError as error:
+                assert (error.status, error.field) == (status, field) and str(error).startswith(f"{status}: "), error
+
+
+def test_a_busy_service_is_asked_again():
+    with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=150) as d:
+        def views(patience):
+            return together(4, lambda i: Splatd(url(d), patience=patience).dataset("wall").view(lod=i, **SMALL))
+        refused = [view for view in views(0) if isinstance(view, SplatdError)]
+        assert refused and all(error.status == 503 for error in refused), refused
+        found = views(120)
+        assert all(not isinstance(view, Exception) and view.bytes for view in found), found
+        assert d.status()["counters"]["refused_full"] > 0
+
+
+def test_python_on_the_command_line():
+    with Daemon(REAL) as d:
+        command = [sys.executable, CLIENTS / "splatd.py", url(d), "wall"]
+        done = subprocess.run([*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=60)
+        assert done.returncode == 0 and done.stdout.startswith(JPEG), done
+        for arguments in (["lod=-1"], ["lod"]):
+            done = subprocess.run([*command, *arguments], capture_output=True, timeout=60)
+            assert done.returncode == 1 and not done.stdout and b"splatd.py" in done.stderr, done
+
+
+def test_shell():
+    with Daemon(REAL) as d, tempfile.TemporaryDirectory() as folder:
+        assert shell(d, "datasets")[0] == b"wall\n"
+        assert json.loads(shell(d, "info", "wall")[0])["id"] == "wall"
+        shell(d, "view", "wall", "a.jpg", "eye=3,0,1", "target=0,0,1", "width=64", "height=48", folder=folder)
+        assert pathlib.Path(folder, "a.jpg").read_bytes() == d.view(eye="3,0,1", target="0,0,1", width=64, height=48).body
+        shell(d, "view", "wall", "a.png", "layer=depth", "width=64", "height=48", folder=folder)
+        assert pathlib.Path(folder, "a.png").read_bytes().startswith(b"\x89PNG")
+        shell(d, "ring", "wall", "views", "3", "2", "1", "target=0,0,1", "width=32", "height=24", folder=folder)
+        views = [file.read_bytes() for file in sorted(pathlib.Path(folder, "views").iterdir())]
+        assert len(views) == len(set(views)) == 3 and all(view.startswith(JPEG) for view in views)
+        for arguments, code, said in [((), 2, "splatd.sh view"), (("paint",), 2, "splatd.sh"), (("view", "wall"), 2, "splatd.sh"),
+                                      (("ring", "wall", "x", "3", "2", "1", "eye=0,0,1"), 2, "splatd.sh"),
+                                      (("info", "none"), 1, "404: there is no dataset 'none'"),
+                                      (("view", "wall", "b.jpg", "lod=-1"), 1, "400: "),
+                                      (("view", "wall", "b.jpg", "background=#12&lod=0"), 1, "background"),
+                                      (("ring", "none", "y", "3", "2", "1", "target=0,0,1"), 1, "404")]:
+            out, err = shell(d, *arguments, code=code, folder=folder)
+            assert not out and said in err, (arguments, err)
+        assert not pathlib.Path(folder, "b.jpg").exists() and not list(pathlib.Path(folder).glob("*.part"))
+
+
+def test_the_examples_of_the_readme():
+    text = (CLIENTS / "README.md").read_text()
+    [program] = re.findall(r"```python\n(.*?)```", text, re.S)
+    assert program.count("\n") < 15
+    with Daemon(REAL) as d, tempfile.TemporaryDirectory() as folder:
+        program = program.replace("http://127.0.0.1:8080", url(d)).replace('"hall"', '"wall"').replace("1280", "64").replace("720", "48")
+        subprocess.run([sys.executable, "-c", program], check=True, cwd=folder, timeout=120, env={**os.environ, "PYTHONPATH": str(CLIENTS)})
+        views = {file.read_bytes() for file in pathlib.Path(folder).glob("view*.jpg")}
+        assert len(views) == 36 and all(view.startswith(JPEG) for view in views)
+        for address in re.findall(r'src="http://127\.0\.0\.1:8080(/[^"#]*)', text):
+            assert d.ask(address.replace("hall", "wall")).status == 200, address
+
+
+def test_notebook_and_dashboard():
+    notebook = json.loads((CLIENTS / "splatd.ipynb").read_text())
+    dashboard = json.loads((CLIENTS / "grafana-dashboard.json").read_text())
+    with Daemon(REAL) as d:
+        shown = types.ModuleType("IPython.display")
+        shown.Image, shown.IFrame = (lambda data: data), (lambda src, width, height: src)
+        sys.modules.update({"IPython": types.ModuleType("IPython"), "IPython.display": shown})
+        names = {}
+        for cell in notebook["cells"]:
+            if cell["cell_type"] == "code":
+                *lines, last = "".join(cell["source"]).replace("http://127.0.0.1:8080", url(d)).split("\n")
+                exec("\n".join(lines), names)
+                names["last"] = eval(last, names)
+        assert len({view.bytes for view in names["views"]}) == 8 and 0 < min(names["seen"])
+        assert d.ask(names["last"].removeprefix(url(d))).status == 200 and names["last"].endswith("/embed/wall")
+        for panel in dashboard["panels"]:
+            [source] = re.findall(r'src="\$\{service\}([^"]*)"', panel["options"]["content"])
+            assert d.ask(source.replace("${dataset}", "wall")).status == 200, source
+
+
+run(globals())

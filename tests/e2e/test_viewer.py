@@ -1,0 +1,407 @@
+"""The page in a real Chromium, over real daemons: what people see, do and are told. The wall of tests/http is the dataset:
+its surface is x = 0.2 sin(y), so that coordinates can be checked."""
+import base64
+import contextlib
+import json
+import math
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import time
+import urllib.parse
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "http"))
+import browser
+from browser import Browser, Page
+from harness import FAKE, REAL, WALL, Daemon, run
+
+if not browser.BINARY:
+    print("skipped: there is no chromium")
+    sys.exit(77)
+
+FACING = "#dataset=wall&eye=3,0,1&target=0,0,1&up=0,0,1&fov=50"
+REST = ("(c => !c.hidden && !c.style.transform)(document.querySelector('canvas'))"
+        " && !(document.querySelector('#facts')?.textContent ?? '').includes('coarse')")
+# A digest of the pixels on screen, and how many colours there are among some of them.
+DIGEST = """(() => { const c = document.querySelector('canvas'), copy = new OffscreenCanvas(c.width, c.height).getContext('2d');
+    copy.drawImage(c, 0, 0);
+    const d = copy.getImageData(0, 0, c.width, c.height).data;
+    let h = 0; const colours = new Set();
+    for (let i = 0; i < d.length; i += 52) { h = (h * 31 + d[i] + 256 * d[i + 1] + 65536 * d[i + 2]) | 0; colours.add(d[i] >> 3 | d[i + 1] >> 3 << 5); }
+    return [h, colours.size, c.width, c.height]; })()"""
+VIEWS = "performance.getEntriesByType('resource').filter(e => e.name.includes('/view?')).map(e => [e.name, e.startTime, e.responseEnd])"
+
+chromium = Browser()
+daemon = Daemon(REAL)
+SITE = f"http://127.0.0.1:{daemon.port}"
+
+
+@contextlib.contextmanager
+def page(url=f"{SITE}/{FACING}", ready=REST, complaints=r"(?!)", **how):
+    """A tab that shows `url`, once its picture rests; nothing but the `complaints` that are expected may come up."""
+    tab = Page(chromium, url, **how)
+    try:
+        if ready:
+            tab.until(ready)
+        yield tab
+        wrong = [c for c in tab.complaints if not re.search(complaints, c)]
+        assert not wrong, wrong
+        tab.run("localStorage.clear()")
+    finally:
+        tab.close()
+
+
+def settled(tab, before=None):
+    """Digest of the picture at rest; other than `before` if that is given."""
+    time.sleep(0.2)  # a motion ends 160 ms after its last step
+    tab.until(REST)
+    if before is not None:
+        tab.until(f"JSON.stringify({DIGEST}) !== {json.dumps(json.dumps(before, separators=(',', ':')))}", "another picture")
+    return tab.run(DIGEST)
+
+
+def link(tab):
+    """The fragment as {name: text}, vectors as lists of floats."""
+    found = dict(urllib.parse.parse_qsl(tab.run("location.hash").removeprefix("#")))
+    return {k: [float(x) for x in v.split(",")] if k in ("eye", "target", "up") else v for k, v in found.items()}
+
+
+def moved(tab, camera):
+    """Waits until the fragment has another eye or target, at rest."""
+    settled(tab)
+    return next_link(tab, lambda now: now["eye"] != camera["eye"] or now["target"] != camera["target"])
+
+
+def next_link(tab, wanted):
+    end = time.monotonic() + browser.PATIENCE
+    while not wanted(now := link(tab)):
+        assert time.monotonic() < end, now
+        time.sleep(0.05)
+    return now
+
+
+def far(a, b):
+    return math.dist(a, b)
+
+
+def middle(tab):
+    return tab.run("(b => [b.x + b.width / 2, b.y + b.height / 2])(document.querySelector('#stage').getBoundingClientRect())")
+
+
+def test_a_picture_appears():
+    with page(f"{SITE}/") as tab:
+        digest = settled(tab)
+        assert digest[1] > 50, f"an empty picture: {digest}"
+        assert tab.text("title") == "wall – splatd" and "1 600 points" in tab.text("#about").replace("\u202f", " ")
+        assert re.fullmatch(r"\d+ × \d+, \d+ ms", tab.text("#facts")), tab.text("#facts")
+        view = daemon.ask("/v1/datasets/wall").json()["default_view"]
+        assert far(link(tab)["eye"], view["eye"]) < 0.01 and far(link(tab)["target"], view["target"]) < 0.01
+        assert tab.run("document.querySelector('#dataset').value") == "wall"
+
+
+def test_dragging_orbits_and_pans():
+    with page() as tab:
+        start, digest = link(tab), settled(tab)
+        x, y = middle(tab)
+        tab.drag((x, y), (x + 60, y + 20))
+        orbited, digest = moved(tab, start), settled(tab, digest)
+        assert orbited["target"] == start["target"] and abs(far(orbited["eye"], orbited["target"]) - 3) < 0.01
+        assert orbited["eye"][2] > 1.1, "dragging down must show more from above"
+        assert orbited["eye"][1] < -0.1, "the camera goes left when the scene is dragged right"  # y is to the right
+        tab.drag((x, y), (x + 60, y), button="right")
+        panned = moved(tab, orbited)
+        step = [b - a for a, b in zip(orbited["eye"], panned["eye"])]
+        assert far(step, [b - a for a, b in zip(orbited["target"], panned["target"])]) < 0.01 and far(step, [0] * 3) > 0.1
+        tab.mouse("mouseWheel", x, y, deltaX=0, deltaY=-300)
+        near = moved(tab, panned)
+        assert far(near["eye"], near["target"]) < 2.5
+        settled(tab, digest)
+
+
+def test_only_one_frame_is_asked_for_at_a_time():
+    with page() as tab:
+        x, y = middle(tab)
+        tab.drag((x, y), (x + 100, y + 30), steps=25)
+        settled(tab)
+        views = sorted(tab.run(VIEWS), key=lambda v: v[1])
+        coarse = [v for v in views if "budget=60ms" in v[0]]
+        assert 1 <= len(coarse) <= 26 and "budget" not in views[-1][0], views
+        for (_, _, ended), (_, began, _) in zip(views, views[1:]):
+            assert began >= ended - 1, "two at once"
+
+
+def test_the_keyboard_does_all_of_it():
+    with page() as tab:
+        start, digest = link(tab), settled(tab)
+        for _ in range(2):
+            tab.key("Tab")
+        assert tab.run("document.activeElement.id") in ("stage", "toggle")
+        tab.run("document.querySelector('#stage').focus()")
+        assert tab.run("getComputedStyle(document.querySelector('.cross')).opacity") == "1"
+        steps = {"ArrowRight": lambda a, b: b["eye"][1] > a["eye"][1], "ArrowUp": lambda a, b: b["eye"][2] > a["eye"][2],
+                 "w": lambda a, b: b["target"][0] < a["target"][0], "d": lambda a, b: b["target"][1] > a["target"][1],
+                 "e": lambda a, b: b["target"][2] > a["target"][2],
+                 "+": lambda a, b: far(b["eye"], b["target"]) < far(a["eye"], a["target"]),
+                 "-": lambda a, b: far(b["eye"], b["target"]) > far(a["eye"], a["target"])}
+        for key, right in steps.items():
+            tab.key(key, hold=0.05)
+            now = moved(tab, start)
+            assert right(start, now), (key, start, now)
+            start = now
+        assert settled(tab, digest)
+        tab.key("Home")
+        view = daemon.ask("/v1/datasets/wall").json()["default_view"]
+        assert far(moved(tab, start)["eye"], view["eye"]) < 0.01
+
+
+def test_layers_methods_and_budgets():
+    with page() as tab:
+        digest = settled(tab)
+        tab.choose("#layer", "depth")
+        digest = settled(tab, digest)
+        tab.until("!document.querySelector('#legend').hidden")
+        near, distant = (float(x.split()[0]) for x in tab.run("[...document.querySelectorAll('#legend span')].map(e => e.textContent)"))
+        assert 2.7 < near < distant < 3.3, (near, distant)
+        tab.choose("#layer", "color")
+        digest = settled(tab, digest)
+        tab.choose("#method", "points")
+        settled(tab, digest)
+        assert link(tab)["method"] == "points" and tab.run("document.querySelector('#legend').hidden")
+        tab.choose("#budget", "120ms")
+        tab.until("document.querySelector('#chosen').textContent.startsWith('Chosen: ')")
+        assert tab.run("document.querySelector('#method').disabled") and link(tab)["budget"] == "120ms"
+        tab.choose("#budget", "")
+        tab.choose("#lod", "99")  # the browser's own check keeps it from being asked
+        settled(tab)
+        assert link(tab)["lod"] == "1"
+
+
+def test_the_address_restores_the_picture():
+    with page() as tab:
+        x, y = middle(tab)
+        tab.drag((x, y), (x + 40, y + 30))
+        tab.choose("#layer", "normal")
+        settled(tab)
+        camera, url = link(tab), tab.run("location.href")
+        digest = settled(tab)
+    with page(url) as tab:
+        assert settled(tab) == digest and link(tab) == camera
+        assert tab.run("document.querySelector('#layer').value") == "normal"
+        command = tab.run("""(async () => { let said; navigator.clipboard.writeText = async (text) => { said = text; };
+            document.querySelector('#curl').click(); await new Promise(done => setTimeout(done, 50)); return said; })()""")
+        name, path = re.fullmatch(rf"curl -o (\w+\.jpg) '{SITE}(/[^']*)'", command).groups()
+        assert name == "normal.jpg"
+        body = base64.b64encode(daemon.ask(path).body).decode()
+        same = DIGEST.replace("document.querySelector('canvas')", "c").replace("const c = c,", "const")
+        assert tab.run(f"""(async () => {{ const bytes = Uint8Array.from(atob('{body}'), x => x.charCodeAt(0));
+            const image = await createImageBitmap(new Blob([bytes])); const c = document.createElement('canvas');
+            [c.width, c.height] = [image.width, image.height]; c.getContext('2d').drawImage(image, 0, 0); return {same}; }})()""") == digest
+
+
+def test_a_phone():
+    with page(size=(390, 780), phone=True) as tab:
+        start, (x, y) = link(tab), middle(tab)
+        assert tab.run("document.documentElement.scrollWidth <= innerWidth && document.querySelector('#panel').scrollWidth <= innerWidth")
+        assert tab.run("document.querySelector('#stage').clientHeight") > 400, "the picture comes first"
+        small = tab.run("[...document.querySelectorAll('button, select')].filter(e => e.offsetHeight && e.offsetHeight < 40).map(e => e.id)")
+        assert not small, f"too small for a finger: {small}"
+        tab.touch([(x, y)], [(x + 20, y)], [(x + 60, y)])
+        orbited = moved(tab, start)
+        assert orbited["target"] == start["target"]
+        tab.touch([(x - 30, y), (x + 30, y)], [(x - 50, y), (x + 50, y)], [(x - 80, y), (x + 80, y)])
+        near = moved(tab, orbited)
+        assert far(near["eye"], near["target"]) < 2.5, "two fingers apart come nearer"
+        tab.touch([(x - 30, y), (x + 30, y)], [(x - 30, y + 30), (x + 30, y + 30)], [(x - 30, y + 60), (x + 30, y + 60)])
+        panned = moved(tab, near)
+        assert panned["target"][2] > near["target"][2] + 0.05, "two fingers down pull the scene down"
+        assert tab.run("document.querySelector('canvas').width") == 780, "as sharp as the screen"
+        tab.press_on("#toggle")
+        tab.until("document.querySelector('#panel').hidden && document.querySelector('#toggle').ariaExpanded === 'false'")
+
+
+def test_dark_and_light():
+    grounds = []
+    for dark in (False, True):
+        with page(dark=dark) as tab:
+            grounds.append(urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])["background"][0])
+            assert tab.run("getComputedStyle(document.body).colorScheme || getComputedStyle(document.documentElement).colorScheme")
+    assert int(grounds[0], 16) > 0xc00000 > int(grounds[1], 16), grounds
+
+
+def test_everything_has_a_name_and_takes_the_focus():
+    with page(size=(1000, 900)) as tab:
+        tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        tab.press_on("#add")
+        tab.press_on("#add")
+        names = tab.names()
+        assert len(names) > 25 and all(name for _, name in names), names
+        assert ("application", "View of wall") in names and ("button", "Move keyframe 2 up") in names, names
+        assert ("spinbutton", "Seconds after keyframe 1") in names and ("combobox", "Layer") in names
+        tab.run("document.activeElement.blur()")
+        seen = set()
+        for _ in range(60):
+            tab.key("Tab")
+            seen.add(tab.run("(e => { e.mark ??= Math.random(); return e.mark; })(document.activeElement)"))
+            visible = tab.run("(e => getComputedStyle(e).outlineStyle !== 'none' || e.type === 'radio' || e === document.body)(document.activeElement)")
+            assert visible, tab.run("document.activeElement.outerHTML")
+        missed = tab.run(f"""[...document.querySelectorAll('button, select, input, summary, [tabindex]')]
+            .filter(e => e.offsetHeight && !e.disabled && !(e.type === 'radio' && !e.checked) && !{json.dumps(list(seen))}.includes(e.mark))
+            .map(e => e.outerHTML)""")
+        assert not missed, missed
+
+
+def test_tours():
+    with tempfile.TemporaryDirectory() as folder, page() as tab:
+        chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
+        tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        cameras, (x, y) = [link(tab)], middle(tab)
+        tab.press_on("#add")
+        for _ in range(2):
+            tab.drag((x, y), (x + 40, y + 10))
+            cameras.append(moved(tab, cameras[-1]))
+            tab.press_on("#add")
+        for i, seconds in enumerate(("0.4", "0.2")):
+            tab.choose(f"#keyframes li:nth-child({i + 1}) input", seconds)
+        assert tab.text("#length") == "3 keyframes, 0.6 s"
+        tab.press_on("#keyframes li:nth-child(3) button:nth-of-type(2)")  # up
+        assert tab.text("#said") == "keyframe 3 moved up"
+        cameras = [cameras[0], cameras[2], cameras[1]]
+        tab.press_on("#download")
+        file = pathlib.Path(folder, "wall-tour.json")
+        end = time.monotonic() + browser.PATIENCE
+        while not file.exists():
+            assert time.monotonic() < end, "nothing was downloaded"
+            time.sleep(0.05)
+        tour = json.loads(file.read_text())
+        assert [key["camera"]["eye"] for key in tour["keyframes"]] == [c["eye"] for c in cameras]
+        assert [key["time"] for key in tour["keyframes"]] == [0, 0.4, 3.4] and tour["closed"] is False
+        tab.choose("#keyframes li:nth-child(2) input", "0.2")
+        tab.press_on("#play")
+        tab.until("document.querySelector('#play').textContent === 'Play'")
+        assert moved(tab, cameras[0])["eye"] == cameras[2]["eye"], "it ends at its last keyframe"
+        tab.press_on("#keyframes li:nth-child(2) button:last-of-type")
+        assert tab.text("#length") == "2 keyframes, 0.4 s"
+        tab.go(f"{SITE}/{FACING}&lod=2")
+        tab.until("document.querySelectorAll('#keyframes li').length === 2", "keyframes outlive the page")
+
+
+def test_the_chart_has_the_frame_on_it():
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = pathlib.Path(folder, "wall.spld")
+        shutil.copy(WALL, dataset)
+        status = daemon.status()
+        point = dict(lod=1, supersample=1, front=True, ms_q90=60, fixed_ms=1, ms_per_mpx=50)
+        dataset.with_name("wall.profile.json").write_text(json.dumps({
+            "format": "splatd-profile", "format_version": 1, "splatd": "0", "reference": "exact", "views": 1,
+            "dataset": {"id": "wall", "version": daemon.ask("/v1/datasets/wall").json()["version"]},
+            "device": {k: status["device"][k] for k in ("backend", "name", "driver", "software")}, "width": 1280, "height": 720,
+            "points": [{**point, "method": "splat", "ms": 50, "psnr": 30}, {**point, "method": "points", "ms": 0.01, "psnr": 20}]}))
+        with Daemon(REAL, datasets=[str(dataset)]) as other, page(f"http://127.0.0.1:{other.port}/") as tab:
+            tab.press_on("#accuracy")
+            tab.until("document.querySelector('#chart img').naturalWidth > 0 && !document.querySelector('.here').hidden")
+            text = tab.text("#chart figcaption")
+            assert re.fullmatch(r"This view: \d+ ms, .*this setting reaches 30\.0 dB .*", text), text
+            first = tab.run("document.querySelector('.here').style.top")
+            tab.choose("#method", "points")
+            tab.until("document.querySelector('#chart figcaption').textContent.includes('20.0 dB')")
+            assert float(tab.run("document.querySelector('.here').style.top")[:-1]) > float(first[:-1]), "less accurate is lower"
+
+
+def refuse(tab, status, problem, retry):
+    """The next view is answered with a refusal, by the browser itself."""
+    def hear(method, params, usual=tab._hear):
+        if method == "Fetch.requestPaused":
+            chromium.listeners[tab.session] = usual
+            body = base64.b64encode(json.dumps({"type": f"urn:splatd:error:{problem}", "detail": "as the test wants it"}).encode())
+            headers = [{"name": "Retry-After", "value": str(retry)}, {"name": "Content-Type", "value": "application/problem+json"}]
+
+            def answer():
+                tab.send("Fetch.fulfillRequest", requestId=params["requestId"], responseCode=status, body=body.decode(),
+                         responseHeaders=headers)
+                tab.send("Fetch.disable")
+            browser.threading.Thread(target=answer).start()
+        else:
+            usual(method, params)
+    chromium.listeners[tab.session] = hear
+    tab.send("Fetch.enable", patterns=[{"urlPattern": "*/view?*"}])
+
+
+def test_trouble_is_told_and_passes():
+    with page(complaints="503|ERR_INTERNET_DISCONNECTED") as tab:
+        for problem, title in (("busy", "The service is busy"), ("device-lost", "The device is being rebuilt")):
+            refuse(tab, 503, problem, 1)
+            began = time.monotonic()
+            tab.choose("#lod", "2" if problem == "busy" else "1")
+            tab.until(f"!document.querySelector('#notice').hidden && document.querySelector('#notice').textContent.startsWith('{title}')")
+            assert "Trying again in" in tab.text("#notice small")
+            tab.until("document.querySelector('#notice').hidden")
+            assert time.monotonic() - began > 0.9, "Retry-After is kept"
+            settled(tab)
+        tab.send("Network.enable")
+        tab.send("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=-1, uploadThroughput=-1)
+        tab.choose("#lod", "2")
+        tab.until("document.querySelector('#notice p').textContent.startsWith('No connection')")
+        tab.send("Network.emulateNetworkConditions", offline=False, latency=0, downloadThroughput=-1, uploadThroughput=-1)
+        tab.until("document.querySelector('#notice').hidden")
+        settled(tab)
+    with page(f"{SITE}/#dataset=none", ready="!document.querySelector('#notice').hidden", complaints="404|400") as tab:
+        assert tab.text("#notice p").startswith("Not there: ") and "'none'" in tab.text("#notice p")
+        tab.choose("#dataset", "wall")
+        settled(tab)
+        assert tab.run("document.querySelector('#notice').hidden")
+        tab.run("location.hash = '#dataset=wall&eye=0,0,1&target=0,0,1'")  # a camera that the service refuses
+        tab.until("document.querySelector('#notice p').textContent.startsWith('Refused: ')")
+        tab.press_on("#home")
+        settled(tab)
+
+
+def test_embed():
+    with page(f"{SITE}/embed/wall#eye=3,0,1&target=0,0,1&layer=depth", size=(400, 300)) as tab:
+        digest = settled(tab)
+        assert digest[1] > 10 and not tab.run("[...document.querySelectorAll('button, select, input')].some(e => e.offsetHeight)")
+        tab.drag((200, 150), (260, 150))
+        settled(tab, digest)
+        assert all(name for _, name in tab.names())
+    with page(f"{SITE}/embed/none", ready="!document.querySelector('#notice').hidden", complaints="404", size=(400, 300)) as tab:
+        assert "'none'" in tab.text("#notice p")
+
+
+def test_splat_view_on_another_origin():
+    import http.server
+    import threading
+
+    html = f"""<!doctype html><meta charset=utf-8><link rel=icon href="data:,"><script type=module src="{SITE}/clients/splat-view.js"></script>
+        <splat-view dataset="wall" eye="3,0,1" target="0,0,1" layer="color"></splat-view>""".encode()
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(html)
+
+        def log_message(self, *_):
+            pass
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        with page(f"http://127.0.0.1:{server.server_port}/", ready="document.querySelector('splat-view')?.camera", size=(500, 400)) as tab:
+            assert tab.run("document.querySelector('splat-view').camera.eye") == [3, 0, 1]
+            assert tab.run("(e => e.clientWidth / e.clientHeight)(document.querySelector('splat-view'))") > 1.7
+            length = tab.run("history.length")
+            tab.run("document.querySelector('splat-view').setAttribute('eye', '3,1,1')")
+            tab.until("document.querySelector('splat-view').camera.eye[1] === 1")
+            assert tab.run("history.length") == length
+            tab.drag((250, 150), (320, 150))
+            tab.until("document.querySelector('splat-view').camera.eye[1] !== 1")
+    finally:
+        server.shutdown()
+
+
+try:
+    with daemon:
+        run(globals())
+finally:
+    chromium.close()
