@@ -131,15 +131,17 @@ static json_t *describe_queue(size_t length, size_t capacity)
     return json_pack("{s:o, s:o}", "length", count(length), "capacity", count(capacity));
 }
 
-json_t *spl_describe_status(struct spl_service *service)
+json_t *spl_describe_status(struct request *request)
 {
+    struct spl_service *service = request->service;
     static const char *const states[] = {"starting", "ready", "rebuilding", "failed"};
     struct spl_pipeline_status status;
     spl_pipeline_get_status(service->pipeline, &status);
     const char *state = service->draining ? "stopping" : states[spl_pipeline_get_state(service->pipeline)];
     json_t *json = json_object(), *ids = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
-        json_array_append_new(ids, json_string(service->catalog.slots[i].id));
+        if (spl_access_may_see(request, service->catalog.slots[i].id))
+            json_array_append_new(ids, json_string(service->catalog.slots[i].id));
     set(json, "version", json_string(SPLATD_VERSION));
     set(json, "state", json_string(state));
     set(json, "uptime_s", json_real((double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S));

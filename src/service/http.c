@@ -16,8 +16,6 @@
 #include "service/state.h"
 
 enum {
-    connections_max = 1024,
-    connections_per_address_max = 512,
     connection_memory = 128 * 1024,
     parameters_max = 256,
     drain_max = 8 * body_max,
@@ -159,6 +157,8 @@ static enum MHD_Result send_reply(struct request *request)
     if (request->service->draining)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);
+    if (request->service->access)
+        spl_access_add_cors(request);
     count_reply(request);
     spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
@@ -276,13 +276,14 @@ static void on_slow_timer(uv_timer_t *timer)
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)
 {
-    service->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET,
-        service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
-        service, MHD_OPTION_NOTIFY_CONNECTION, on_connection, service, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)connections_max, MHD_OPTION_PER_IP_CONNECTION_LIMIT, (unsigned)connections_per_address_max,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)connection_memory,
-        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    service->daemon =
+        MHD_start_daemon(MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service,
+                         MHD_OPTION_LISTEN_SOCKET, service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service,
+                         MHD_OPTION_NOTIFY_COMPLETED, on_completed, service, MHD_OPTION_NOTIFY_CONNECTION,
+                         on_connection, service, MHD_OPTION_CONNECTION_LIMIT, (unsigned)service->options->connections,
+                         MHD_OPTION_PER_IP_CONNECTION_LIMIT, (unsigned)service->options->connections_per_address,
+                         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                         (size_t)connection_memory, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (!service->daemon)
         return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start");
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->daemon, MHD_DAEMON_INFO_EPOLL_FD);

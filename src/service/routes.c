@@ -26,7 +26,7 @@ static void index_page(struct request *request, const struct spl_call *call)
     struct spl_service *service = request->service;
     json_t *views = json_array();
     for (size_t i = 0; i < service->catalog.count; i++)
-        if (service->catalog.slots[i].current)
+        if (service->catalog.slots[i].current && spl_access_may_see(request, service->catalog.slots[i].id))
             json_array_append_new(views, json_sprintf("%s/view", service->catalog.slots[i].current->uri));
     spl_reply_json(request,
                    json_pack("{s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "openapi",
@@ -41,7 +41,8 @@ static void list_datasets(struct request *request, const struct spl_call *call)
     struct spl_catalog *catalog = &request->service->catalog;
     json_t *list = json_array();
     for (size_t i = 0; i < catalog->count; i++)
-        json_array_append_new(list, spl_describe_slot(&catalog->slots[i]));
+        if (spl_access_may_see(request, catalog->slots[i].id))
+            json_array_append_new(list, spl_describe_slot(&catalog->slots[i]));
     spl_reply_json(request, json_pack("{s:o}", "datasets", list));
 }
 
@@ -53,7 +54,7 @@ static void show_dataset(struct request *request, const struct spl_call *call)
 static void show_status(struct request *request, const struct spl_call *call)
 {
     (void)call;
-    spl_reply_json(request, spl_describe_status(request->service));
+    spl_reply_json(request, spl_describe_status(request));
 }
 
 /* "{id}" stands for a dataset, "{name}" for any other segment. Methods of one pattern that need different scopes are
@@ -130,18 +131,22 @@ static void refuse_query(struct request *request, enum spl_http_method method)
     spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", name, detail);
 }
 
-/* Decodes what the path has in its holes; an unknown dataset is refused where the method does not make it. */
-static int fill(struct request *request, const struct holes *holes, struct spl_call *call, struct spl_error *err)
+/* Decodes what the path has in its holes. */
+static int fill(const struct holes *holes, struct spl_call *call, struct spl_error *err)
 {
-    struct spl_catalog *catalog = &request->service->catalog;
     int rc = 0;
     if (holes->name)
         rc = spl_percent_decode(holes->name, holes->name_length, call->name, sizeof call->name, "name", err);
-    if (rc || !holes->id)
-        return rc;
-    rc = spl_percent_decode(holes->id, holes->id_length, call->id, sizeof call->id, "id", err);
-    if (rc || (call->entry = spl_catalog_find(catalog, call->id)) || call->method == SPL_PUT)
-        return rc;
+    if (!rc && holes->id)
+        rc = spl_percent_decode(holes->id, holes->id_length, call->id, sizeof call->id, "id", err);
+    return rc;
+}
+
+/* Finds the dataset; PUT and DELETE take what is not served as well. */
+static int find(const struct spl_catalog *catalog, struct spl_call *call, struct spl_error *err)
+{
+    if (!*call->id || (call->entry = spl_catalog_find(catalog, call->id)) || call->method >= SPL_PUT)
+        return 0;
     const struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, call->id);
     if (slot && slot->reason[0])
         return spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' cannot be served: %.350s", call->id,
@@ -156,9 +161,15 @@ static void enter(struct request *request, const struct route *route, enum spl_h
 {
     struct spl_call call = {.method = method};
     struct spl_error err = {0};
+    if (fill(holes, &call, &err)) {
+        spl_reply_error(request, &err);
+        return;
+    }
+    if (!spl_access_check(request, route->scope, &call))
+        return;
     if (request->query[0] && (method == SPL_POST || !route->query))
         refuse_query(request, method);
-    else if (fill(request, holes, &call, &err))
+    else if (find(&request->service->catalog, &call, &err))
         spl_reply_error(request, &err);
     else
         route->handle(request, &call);
@@ -171,6 +182,8 @@ void spl_route(struct request *request, const char *method)
                           "the URL is longer than 8 KiB; POST takes long views");
         return;
     }
+    if (!spl_access_admit(request, method))
+        return;
     unsigned wanted = 0, allowed = 0, count = sizeof methods / sizeof *methods;
     const char *name = strcmp(method, MHD_HTTP_METHOD_HEAD) ? method : MHD_HTTP_METHOD_GET;
     while (wanted < count && strcmp(name, methods[wanted]))

@@ -1,8 +1,8 @@
 /* The loop's life: open datasets, bind, start the pipeline, serve once it is ready, drain on a signal.
  *
  * SIGTERM or SIGINT: no new connections, what runs is finished and answered with "Connection: close", then 0. A second
- * signal ends the process at once. A pipeline that failed for good is drained the same way and its error returned.
- * Everything here runs on the loop's thread, which is the caller's. */
+ * signal ends the process at once. SIGHUP reads tokens and keys again. A pipeline that failed for good is drained the
+ * same way and its error returned. Everything here runs on the loop's thread, which is the caller's. */
 #include "service/service.h"
 
 #include <signal.h>
@@ -69,6 +69,12 @@ static void on_signal(uv_signal_t *handle, int number)
         drain(service);
 }
 
+static void on_hangup(uv_signal_t *handle, int number)
+{
+    (void)number;
+    spl_access_reload(handle->data);
+}
+
 static void announce(struct spl_service *service)
 {
     struct spl_pipeline_status status;
@@ -114,13 +120,18 @@ static void wake(void *context)
 }
 
 /* Every connection is a descriptor. */
-static void raise_descriptor_limit(void)
+static void raise_descriptor_limit(const struct spl_service_options *options)
 {
+    enum { others = 512 };
     struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= 4096)
+    rlim_t wanted = (rlim_t)options->connections + others;
+    if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= wanted)
         return;
-    limit.rlim_cur = limit.rlim_max < 4096 ? limit.rlim_max : 4096;
+    limit.rlim_cur = limit.rlim_max < wanted ? limit.rlim_max : wanted;
     setrlimit(RLIMIT_NOFILE, &limit);
+    if (limit.rlim_cur < wanted)
+        spl_log_info("the system allows %llu open files, which is less than --connections %llu may need",
+                     (unsigned long long)limit.rlim_cur, (unsigned long long)options->connections);
 }
 
 static int init_loop(struct spl_service *service, struct spl_error *err)
@@ -142,6 +153,9 @@ static int init_loop(struct spl_service *service, struct spl_error *err)
         service->signals[i].data = service;
         uv_signal_start(&service->signals[i], on_signal, numbers[i]);
     }
+    uv_signal_init(&service->loop, &service->hangup);
+    service->hangup.data = service;
+    uv_signal_start(&service->hangup, on_hangup, SIGHUP);
     signal(SIGPIPE, SIG_IGN);
     return 0;
 }
@@ -192,12 +206,13 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     service->options = options;
     service->listen_fd = -1;
     service->started_ns = spl_now_ns();
-    raise_descriptor_limit();
+    raise_descriptor_limit(options);
     int rc = init_loop(service, err);
     if (rc)
         goto free_service;
     if ((rc = spl_ops_start(service, err)) ||
         (rc = spl_listen("--listen", options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
+        (rc = spl_access_init(service, err)) ||
         (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
                                err)) ||
         (rc = start_pipeline(service, err)))
@@ -213,6 +228,7 @@ done:
     spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_pipeline_destroy(service->pipeline);
     free(service->entries);
+    spl_access_finish(service);
     if (service->listen_fd >= 0)
         close(service->listen_fd);
     finish_loop(service);

@@ -7,6 +7,7 @@
 #include <sys/queue.h>
 #include <uv.h>
 
+#include "service/access.h"
 #include "service/access_log.h"
 #include "service/catalog.h"
 #include "service/latency.h"
@@ -51,6 +52,7 @@ struct request {
     const char *query; /* inside uri, "" when there is none */
     char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
+    const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     bool started;
     bool abandoned;                /* the client has left: close without a reply */
     struct spl_job *job;           /* in the pipeline; NULL otherwise */
@@ -72,6 +74,7 @@ struct spl_service {
     struct spl_catalog catalog;
     struct spl_catalog_entry **entries; /* of the catalog at start, for the pipeline */
     struct library library;
+    struct spl_access *access; // may be NULL: there is nothing to check
     struct spl_pipeline *pipeline;
     struct spl_counters counters;
     struct spl_latencies latencies;
@@ -82,7 +85,7 @@ struct spl_service {
 
     uv_loop_t loop;
     uv_async_t wake;
-    uv_signal_t signals[2];
+    uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
     uv_timer_t http_timer;  /* MHD's own timeouts */
     uv_timer_t wait_timer;  /* deadlines and departures, while requests wait */
@@ -125,7 +128,6 @@ void spl_library_stop(struct spl_service *service);         /* waits for the thr
 void spl_route(struct request *request, const char *method);
 
 /* What a route's handler is called with; valid during the call. */
-enum spl_scope { SPL_SCOPE_NONE, SPL_SCOPE_VIEW, SPL_SCOPE_TOUR, SPL_SCOPE_ADMIN }; /* NONE: anyone, without a token */
 enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET: MHD leaves the body out */
 struct spl_call {
     enum spl_http_method method;
@@ -162,7 +164,7 @@ void spl_reply_view(struct request *request, struct spl_job *job);          /* t
 /* describe.c: new references; NULL without memory. */
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full);
-json_t *spl_describe_status(struct spl_service *service);
+json_t *spl_describe_status(struct request *request);
 
 uint64_t spl_resident_bytes(void); /* of this process, 0 when unknown */
 

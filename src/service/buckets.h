@@ -1,0 +1,20 @@
+/* How often an address may ask: a token bucket each, in a table of fixed size. Owned by one thread. */
+#ifndef SPL_SERVICE_BUCKETS_H
+#define SPL_SERVICE_BUCKETS_H
+
+#include <stdint.h>
+
+#include "base/error.h"
+
+enum { SPL_BUCKET_KEY = 16 };
+
+struct spl_buckets;
+
+/* `per_second` >= 1 requests each; twice as many at once. */
+int spl_buckets_create(uint64_t per_second, struct spl_buckets **out, struct spl_error *err);
+void spl_buckets_destroy(struct spl_buckets *buckets); /* NULL-safe */
+
+/* Takes one from the bucket of `key`: 0, or the seconds after which there will be one, at least 1. */
+unsigned spl_buckets_take(struct spl_buckets *buckets, const uint8_t key[SPL_BUCKET_KEY], uint64_t now_ns);
+
+#endif

@@ -1,0 +1,37 @@
+/* URLs that carry their own permission: ...?PARAMETERS&exp=UNIX-SECONDS&sig=SIGNATURE, where SIGNATURE is base64url of
+ * HMAC-SHA-256 over everything from the path's '/' to the last byte before "&sig=", as it stands in the request. Pure
+ * functions but for the reading of the key; any thread. */
+#ifndef SPL_SERVICE_SIGN_H
+#define SPL_SERVICE_SIGN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+
+struct spl_sign_key {
+    char *bytes; // NULL = none
+    size_t length;
+};
+
+/* A key is the file's content without newlines at its end, 32 to 4096 bytes. SPL_E_USAGE. Blocks on disk. */
+int spl_sign_key_read(const char *path, struct spl_sign_key *out, struct spl_error *err);
+void spl_sign_key_finish(struct spl_sign_key *key);
+
+/* Does a query have the form of a signed one: does its last parameter begin with "sig="? */
+bool spl_sign_is_signed(const char *query);
+
+/* Checks the signature of `path`?`query` and that it has not expired at `now_s`, Unix time. On success *kept is the
+ * length of the query without exp and sig. SPL_E_INPUT with field sig or exp. */
+int spl_sign_check(const struct spl_sign_key *key, const char *path, const char *query, int64_t now_s, size_t *kept,
+                   struct spl_error *err);
+
+/* Where the path of `url` begins, behind scheme and host if it has them; NULL where there is none. */
+const char *spl_sign_path_of(const char *url);
+
+/* Appends exp and sig to `url`, with or without scheme and host. The caller frees *out. SPL_E_USAGE for what is no such
+ * URL, has a fragment, or is signed already. */
+int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err);
+
+#endif

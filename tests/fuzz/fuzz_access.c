@@ -1,0 +1,64 @@
+/* Token files and signed queries: the first byte chooses. Whatever file is accepted answers lookups; no query is taken
+ * for signed but by the key. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "service/sign.h"
+#include "service/tokens.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void try_tokens(const char *text, size_t size)
+{
+    struct spl_tokens *tokens = NULL;
+    struct spl_error err = {0};
+    int rc = spl_tokens_parse(text, size, "file", &tokens, &err);
+    if (rc ? err.code != rc || !err.message[0] || tokens : !spl_tokens_get_count(tokens))
+        abort();
+    if (rc)
+        return;
+    const struct spl_token *token = spl_tokens_find(tokens, text, strcspn(text, " \t\r\n"));
+    for (int scope = SPL_SCOPE_VIEW; token && scope < SPL_SCOPES; scope++)
+        if (spl_token_allows(token, (enum spl_scope)scope, "wall") &&
+            !spl_token_allows(token, (enum spl_scope)scope, ""))
+            abort();
+    spl_tokens_destroy(tokens);
+}
+
+static void try_query(const char *query)
+{
+    static char bytes[] = "0123456789abcdef0123456789abcdef";
+    const struct spl_sign_key key = {bytes, 32};
+    struct spl_error err = {0};
+    size_t kept = 0;
+    int rc = spl_sign_check(&key, "/v1/datasets/wall/view", query, 0, &kept, &err);
+    if (rc ? err.code != rc || !err.field[0] : kept > strlen(query) || !spl_sign_is_signed(query))
+        abort();
+    char *url = NULL;
+    if (!spl_sign_url(&key, query, 1, &url, NULL)) {
+        const char *path = spl_sign_path_of(url);
+        char *mark = strchr(path, '?');
+        *mark = '\0';
+        if (spl_sign_check(&key, path, mark + 1, 1, &kept, NULL) ||
+            !spl_sign_check(&key, path, mark + 1, 2, &kept, NULL))
+            abort();
+    }
+    free(url);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    char *text = calloc(size + 1, 1);
+    if (!text || !size) {
+        free(text);
+        return 0;
+    }
+    memcpy(text, data + 1, size - 1);
+    if (data[0] == '?')
+        try_query(text);
+    else
+        try_tokens(text, size - 1);
+    free(text);
+    return 0;
+}

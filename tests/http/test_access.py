@@ -1,0 +1,242 @@
+"""Who may do what, over HTTP: tokens and their patterns, signed URLs, rates, other origins, files read again by SIGHUP."""
+import contextlib
+import hashlib
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import time
+
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run, together
+
+SMALL = VIEW + "?width=16&height=16"
+VIEWER, TOURIST, ADMIN, OUTSIDER, NEXT = (f"{name}-0123456789abcdef" for name in
+                                          ("viewer", "tourist", "admin", "outsider", "next"))
+KEY = "0123456789abcdef0123456789abcdef\n"
+
+
+def lines():
+    return (f"# tests\n{VIEWER} view\nsha256:{hashlib.sha256(TOURIST.encode()).hexdigest()} view,tour wa*\n"
+            f"{ADMIN} admin\n{OUTSIDER} view,admin other-*\n")
+
+
+@contextlib.contextmanager
+def guarded(*args, tokens=None, **environment):
+    with tempfile.TemporaryDirectory() as home:
+        file, key = pathlib.Path(home, "tokens"), pathlib.Path(home, "url.key")
+        file.write_text(tokens or lines())
+        key.write_text(KEY)
+        file.chmod(0o600)
+        key.chmod(0o600)
+        with Daemon(FAKE, "--tokens", str(file), "--url-key", str(key), *args, **environment) as d:
+            d.tokens, d.key = file, str(key)
+            yield d
+        log = "".join(d.lines)
+        for secret in (VIEWER, TOURIST, ADMIN, OUTSIDER, NEXT, KEY.strip(), "sig="):
+            assert secret not in log, "a secret in the log"
+
+
+def bearer(token, **more):
+    return {"Authorization": f"Bearer {token}", **more}
+
+
+def sign(d, url, expires="1h"):
+    return subprocess.run([REAL, "sign", url, "--key", d.key, "--expires", expires], capture_output=True, text=True,
+                          check=True, timeout=30).stdout.strip()
+
+
+def test_without_a_token_only_the_page_is_there():
+    with guarded() as d:
+        for path in (SMALL, "/v1/datasets", "/v1/status", "/v1/datasets/wall", "/v1/datasets/none", VIEW):
+            reply = d.ask(path)
+            assert reply.status == 401 and reply.headers["WWW-Authenticate"] == 'Bearer realm="splatd"', path
+        index = d.ask("/", headers={"Accept": "application/json"})
+        assert index.status == 200 and index.json()["views"] == []
+        assert d.ask("/v1/openapi.yaml").status == 200
+        for wrong in ("nobody-0123456789abcdef", VIEWER[:-1], VIEWER + "0", "", "x" * 8000):
+            reply = d.ask(SMALL, headers=bearer(wrong))
+            assert reply.status == 401 and "invalid_token" in reply.headers["WWW-Authenticate"], reply.body
+            assert not wrong or wrong not in reply.body.decode()
+        for other in (f"Basic {VIEWER}", VIEWER, f"Bearer{VIEWER}"):
+            assert d.ask(SMALL, headers={"Authorization": other}).status == 401
+        status = d.ask("/v1/status", headers=bearer(VIEWER)).json()
+        assert status["counters"]["refused_access"] == 14 and status["counters"]["frames"] == 0, status
+        assert "tokens" not in status["parameters"] and "url-key" not in status["parameters"]
+
+
+def test_a_token_does_what_its_line_says():
+    with guarded() as d:
+        for token in (VIEWER, TOURIST):
+            assert d.ask(SMALL, headers=bearer(token)).status == 200
+            assert d.ask(SMALL, headers={"Authorization": f"bearer  {token}"}).status == 200
+            assert d.ask(VIEW, "POST", '{"width": 16}', bearer(token)).status == 200
+            assert [x["id"] for x in d.ask("/v1/datasets", headers=bearer(token)).json()["datasets"]] == ["wall"]
+            assert d.ask("/v1/datasets/none", headers=bearer(VIEWER)).status == 404
+        reply = d.ask(SMALL, headers=bearer(ADMIN))
+        assert reply.status == 403 and 'scope="view"' in reply.headers["WWW-Authenticate"], reply.headers
+        for path in ("/v1/datasets/wall", SMALL, "/v1/datasets/none"):  # what is not theirs may be there or not
+            assert d.ask(path, headers=bearer(OUTSIDER)).status == 403
+        assert d.ask("/v1/datasets", headers=bearer(OUTSIDER)).json() == {"datasets": []}
+        assert d.ask("/v1/status", headers=bearer(OUTSIDER)).json()["datasets"] == []
+        assert d.ask("/", headers=bearer(OUTSIDER, Accept="application/json")).json()["views"] == []
+        assert d.ask("/", headers=bearer(VIEWER, Accept="application/json")).json()["views"] == [VIEW]
+
+
+def test_a_token_in_a_url_is_refused():
+    with guarded() as d:
+        for query in (f"token={VIEWER}", f"width=16&access_token={VIEWER}"):
+            for headers in ({}, bearer(VIEWER)):
+                reply = d.ask(f"{VIEW}?{query}", headers=headers)
+                assert reply.status == 400 and reply.json()["field"] == "token" and VIEWER not in reply.body.decode()
+
+
+def test_a_signed_url_is_good_for_what_it_says():
+    with guarded() as d:
+        url = sign(d, SMALL)
+        plain = d.ask(SMALL, headers=bearer(VIEWER)).body
+        for path in (url, sign(d, f"http://somewhere{SMALL}").removeprefix("http://somewhere")):
+            reply = d.ask(path)
+            assert reply.status == 200 and reply.body == plain
+        assert d.ask(url, "HEAD").status == 200
+        assert d.ask(sign(d, "/v1/datasets/wall")).status == 200
+        assert d.ask(sign(d, VIEW)).status == 200
+        at = url.index("sig=") + 4
+        forged = [url.replace("width=16", "width=17"), url.replace("wall", "walk"), url[:-1], url[:at] + "A" * 43,
+                  url + "&x=1", url[:at], url.replace("exp=", "exp=9"), url.replace("&exp", "&&exp")]
+        for path in forged:
+            reply = d.ask(path)
+            assert reply.status in (401, 403), (path, reply.status)
+            assert reply.status == 401 or reply.json()["field"] in ("sig", "exp"), reply.body
+        assert d.ask(url, "POST", "{}").status == 401
+        assert d.ask(sign(d, "/v1/status")).status == 401 and d.ask(sign(d, "/v1/datasets")).status == 401
+        assert d.ask(sign(d, "/v1/datasets/none")).status == 404
+        short = sign(d, SMALL, "1s")
+        eventually(lambda: d.ask(short).status == 403)
+        assert d.ask(short).json()["field"] == "exp"
+        assert d.ask(short, headers=bearer(VIEWER)).status == 403  # it says what it is; the token does not mend it
+
+
+def test_splatd_sign_refuses_bad_arguments():
+    with tempfile.TemporaryDirectory() as home:
+        key = pathlib.Path(home, "key")
+        key.write_text(KEY)
+        short = pathlib.Path(home, "short")
+        short.write_text("secret")
+        for arguments, said in [
+            (["/v1/x"], "--key"), (["--key", key], "one URL"), (["/a", "/b", "--key", key], "one URL"),
+            (["/v1/x", "--key", "/nowhere"], "/nowhere"), (["/v1/x", "--key", short], "32"),
+            (["v1", "--key", key], "'v1'"), (["/a#b", "--key", key], "'/a#b'"),
+            *[(["/v1/x", "--key", key, "--expires", e], f"'{e}'") for e in ("1", "h", "-1h", "0s", "1w", "1hh", "99999d", "")],
+        ]:
+            done = subprocess.run([REAL, "sign", *arguments], capture_output=True, text=True, timeout=30)
+            assert done.returncode == 2 and said in done.stderr and not done.stdout, (arguments, done)
+            assert "secret" not in done.stderr
+
+
+def test_sighup_reads_the_files_again():
+    with guarded() as d:
+        url = sign(d, SMALL)
+        assert d.ask(SMALL, headers=bearer(NEXT)).status == 401
+        d.tokens.write_text(f"{NEXT} view\n")
+        pathlib.Path(d.key).write_text("another-" + KEY)
+        d.process.send_signal(signal.SIGHUP)
+        eventually(lambda: d.ask(SMALL, headers=bearer(NEXT)).status == 200)
+        assert d.ask(SMALL, headers=bearer(VIEWER)).status == 401
+        assert d.ask(url).status == 403 and d.ask(sign(d, SMALL)).status == 200
+        d.tokens.write_text(f"{VIEWER} view\n{ADMIN} whatever\n")
+        d.process.send_signal(signal.SIGHUP)
+        eventually(lambda: any("stay as they were" in line and "line 2" in line for line in d.lines))
+        assert d.ask(SMALL, headers=bearer(NEXT)).status == 200 and d.ask(SMALL, headers=bearer(VIEWER)).status == 401
+    with Daemon(FAKE) as d:
+        d.process.send_signal(signal.SIGHUP)
+        eventually(lambda: any("no tokens" in line for line in d.lines))
+        assert d.ask(SMALL).status == 200
+
+
+def test_anonymous_may_view_where_that_is_said():
+    with guarded("--allow-anonymous") as d:
+        assert d.ask(SMALL).status == 200 and d.ask("/v1/datasets").json()["datasets"]
+        assert d.ask(SMALL, headers=bearer("nobody-0123456789abcdef")).status == 401
+
+
+def test_what_others_reach_needs_a_word():
+    def start(*arguments):
+        process = subprocess.Popen([FAKE, "--listen", "0.0.0.0:0", *arguments, WALL], stderr=subprocess.PIPE, text=True)
+        said = ""
+        for line in process.stderr:
+            said += line
+            if line.endswith(" ready\n"):
+                process.send_signal(signal.SIGTERM)
+        return process.wait(30), said
+    with tempfile.TemporaryDirectory() as home:
+        file = pathlib.Path(home, "tokens")
+        file.write_text(lines())
+        file.chmod(0o600)
+        code, said = start()
+        assert code == 2 and "--tokens" in said and "--allow-anonymous" in said, (code, said)
+        assert start("--allow-anonymous")[0] == 0 and start("--tokens", str(file))[0] == 0
+        for broken, wanted in [("", "no token"), (f"{VIEWER}\n", "line 1"), (f"{VIEWER} view\n{VIEWER} view\n", "line 2")]:
+            file.write_text(broken)
+            code, said = start("--tokens", str(file))
+            assert code == 2 and wanted in said and VIEWER not in said, said
+        for arguments, wanted in [(("--tokens", "/nowhere"), "/nowhere"), (("--url-key", str(file)), "--tokens")]:
+            code, said = start("--allow-anonymous", *arguments)
+            assert code == 2 and wanted in said, said
+
+
+def test_pages_of_listed_origins_may_read():
+    with guarded("--cors", "https://dash.example", "--cors", "http://127.0.0.1:9") as d:
+        asked = {"Origin": "https://dash.example", "Access-Control-Request-Method": "GET",
+                 "Access-Control-Request-Headers": "authorization"}
+        reply = d.ask(VIEW, "OPTIONS", headers=asked)
+        assert reply.status == 204 and not reply.body, reply.status
+        assert reply.headers["Access-Control-Allow-Origin"] == "https://dash.example"
+        assert "Authorization" in reply.headers["Access-Control-Allow-Headers"]
+        assert "GET" in reply.headers["Access-Control-Allow-Methods"] and reply.headers["Vary"] == "Origin"
+        for path, headers in ((SMALL, bearer(VIEWER)), (SMALL, {}), ("/nowhere", {})):
+            reply = d.ask(path, headers={**headers, "Origin": "http://127.0.0.1:9"})
+            assert reply.headers["Access-Control-Allow-Origin"] == "http://127.0.0.1:9", reply.status
+            assert reply.headers["Access-Control-Expose-Headers"] == "*"
+        for origin in ("https://dash.example.evil", "http://dash.example", "null", ""):
+            reply = d.ask(SMALL, headers=bearer(VIEWER, Origin=origin))
+            assert reply.status == 200 and reply.headers["Access-Control-Allow-Origin"] is None
+            assert d.ask(VIEW, "OPTIONS", headers={**asked, "Origin": origin}).status == 405
+        assert d.ask(VIEW, "OPTIONS", headers={"Origin": "https://dash.example"}).status == 405
+    with Daemon(FAKE, "--cors", "*") as d:
+        assert d.ask(SMALL, headers={"Origin": "https://any.example"}).headers["Access-Control-Allow-Origin"]
+    with Daemon(FAKE) as d:
+        assert d.ask(SMALL, headers={"Origin": "https://any.example"}).headers["Access-Control-Allow-Origin"] is None
+
+
+def test_who_asks_too_often_waits():
+    for flag, said in (("--rate-limit", "this address"), ("--rate-limit-total", "all clients")):
+        with Daemon(FAKE, flag, "5", FAKE_FRAME_MS=0) as d:
+            connection = d.connect()
+            replies = [d.ask(SMALL, connection=connection) for _ in range(60)]
+            statuses = [reply.status for reply in replies]
+            assert set(statuses) == {200, 429} and statuses[:10] == [200] * 10, statuses
+            refused = [reply for reply in replies if reply.status == 429]
+            assert all(reply.headers["Retry-After"] == "1" for reply in refused)
+            assert said in refused[0].json()["detail"] and refused[0].json()["type"] == "urn:splatd:error:rate"
+            time.sleep(1.1)
+            status = d.ask("/v1/status")
+            assert status.status == 200 and status.json()["counters"]["refused_rate"] == len(refused)
+
+
+def test_connections_are_capped():
+    import socket
+    with Daemon(FAKE, "--connections", "40", "--connections-per-address", "20") as d:
+        def outcome(i):
+            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+                try:
+                    s.sendall(b"GET /v1/openapi.yaml HTTP/1.1\r\nHost: x\r\n\r\n")
+                    return s.recv(12) and bool(time.sleep(1)) is False
+                except OSError:
+                    return b""
+        served = [bool(result) for result in together(30, outcome)]
+        assert 1 <= served.count(False) <= 29, served
+        eventually(lambda: d.status()["connections"] == 1)
+
+
+run(globals())

@@ -1,0 +1,281 @@
+/* Tokens, signatures and rates without HTTP: what must be refused first, then known vectors. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "service/buckets.h"
+#include "service/secret.h"
+#include "service/sign.h"
+#include "service/tokens.h"
+
+#define TOKEN "correct-horse-battery"
+#define OTHER "another-secret.1234567890"
+
+static int parse(const char *text, struct spl_tokens **tokens, struct spl_error *err)
+{
+    return spl_tokens_parse(text, strlen(text), "file", tokens, err);
+}
+
+static void bad_token_files_are_refused_by_line_without_the_token(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *said;
+    } cases[] = {
+        {"", "no token"},
+        {"# nothing\n\n  \n", "no token"},
+        {TOKEN "\n", "line 1: a line is"},
+        {TOKEN " view a b\n", "line 1: a line is"},
+        {"\n" TOKEN " view a b c d\n", "line 2: a line is"},
+        {"short view\n", "line 1: a token has"},
+        {"correct-horse-batter! view\n", "line 1: a token has"},
+        {"correct-hörse-battery view\n", "line 1: a token has"},
+        {TOKEN " View\n", "line 1: the second field"},
+        {TOKEN " view,\n", "line 1: the second field"},
+        {TOKEN " ,view\n", "line 1: the second field"},
+        {TOKEN " all\n", "line 1: the second field"},
+        {TOKEN " view ../x\n", "line 1: the third field"},
+        {TOKEN " view a,,b\n", "line 1: the third field"},
+        {TOKEN " view ,a\n", "line 1: the third field"},
+        {TOKEN " view a,\n", "line 1: the third field"},
+        {"sha256: view\n", "line 1: sha256"},
+        {"sha256:12 view\n", "line 1: sha256"},
+        {"sha256:zz34567890123456789012345678901234567890123456789012345678901234 view\n", "line 1: sha256"},
+        {TOKEN " view\n# x\n" TOKEN " admin\n", "line 3: the token of line 1 again"},
+        {TOKEN " view\nbut this one is broken\n", "line 2"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_tokens *tokens = NULL;
+        struct spl_error err = {0};
+        if (parse(cases[i].text, &tokens, &err) != SPL_E_USAGE || tokens || !strstr(err.message, cases[i].said) ||
+            strstr(err.message, "correct"))
+            fail_msg("case %zu: %d, '%s'", i, err.code, err.message);
+    }
+    char longer[2000];
+    memset(longer, 'a', sizeof longer);
+    struct spl_tokens *tokens;
+    struct spl_error err = {0};
+    assert_int_equal(spl_tokens_parse(longer, sizeof longer, "file", &tokens, &err), SPL_E_USAGE);
+    assert_int_equal(spl_tokens_parse(TOKEN " view\0x", strlen(TOKEN) + 7, "file", &tokens, &err), SPL_E_USAGE);
+}
+
+static const struct spl_token *find(const struct spl_tokens *tokens, const char *text)
+{
+    return spl_tokens_find(tokens, text, strlen(text));
+}
+
+static void tokens_allow_what_their_line_says(void **state)
+{
+    (void)state;
+    struct spl_tokens *tokens;
+    uint8_t digest[SPL_DIGEST_BYTES];
+    char text[400] = "# who\r\n" TOKEN "\tview,tour  site-*,vault,[ab]?\r\nsha256:";
+    assert_int_equal(spl_sha256(OTHER, strlen(OTHER), digest, NULL), 0);
+    for (int i = 0; i < SPL_DIGEST_BYTES; i++)
+        sprintf(text + strlen(text), i % 2 ? "%02X" : "%02x", digest[i]);
+    strcat(text, " admin"); // no newline at the end, no patterns
+    assert_int_equal(parse(text, &tokens, NULL), 0);
+    assert_int_equal(spl_tokens_get_count(tokens), 2);
+    for (const char *const *wrong = (const char *const[]){"", "correct-horse-batter", TOKEN "y", "sha256:", NULL};
+         *wrong; wrong++)
+        assert_null(find(tokens, *wrong));
+    const struct spl_token *first = find(tokens, TOKEN), *second = find(tokens, OTHER);
+    assert_non_null(first);
+    assert_non_null(second);
+    assert_ptr_not_equal(first, second);
+    static const struct {
+        const char *id;
+        bool allowed;
+    } ids[] = {{"", true},      {"vault", true}, {"site-", true}, {"site-1", true},  {"a1", true},    {"b.", true},
+               {"site", false}, {"c1", false},   {"a", false},    {"vault2", false}, {"Vault", false}};
+    for (size_t i = 0; i < sizeof ids / sizeof *ids; i++) {
+        assert_int_equal(spl_token_allows(first, SPL_SCOPE_VIEW, ids[i].id), ids[i].allowed);
+        assert_int_equal(spl_token_allows(first, SPL_SCOPE_TOUR, ids[i].id), ids[i].allowed);
+        assert_false(spl_token_allows(first, SPL_SCOPE_ADMIN, ids[i].id));
+        assert_true(spl_token_allows(second, SPL_SCOPE_ADMIN, ids[i].id));
+        assert_false(spl_token_allows(second, SPL_SCOPE_VIEW, ids[i].id));
+    }
+    spl_tokens_destroy(tokens);
+}
+
+static void digests_are_those_of_the_standards(void **state)
+{
+    (void)state;
+    uint8_t digest[SPL_DIGEST_BYTES];
+    char text[SPL_DIGEST_TEXT];
+    assert_int_equal(spl_sha256("abc", 3, digest, NULL), 0); // FIPS 180-2, B.1
+    spl_digest_to_base64url(digest, text);
+    assert_string_equal(text, "ungWv48Bz-pBQUDeXa4iI7ADYaOWF3qctBD_YfIAFa0");
+    assert_int_equal(spl_hmac_sha256("Jefe", 4, "what do ya want for nothing?", 28, digest, NULL), 0); // RFC 4231, 4.3
+    spl_digest_to_base64url(digest, text);
+    assert_string_equal(text, "W9zBRr9gdU5qBCQmCJV1x1oAPwidJzmDnexYuWTsOEM");
+    assert_true(spl_secret_is_equal("abcd", "abcd", 4));
+    assert_false(spl_secret_is_equal("abcd", "abce", 4));
+}
+
+static struct spl_sign_key make_key(const char *bytes)
+{
+    return (struct spl_sign_key){strdup(bytes), strlen(bytes)};
+}
+
+enum { expires = 2000000000 };
+#define KEY "0123456789abcdef0123456789abcdef"
+/* printf '/v1/datasets/wall/view?width=64&exp=2000000000' | openssl dgst -sha256 -hmac KEY -binary | basenc --base64url
+ */
+#define SIG "2XBn4JAxAIJXdgiOaQIWbDoR9Qvc7eY8dFymrv6PWI0"
+
+static int check(const struct spl_sign_key *key, const char *url, int64_t now, size_t *kept, struct spl_error *err)
+{
+    char path[400];
+    snprintf(path, sizeof path, "%s", url);
+    char *mark = strchr(path, '?');
+    *mark = '\0';
+    *err = (struct spl_error){0};
+    return spl_sign_check(key, path, mark + 1, now, kept, err);
+}
+
+static void signed_urls_hold_until_they_expire_and_not_when_changed(void **state)
+{
+    (void)state;
+    struct spl_sign_key key = make_key(KEY), wrong = make_key("x123456789abcdef0123456789abcdef");
+    struct spl_error err = {0};
+    char *url = NULL;
+    size_t kept = 0;
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/view?width=64", expires, &url, &err), 0);
+    assert_string_equal(url, "/v1/datasets/wall/view?width=64&exp=2000000000&sig=" SIG);
+    assert_int_equal(check(&key, url, expires, &kept, &err), 0);
+    assert_int_equal(kept, strlen("width=64"));
+    assert_int_equal(check(&key, url, expires + 1, &kept, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "exp");
+    assert_int_equal(check(&wrong, url, 0, &kept, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "sig");
+    for (size_t i = strlen("/v1/datasets/wall/view?"); url[i]; i++) { // every byte of the query counts
+        url[i] ^= 1;
+        assert_int_equal(check(&key, url, 0, &kept, &err), SPL_E_INPUT);
+        assert_null(strstr(err.message, SIG));
+        url[i] ^= 1;
+    }
+    url[4] = 'e'; // and of the path
+    assert_int_equal(check(&key, url, 0, &kept, &err), SPL_E_INPUT);
+    free(url);
+    static const char *const broken[] = {"/a?sig=" SIG,
+                                         "/a?exp=9",
+                                         "/a?exp=2000000000&sig=",
+                                         "/a?x=1&sig=" SIG,
+                                         "/a?exp=2000000000&sig=" SIG SIG,
+                                         "/a?exp=2000000000&sig=" SIG "&x=1"};
+    for (size_t i = 0; i < sizeof broken / sizeof *broken; i++)
+        assert_int_equal(check(&key, broken[i], 0, &kept, &err), SPL_E_INPUT);
+    spl_sign_key_finish(&wrong);
+    spl_sign_key_finish(&key);
+}
+
+static void urls_are_signed_with_or_without_host_and_query(void **state)
+{
+    (void)state;
+    struct spl_sign_key key = make_key(KEY);
+    struct spl_error err = {0};
+    char *whole = NULL, *path = NULL;
+    size_t kept = 7;
+    assert_int_equal(spl_sign_url(&key, "https://h:1/v1/datasets/a", expires, &whole, &err), 0);
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/a", expires, &path, &err), 0);
+    assert_string_equal(whole + strlen("https://h:1"), path);
+    assert_int_equal(check(&key, path, 0, &kept, &err), 0);
+    assert_int_equal(kept, 0);
+    free(whole);
+    assert_int_equal(spl_sign_url(&key, "/v1/x?from=http://y/z", expires, &whole, &err), 0);
+    assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
+    free(whole);
+    const char *const bad[] = {"",     "v1/x", "https://host", "https://host?/x", "://h/x",
+                               "/a#b", "/a b", path,           "/a?exp=3"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        err = (struct spl_error){0};
+        assert_int_equal(spl_sign_url(&key, bad[i], expires, &whole, &err), SPL_E_USAGE);
+        assert_null(whole);
+    }
+    free(path);
+    spl_sign_key_finish(&key);
+}
+
+static void keys_that_are_too_short_are_refused(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/splatd-key-XXXXXX";
+    int fd = mkstemp(path);
+    struct spl_sign_key key;
+    struct spl_error err = {0};
+    assert_int_equal(write(fd, "0123456789abcdef0123456789abcde\n", 32), 32); // 31 and a newline
+    assert_int_equal(spl_sign_key_read(path, &key, &err), SPL_E_USAGE);
+    assert_null(key.bytes);
+    assert_null(strstr(err.message, "0123456789abcdef"));
+    assert_int_equal(pwrite(fd, "0123456789abcdef0123456789abcdef\r\n", 34, 0), 34);
+    assert_int_equal(spl_sign_key_read(path, &key, &err), 0);
+    assert_int_equal(key.length, 32);
+    spl_sign_key_finish(&key);
+    close(fd);
+    unlink(path);
+    assert_int_equal(spl_sign_key_read(path, &key, &(struct spl_error){0}), SPL_E_USAGE);
+    assert_int_equal(spl_sign_key_read("/tmp", &key, &(struct spl_error){0}), SPL_E_USAGE);
+}
+
+static void buckets_empty_and_fill_again(void **state)
+{
+    (void)state;
+    struct spl_buckets *buckets;
+    uint8_t a[SPL_BUCKET_KEY] = {1}, b[SPL_BUCKET_KEY] = {2};
+    uint64_t now = 1000 * SPL_NS_PER_S;
+    assert_int_equal(spl_buckets_create(10, &buckets, NULL), 0);
+    for (int i = 0; i < 20; i++)
+        assert_int_equal(spl_buckets_take(buckets, a, now), 0);
+    assert_int_equal(spl_buckets_take(buckets, a, now), 1);
+    assert_int_equal(spl_buckets_take(buckets, b, now), 0); // others are not touched
+    now += SPL_NS_PER_S / 2;
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(spl_buckets_take(buckets, a, now), 0);
+    assert_int_not_equal(spl_buckets_take(buckets, a, now), 0);
+    assert_int_not_equal(spl_buckets_take(buckets, a, now - SPL_NS_PER_S), 0); // a clock that stands back gives nothing
+    now += 1000 * SPL_NS_PER_S;
+    for (int i = 0; i < 20; i++)
+        assert_int_equal(spl_buckets_take(buckets, a, now), 0);
+    assert_int_equal(spl_buckets_take(buckets, a, now), 1);
+    spl_buckets_destroy(buckets);
+    spl_buckets_destroy(NULL);
+}
+
+static void a_table_full_of_addresses_still_works(void **state)
+{
+    (void)state;
+    struct spl_buckets *buckets;
+    uint8_t key[SPL_BUCKET_KEY] = {0};
+    uint64_t now = SPL_NS_PER_S;
+    assert_int_equal(spl_buckets_create(1, &buckets, NULL), 0);
+    for (uint32_t i = 0; i < 100000; i++) {
+        memcpy(key, &i, sizeof i);
+        assert_int_equal(spl_buckets_take(buckets, key, now + i), 0);
+    }
+    assert_int_equal(spl_buckets_take(buckets, key, now + 100000), 0);
+    assert_int_not_equal(spl_buckets_take(buckets, key, now + 100001), 0); // the latest is still known
+    spl_buckets_destroy(buckets);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bad_token_files_are_refused_by_line_without_the_token),
+        cmocka_unit_test(tokens_allow_what_their_line_says),
+        cmocka_unit_test(digests_are_those_of_the_standards),
+        cmocka_unit_test(signed_urls_hold_until_they_expire_and_not_when_changed),
+        cmocka_unit_test(urls_are_signed_with_or_without_host_and_query),
+        cmocka_unit_test(keys_that_are_too_short_are_refused),
+        cmocka_unit_test(buckets_empty_and_fill_again),
+        cmocka_unit_test(a_table_full_of_addresses_still_works),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
