@@ -54,7 +54,6 @@ async function open() {
     const ids = datasets.map(({id}) => id);
     const id = wanted.dataset ?? ids[0];
     choices($("dataset"), ids.includes(id) || !id ? ids : [...ids, id], id);
-    $("about").title = `${device.backend}: ${device.name}`;
     if (!id) return stage.report(Object.assign(new Error("No dataset is served yet"), {kind: "gone"}));
     const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
     stage.pixels = limits.pixels;
@@ -63,7 +62,7 @@ async function open() {
     for (const name of ["lod", "supersample", "budget"]) $(name).value = wanted[name] ?? (name === "budget" ? "" : 1);
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
-    $("about").textContent = `${thousands(dataset.points)} points, ${size} m`;
+    $("about").textContent = `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);

@@ -114,7 +114,8 @@ export class Stage extends EventTarget {
     const ratio = Math.min(devicePixelRatio, 2, Math.sqrt(this.pixels / (width * height)));
     const {layer, budget, ...setting} = this.settings;
     const coarse = COARSE[this.coarse];
-    const quality = full ? (budget ? {budget} : setting) : coarse.budget ? coarse : {...setting, ...coarse};
+    // In motion the method stays: what changes it from frame to frame flickers.
+    const quality = full ? (budget ? {budget} : setting) : coarse.budget ? {...coarse, method: setting.method} : {...setting, ...coarse};
     return {...rounded(this.camera), width: Math.max(1, Math.floor(width * ratio)), height: Math.max(1, Math.floor(height * ratio)),
       layer, ...quality, background: getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
       format: "jpeg"};
@@ -148,7 +149,8 @@ export class Stage extends EventTarget {
       this.failures = 0;
       this.report(null);
     } catch (error) {
-      if (error.name !== "AbortError") this.fail(error);
+      if (!full && error.kind === "refused" && this.coarse === "auto") this.coarse = "quarter"; // a profile without this method
+      else if (error.name !== "AbortError") this.fail(error);
     }
     this.flight = null;
     this.pump();

@@ -149,10 +149,12 @@ class Page:
                         f"return [b.x + b.width / 2, b.y + b.height / 2] }})(document.querySelector({json.dumps(selector)}))")
         self.click(x, y)
 
-    def drag(self, a, b, button="left", steps=4):
+    def drag(self, a, b, button="left", steps=4, hold="true"):
+        """`hold` is checked before the button comes up."""
         self.mouse("mousePressed", *a, button=button, clickCount=1)
         for i in range(1, steps + 1):
             self.mouse("mouseMoved", *(p + (q - p) * i / steps for p, q in zip(a, b)), button=button)
+        assert self.run(hold), f"not while dragging: {hold}"
         self.mouse("mouseReleased", *b, button=button, clickCount=1)
 
     def touch(self, *moves):

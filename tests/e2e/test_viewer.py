@@ -101,11 +101,33 @@ def test_a_picture_appears():
         assert tab.run("document.querySelector('#dataset').value") == "wall"
 
 
+def test_the_camera_is_the_one_of_the_service():
+    """Axes and projection as in the reply's Splatd-Camera; a bent frame puts points of the target's plane where they are."""
+    cameras = [dict(eye=[3, 0.5, 1], target=[0, 0.1, 0.9], up=[0, 0, 1], fov=50), dict(eye=[-2, 7, 3], target=[0, 0, 1], up=[0.1, 1, 0.5], fov=20)]
+    with page() as tab:
+        for camera in cameras:
+            params = {**{k: ",".join(map(str, v)) for k, v in camera.items() if k != "fov"}, "fov": camera["fov"]}
+            used = json.loads(daemon.view(**params, width=400, height=300).headers["Splatd-Camera"])
+            right, down, forward = tab.run(f"import('/viewer/camera.js').then(m => Object.values(m.axes({json.dumps(camera)})))")
+            assert all(abs(a - b) < 1e-12 for a, b in zip(right + down + forward, used["rotation"])), (right, down, forward)
+            assert abs(tab.run(f"import('/viewer/camera.js').then(m => m.focal({json.dumps(camera)}, 300))") - used["fx"]) < 1e-9
+        worst = tab.run(f"""import('/viewer/camera.js').then(m => {{
+            const from = {json.dumps(cameras[0])}, to = m.pan(m.orbit(m.dolly(from, 0.8, [400, 300], [100, 80], 0.1), 0.2, -0.1), 20, 10, 300);
+            const css = new DOMMatrix(m.warp(from, to, [400, 300])), d = m.distance(from);
+            return Math.max(...[[0, 0], [400, 0], [30, 270], [200, 150]].map(pixel => {{
+                const world = m.add(from.eye, m.times(m.ray(from, [400, 300], pixel), d));
+                const there = m.project(to, [400, 300], world), bent = css.transformPoint(new DOMPoint(...pixel));
+                return Math.hypot(bent.x / bent.w - there[0], bent.y / bent.w - there[1]);
+            }})); }})""")
+        assert worst < 0.1, f"{worst} pixels off"  # CSS keeps six digits
+        assert tab.run(f"import('/viewer/camera.js').then(m => m.warp({json.dumps(cameras[0])}, m.look({json.dumps(cameras[0])}, 3, 0), [400, 300]))") == ""
+
+
 def test_dragging_orbits_and_pans():
     with page() as tab:
         start, digest = link(tab), settled(tab)
         x, y = middle(tab)
-        tab.drag((x, y), (x + 60, y + 20))
+        tab.drag((x, y), (x + 60, y + 20), hold="document.querySelector('canvas').style.transform.startsWith('matrix3d')")
         orbited, digest = moved(tab, start), settled(tab, digest)
         assert orbited["target"] == start["target"] and abs(far(orbited["eye"], orbited["target"]) - 3) < 0.01
         assert orbited["eye"][2] > 1.1, "dragging down must show more from above"
