@@ -5,6 +5,7 @@
 //
 // src       the service; by default where this file came from
 // dataset   its id; label  what screen readers call the view
+// token     where the service wants one; whoever sees the page sees it, so let it allow no more than view
 // eye, target, up, fov, layer, method, lod, supersample, budget   as parameters of a view; changing one moves the view
 //
 // Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last one.
@@ -20,7 +21,10 @@ class SplatView extends HTMLElement {
   #page = "";
   #heard = (event) => {
     const {splatd, ...camera} = event.data ?? {};
-    if (event.source !== this.#frame.contentWindow || splatd !== "camera") return;
+    if (event.source !== this.#frame.contentWindow) return;
+    if (splatd === "token" && this.hasAttribute("token"))
+      event.source.postMessage({splatd, token: this.getAttribute("token")}, new URL(this.#page).origin);
+    if (splatd !== "camera") return;
     this.camera = camera;
     this.dispatchEvent(new CustomEvent("camera", {detail: camera, bubbles: true}));
   };

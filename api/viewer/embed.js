@@ -1,16 +1,19 @@
 // The page inside a frame: the picture and navigation, nothing else. The path names the dataset, the fragment camera and
-// settings. Tells the page around it {splatd: "camera", eye, target, up, fov} when the camera has come to rest.
+// settings. Tells the page around it {splatd: "camera", eye, target, up, fov} when the camera has come to rest, and asks it
+// for {splatd: "token", token} where the service wants one: tokens do not belong into addresses.
 
 import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {notices} from "./notice.js";
-import {askJson} from "./service.js";
+import {askJson, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 
 const id = decodeURIComponent(location.pathname.split("/").pop());
 const stage = new Stage(document.getElementById("stage"));
 stage.drag = "orbit";
 attach(stage);
+
+let asked = false;
 
 async function open() {
   const {eye, target, up, fov, layer = "color", method, lod, supersample, budget} = parse(location.hash);
@@ -24,12 +27,19 @@ async function open() {
     stage.open(dataset, Object.fromEntries(given));
   } catch (problem) {
     stage.report(problem);
+    if (problem.kind === "token" && !asked) parent.postMessage({splatd: "token"}, "*");
+    asked = true;
   }
 }
 
 notices(stage, document.getElementById("notice"), document.getElementById("again"), open);
 stage.addEventListener("frame", ({detail}) => {
   if (detail.full && parent !== window) parent.postMessage({splatd: "camera", ...detail.camera}, "*");
+});
+addEventListener("message", ({source, data}) => {
+  if (source !== parent || data?.splatd !== "token" || typeof data.token !== "string") return;
+  setToken(data.token);
+  open();
 });
 addEventListener("hashchange", open);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.refresh());

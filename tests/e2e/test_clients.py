@@ -24,9 +24,9 @@ def url(daemon):
     return f"http://127.0.0.1:{daemon.port}"
 
 
-def shell(daemon, *arguments, code=0, folder=None):
+def shell(daemon, *arguments, code=0, folder=None, **environment):
     done = subprocess.run([CLIENTS / "splatd.sh", *arguments], capture_output=True, timeout=120, cwd=folder,
-                          env={**os.environ, "SPLATD_URL": url(daemon) + "/"})
+                          env={**os.environ, "SPLATD_URL": url(daemon) + "/", **environment})
     assert done.returncode == code, (arguments, done)
     return done.stdout, done.stderr.decode()
 
@@ -103,6 +103,23 @@ def test_shell():
             out, err = shell(d, *arguments, code=code, folder=folder)
             assert not out and said in err, (arguments, err)
         assert not pathlib.Path(folder, "b.jpg").exists() and not list(pathlib.Path(folder).glob("*.part"))
+
+
+def test_tokens():
+    token = "a-token/of+the~tests"
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder, "tokens")
+        file.write_text(f"{token} view\n")
+        file.chmod(0o600)
+        with Daemon(REAL, "--tokens", str(file)) as d:
+            assert Splatd(url(d), token).dataset("wall").view(**POSE, **SMALL).bytes.startswith(JPEG)
+            assert shell(d, "datasets", SPLATD_TOKEN=token)[0] == b"wall\n"
+            assert "401" in shell(d, "datasets", code=1)[1]
+            try:
+                Splatd(url(d), token + "x").datasets()
+                raise RuntimeError("nothing was refused")
+            except SplatdError as error:
+                assert error.status == 401
 
 
 def test_the_examples_of_the_readme():

@@ -2,6 +2,7 @@
 its surface is x = 0.2 sin(y), so that coordinates can be checked."""
 import base64
 import contextlib
+import http.server
 import json
 import math
 import pathlib
@@ -9,6 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
+import threading
 import time
 import urllib.parse
 
@@ -343,7 +345,7 @@ def refuse(tab, status, problem, retry):
                 tab.send("Fetch.fulfillRequest", requestId=params["requestId"], responseCode=status, body=body.decode(),
                          responseHeaders=headers)
                 tab.send("Fetch.disable")
-            browser.threading.Thread(target=answer).start()
+            threading.Thread(target=answer).start()
         else:
             usual(method, params)
     chromium.listeners[tab.session] = hear
@@ -390,12 +392,11 @@ def test_embed():
         assert "'none'" in tab.text("#notice p")
 
 
-def test_splat_view_on_another_origin():
-    import http.server
-    import threading
-
-    html = f"""<!doctype html><meta charset=utf-8><link rel=icon href="data:,"><script type=module src="{SITE}/clients/splat-view.js"></script>
-        <splat-view dataset="wall" eye="3,0,1" target="0,0,1" layer="color"></splat-view>""".encode()
+@contextlib.contextmanager
+def elsewhere(site, element):
+    """A page of another origin with a <splat-view> in it; its address."""
+    html = f"""<!doctype html><meta charset=utf-8><link rel=icon href="data:,"><script type=module src="{site}/clients/splat-view.js"></script>
+        {element}""".encode()
 
     class Handler(http.server.BaseHTTPRequestHandler):
         def do_GET(self):
@@ -408,8 +409,15 @@ def test_splat_view_on_another_origin():
             pass
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        with page(f"http://127.0.0.1:{server.server_port}/", ready="document.querySelector('splat-view')?.camera", size=(500, 400)) as tab:
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+    server.server_close()
+
+
+def test_splat_view_on_another_origin():
+    element = '<splat-view dataset="wall" eye="3,0,1" target="0,0,1" layer="color"></splat-view>'
+    with elsewhere(SITE, element) as url:
+        with page(url, ready="document.querySelector('splat-view')?.camera", size=(500, 400)) as tab:
             assert tab.run("document.querySelector('splat-view').camera.eye") == [3, 0, 1]
             assert tab.run("(e => e.clientWidth / e.clientHeight)(document.querySelector('splat-view'))") > 1.7
             length = tab.run("history.length")
@@ -418,8 +426,27 @@ def test_splat_view_on_another_origin():
             assert tab.run("history.length") == length
             tab.drag((250, 150), (320, 150))
             tab.until("document.querySelector('splat-view').camera.eye[1] !== 1")
-    finally:
-        server.shutdown()
+
+
+def test_a_token_is_asked_for():
+    token = "a-token-of-the-tests"
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder, "tokens")
+        file.write_text(f"{token} view\n")
+        file.chmod(0o600)
+        with Daemon(REAL, "--tokens", str(file)) as guarded:
+            site = f"http://127.0.0.1:{guarded.port}"
+            with page(site, ready="!document.querySelector('#token').hidden", complaints="401") as tab:
+                for text in ("some-other-token-than-that", token):
+                    tab.run(f"""document.querySelector('#token input').value = '{text}';
+                        document.querySelector('#token').requestSubmit()""")
+                    tab.until("document.querySelector('#token').hidden" if text == token else
+                              "document.querySelector('#notice').textContent.includes('not known')")
+                settled(tab)
+                assert token not in tab.run("location.href") + json.dumps(tab.run(VIEWS))
+            with elsewhere(site, f'<splat-view dataset="wall" token="{token}"></splat-view>') as url:
+                with page(url, ready="document.querySelector('splat-view')?.camera", complaints="401"):
+                    pass
 
 
 try:
