@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "service/state.h"
+#include "service/supervisor.h"
 
 enum { look_ms = 500 };
 
@@ -50,10 +51,28 @@ bool spl_health_is_ready(struct spl_service *service, char why[SPL_HEALTH_TEXT])
     return spl_health_is_alive(service, why);
 }
 
+static void say_status(struct spl_service *service)
+{
+    static const char *const lines[] = {
+        [SPL_PIPELINE_STARTING] = "datasets are being loaded",
+        [SPL_PIPELINE_READY] = "serving",
+        [SPL_PIPELINE_REBUILDING] = "the device was lost and is being reopened",
+        [SPL_PIPELINE_FAILED] = "the device is gone",
+    };
+    enum spl_pipeline_state state = spl_pipeline_get_state(service->pipeline);
+    if (state != service->said_state && !service->leaving)
+        spl_supervisor_say_status(lines[state]);
+    service->said_state = state;
+}
+
 static void on_look(uv_timer_t *timer)
 {
     struct spl_service *service = timer->data;
     const struct spl_service_options *options = service->options;
+    char why[SPL_HEALTH_TEXT];
+    say_status(service);
+    if (spl_health_is_alive(service, why))
+        spl_supervisor_say_alive();
     uint64_t still_ms = service->pipeline ? spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_MS : 0;
     if (still_ms <= options->deadline_ms + 2 * options->stall_ms)
         return;
@@ -66,5 +85,7 @@ static void on_look(uv_timer_t *timer)
 
 void spl_health_watch(struct spl_service *service)
 {
-    uv_timer_start(&service->look_timer, on_look, look_ms, look_ms);
+    uint64_t watchdog_ms = spl_supervisor_get_watchdog_ms();
+    uint64_t every_ms = watchdog_ms && watchdog_ms / 3 < look_ms ? watchdog_ms / 3 + 1 : look_ms;
+    uv_timer_start(&service->look_timer, on_look, every_ms, every_ms);
 }

@@ -46,6 +46,17 @@ static int open_socket(const struct addrinfo *info)
     return -1;
 }
 
+void spl_listen_print(int fd, char *url, size_t url_capacity)
+{
+    struct sockaddr_storage bound;
+    socklen_t length = sizeof bound;
+    char name[128] = "?", number[16] = "?";
+    if (!getsockname(fd, (struct sockaddr *)&bound, &length))
+        getnameinfo((struct sockaddr *)&bound, length, name, sizeof name, number, sizeof number,
+                    NI_NUMERICHOST | NI_NUMERICSERV);
+    snprintf(url, url_capacity, bound.ss_family == AF_INET6 ? "http://[%s]:%s/" : "http://%s:%s/", name, number);
+}
+
 int spl_listen(const char *flag, const char *address, int *fd, char *url, size_t url_capacity, struct spl_error *err)
 {
     char text[256], *host, *port;
@@ -63,12 +74,6 @@ int spl_listen(const char *flag, const char *address, int *fd, char *url, size_t
     freeaddrinfo(found);
     if (*fd < 0)
         return spl_fail_errno(err, failed, "cannot listen on %s", address);
-    struct sockaddr_storage bound;
-    socklen_t length = sizeof bound;
-    char name[128] = "?", number[16] = "?";
-    if (!getsockname(*fd, (struct sockaddr *)&bound, &length))
-        getnameinfo((struct sockaddr *)&bound, length, name, sizeof name, number, sizeof number,
-                    NI_NUMERICHOST | NI_NUMERICSERV);
-    snprintf(url, url_capacity, bound.ss_family == AF_INET6 ? "http://[%s]:%s/" : "http://%s:%s/", name, number);
+    spl_listen_print(*fd, url, url_capacity);
     return 0;
 }

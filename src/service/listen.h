@@ -10,4 +10,7 @@
  * caller and `url` says where it is reachable, with the port that was taken. */
 int spl_listen(const char *flag, const char *address, int *fd, char *url, size_t url_capacity, struct spl_error *err);
 
+/* Writes where the listening socket `fd` is reachable to `url`. */
+void spl_listen_print(int fd, char *url, size_t url_capacity);
+
 #endif

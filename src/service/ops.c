@@ -129,9 +129,15 @@ int spl_ops_start(struct spl_service *service, struct spl_error *err)
     struct spl_error busy = {0};
     char url[192];
     int fd = -1, rc = 0;
-    if (!options->ops_listen[0])
+    if (service->ops_fd >= 0) {
+        fd = service->ops_fd;
+        service->ops_fd = -1;
+        spl_listen_print(fd, url, sizeof url);
+    } else if (options->ops_listen[0]) {
+        rc = spl_listen("--ops-listen", options->ops_listen, &fd, url, sizeof url, &busy);
+    } else {
         return 0;
-    rc = spl_listen("--ops-listen", options->ops_listen, &fd, url, sizeof url, &busy);
+    }
     if (rc == SPL_E_IO && options->origin[SPL_PARAMETER_ops_listen] == SPL_FROM_DEFAULT) {
         spl_log_warn("%s: no /healthz, /readyz and /metrics; --ops-listen takes another address", busy.message);
         return 0;

@@ -6,6 +6,7 @@
 #include "service/service.h"
 
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -17,6 +18,7 @@
 #include "service/listen.h"
 #include "service/ops.h"
 #include "service/state.h"
+#include "service/supervisor.h"
 
 enum {
     drain_check_ms = 20,
@@ -63,6 +65,7 @@ static void on_signal(uv_signal_t *handle, int number)
     service->leaving = true;
     spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
                  service->requests_open);
+    spl_supervisor_say_stopping("finishing what runs");
     if (service->options->drain_delay_ms && service->daemon)
         uv_timer_start(&service->drain_timer, on_leave, service->options->drain_delay_ms, 0);
     else
@@ -92,6 +95,10 @@ static void announce(struct spl_service *service)
         spl_log_warn("no dataset yet; 'splatd pack' makes one");
     spl_log_info("listening on %s", service->url);
     spl_log_info("ready");
+    char line[SPL_DEVICE_NAME_MAX + 64];
+    snprintf(line, sizeof line, "rendering on %s%s", status.device.name, status.device.software ? " (software)" : "");
+    spl_supervisor_say_ready(line);
+    service->said_state = SPL_PIPELINE_READY;
 }
 
 static void on_wake(uv_async_t *handle)
@@ -198,21 +205,36 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
     return spl_pipeline_create(&options, &service->pipeline, err);
 }
 
+/* The sockets that the supervisor has bound, or our own. */
+static int open_sockets(struct spl_service *service, struct spl_error *err)
+{
+    int fds[SPL_SUPERVISOR_SOCKETS], rc;
+    if ((rc = spl_supervisor_take_sockets(fds, err)))
+        return rc;
+    service->ops_fd = fds[1];
+    if ((rc = spl_ops_start(service, err)))
+        return rc;
+    service->listen_fd = fds[0];
+    if (fds[0] < 0)
+        return spl_listen("--listen", service->options->listen, &service->listen_fd, service->url, sizeof service->url,
+                          err);
+    spl_listen_print(service->listen_fd, service->url, sizeof service->url);
+    return 0;
+}
+
 int spl_service_run(const struct spl_service_options *options, struct spl_error *err)
 {
     struct spl_service *service = spl_alloc(1, sizeof *service, err);
     if (!service)
         return SPL_E_NOMEM;
     service->options = options;
-    service->listen_fd = -1;
+    service->listen_fd = service->ops_fd = -1;
     service->started_ns = spl_now_ns();
     raise_descriptor_limit(options);
     int rc = init_loop(service, err);
     if (rc)
         goto free_service;
-    if ((rc = spl_ops_start(service, err)) ||
-        (rc = spl_listen("--listen", options->listen, &service->listen_fd, service->url, sizeof service->url, err)) ||
-        (rc = spl_access_init(service, err)) ||
+    if ((rc = open_sockets(service, err)) || (rc = spl_access_init(service, err)) ||
         (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
                                err)) ||
         (rc = start_pipeline(service, err)))

@@ -82,17 +82,19 @@ struct spl_service {
     uint64_t started_ns;
     char url[192];
     int listen_fd; /* -1 once MHD has it */
+    int ops_fd;    /* passed by the supervisor; -1 = none, or once MHD has it */
 
     uv_loop_t loop;
     uv_async_t wake;
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
-    uv_timer_t http_timer;  /* MHD's own timeouts */
-    uv_timer_t wait_timer;  /* deadlines and departures, while requests wait */
-    uv_timer_t slow_timer;  /* connections that take too long */
-    uv_timer_t drain_timer; /* while stopping */
-    uv_timer_t look_timer;  /* health.c */
-    struct MHD_Daemon *ops; // may be NULL
+    uv_timer_t http_timer;              /* MHD's own timeouts */
+    uv_timer_t wait_timer;              /* deadlines and departures, while requests wait */
+    uv_timer_t slow_timer;              /* connections that take too long */
+    uv_timer_t drain_timer;             /* while stopping */
+    uv_timer_t look_timer;              /* health.c */
+    enum spl_pipeline_state said_state; /* to the supervisor; owned by: health.c */
+    struct MHD_Daemon *ops;             // may be NULL
     uv_poll_t ops_poll;
     uv_timer_t ops_timer;
 

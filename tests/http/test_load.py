@@ -246,7 +246,8 @@ def test_ipv6_and_quiet():
         except OSError:
             return  # a machine without IPv6
         port = probe.getsockname()[1]
-    process = subprocess.Popen([FAKE, "--quiet", "--listen", f"[::1]:{port}", WALL], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen([FAKE, "--quiet", "--ops-listen", "", "--listen", f"[::1]:{port}", WALL],
+                               stderr=subprocess.PIPE, text=True)
 
     def up():
         try:
