@@ -57,6 +57,10 @@
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
 
+/* A splat covers the samples within this many sample sizes of its centre, however small it is: half a sample's diagonal, so
+ * that any centre covers one, and a thousandth more, for a centre in the corner between four and what floats round. */
+#define SPL_LOW_PASS 0.7081f
+
 /* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many sample
  * sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f

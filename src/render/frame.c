@@ -56,14 +56,14 @@ static void fill_params(struct spl_tile *tile)
         .cy = (float)camera->cy,
         .near = (float)camera->near,
         .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
-        .low_pass = 0.70710678f, /* half a sample's diagonal: any centre then covers a sample */
+        .low_pass = SPL_LOW_PASS,
         .margin = view->margin < 0 ? default_margin : (float)view->margin,
         .width = camera->width,
         .height = camera->height,
         .supersample = (uint32_t)view->supersample,
         .inverse_fx = 1 / (float)camera->fx,
         .inverse_fy = 1 / (float)camera->fy,
-        .inverse_low_pass_squared = 2,
+        .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
     };
     for (int row = 0; row < 3; row++)

@@ -37,8 +37,8 @@ static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_sample
     return count < chunk->count ? count : chunk->count;
 }
 
-/* The occlusion tiles of samples [low, high], which may lie outside the image. The depth is lowered by what the
- * kernels' floats may round. */
+/* The occlusion tiles of samples [low, high], which may lie outside the image. The depth is lowered by how far
+ * a sample off its disc may lie in front of it (disc.glsl), and by what the kernels' floats may round. */
 static struct spl_chunk_bounds occlusion_bounds(const struct spl_camera *camera, const double low[2],
                                                 const double high[2], double near)
 {
@@ -48,9 +48,9 @@ static struct spl_chunk_bounds occlusion_bounds(const struct spl_camera *camera,
         last[i] = (uint32_t)fmin(fmax(high[i], 0), size[i] - 1) / SPL_OCCLUSION_TILE;
     }
     bool few = (last[0] - first[0] + 1) * (last[1] - first[1] + 1) <= SPL_OCCLUSION_TILES_MAX;
-    return (struct spl_chunk_bounds){.first = first[0] | first[1] << 16,
-                                     .last = last[0] | last[1] << 16,
-                                     .near = few ? (float)(near * (1 - 1e-5)) : 0};
+    double share = fmax(0, 1 - SPL_LOW_PASS_REACH / camera->fx) * (1 - 1e-5);
+    return (struct spl_chunk_bounds){
+        .first = first[0] | first[1] << 16, .last = last[0] | last[1] << 16, .near = few ? (float)(near * share) : 0};
 }
 
 /* The most samples along an image axis that a disc of `radius` covers if no part of it is nearer than `near`; what lies

@@ -75,7 +75,10 @@ static void check_heap(struct suite *suite, const char *name, size_t count, floa
     if (!splats)
         abort();
     for (size_t i = 0; i < count; i++) {
-        splats[i] = (struct make_splat){.position = {i < count / 2 ? -3e-4 : 3e-4}, .normal = {0, -1, 0}};
+        splats[i] = (struct make_splat){.position = {count == 1      ? 0
+                                                     : i < count / 2 ? -3e-4
+                                                                     : 3e-4},
+                                        .normal = {0, -1, 0}};
         splats[i].radius = radius;
         memset(splats[i].color, (i ^ i / 8) % 2 ? 200 + spread : 200 - spread, sizeof splats[i].color);
     }

@@ -98,7 +98,7 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
 static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z)
 {
     float ox = (float)x + (0.5f - center[0]), oy = (float)y + (0.5f - center[1]);
-    float near_center = (ox * ox + oy * oy) * 2.0f;
+    float near_center = (ox * ox + oy * oy) * (1 / (SPL_LOW_PASS * SPL_LOW_PASS));
     const float *p = d->p, *n = d->n;
     float ifx = 1 / (float)s->camera.fx, ify = 1 / (float)s->camera.fy, inverse = 1.0f / p[2];
     float rx = p[0] * inverse, ry = p[1] * inverse, facing = n[0] * rx + n[1] * ry + n[2];
@@ -118,7 +118,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     int first[2], last[2];
     float center[2], z;
     footprint(s, d, first, last, center);
-    float pixel = 0.70710678f * d->p[2] / (float)s->camera.fx;
+    float pixel = SPL_LOW_PASS * d->p[2] / (float)s->camera.fx;
     float margin = s->margin * (d->radius > pixel ? d->radius : pixel);
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {
@@ -299,7 +299,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cy *= view->supersample;
     s.margin = view->margin < 0 ? 1 : (float)view->margin;
     struct spl_select_params params = {
-        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = 0.70710678f, .resident = always,
+        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = SPL_LOW_PASS, .resident = always,
         .points = view->method == SPL_METHOD_POINTS};
     int rc = spl_select(&params, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
