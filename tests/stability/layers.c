@@ -34,7 +34,7 @@ static void count_broken(const struct spl_view *view, const struct spl_frame *f,
         broken[SPL_LAYER_COVERAGE] +=
             !(share >= 0 && share <= 1) || fabs(share * samples - rint(share * samples)) > 1e-4;
         broken[SPL_LAYER_COLOR] += fabs(color[4 * i + 3] - 255 * share) > 0.51;
-        broken[SPL_LAYER_DEPTH] += there ? !(z >= c->near && z <= c->far) : !isnan(depth[i]);
+        broken[SPL_LAYER_DEPTH] += there ? !(z > 0 && z < INFINITY) : !isnan(depth[i]);
         broken[SPL_LAYER_RANGE] +=
             there ? !(fabs(range[i] / (z * sqrt(1 + x * x + y * y)) - 1) < 1e-5) : !isnan(range[i]);
         double length = sqrt(normal[3 * i] * (double)normal[3 * i] + normal[3 * i + 1] * (double)normal[3 * i + 1] +
@@ -44,18 +44,26 @@ static void count_broken(const struct spl_view *view, const struct spl_frame *f,
     }
 }
 
-static void check_frame(struct suite *suite, const struct world *world, const struct spl_view *view, struct place place)
+void check_kinds(struct suite *suite, const struct world *world, const struct spl_view *view,
+                 const struct spl_frame *frame, struct place place)
 {
-    struct spl_frame frame, again;
     size_t broken[SPL_LAYER_COUNT];
-    if (!world_render(suite, world, &place, view, &frame))
-        return;
-    count_broken(view, &frame, spl_dataset_get_info(world->dataset)->splats, broken);
+    if (view->layers != (1u << SPL_LAYER_COUNT) - 1)
+        return; /* layers are held against each other */
+    count_broken(view, frame, spl_dataset_get_info(world->dataset)->splats, broken);
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
         place.layer = spl_layer_name((enum spl_layer)layer);
         report_at_most(&suite->report, "layer-holds-its-kind", &place, (double)broken[layer], 0,
                        "pixels; image.h says what a layer holds");
     }
+}
+
+static void check_frame(struct suite *suite, const struct world *world, const struct spl_view *view, struct place place)
+{
+    struct spl_frame frame, again;
+    if (!world_render(suite, world, &place, view, &frame))
+        return;
+    check_kinds(suite, world, view, &frame, place);
     /* another view in between, so that nothing of this one is left over by chance */
     struct spl_view other = *view;
     other.camera.cx += 40;

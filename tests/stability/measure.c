@@ -17,7 +17,8 @@ struct spl_metrics measure_frame(const struct world *world, const struct spl_vie
     if (!radius || spl_tolerance_create(world->dataset, &tolerance, &err))
         abort();
     spl_tolerance_fill(tolerance, view, &images[SPL_LAYER_ID], &images[SPL_LAYER_DEPTH], 0, radius);
-    const struct spl_picture image = {&images[SPL_LAYER_COLOR], &images[SPL_LAYER_DEPTH], &images[SPL_LAYER_NORMAL],
+    const struct spl_picture image = {&images[SPL_LAYER_COLOR], &images[SPL_LAYER_DEPTH],
+                                      images[SPL_LAYER_NORMAL].pixels ? &images[SPL_LAYER_NORMAL] : NULL,
                                       &images[SPL_LAYER_COVERAGE]};
     const struct spl_picture reference = {&truth[SPL_LAYER_COLOR], &truth[SPL_LAYER_DEPTH], &truth[SPL_LAYER_NORMAL],
                                           &truth[SPL_LAYER_COVERAGE], .tolerance_m = radius};

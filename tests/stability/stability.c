@@ -9,9 +9,11 @@
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
  * prints what passes as well. Exit code 77: no such device here. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
+#include "conditions.h"
 #include "themes.h"
 
 enum { SKIPPED = 77 };
@@ -92,19 +94,42 @@ static int run_plant(struct suite *suite, const char *name)
     return 2;
 }
 
+static int run_conditions(struct suite *suite, struct conditions *conditions)
+{
+    char path[512];
+    const char *root = getenv("SPLATD_SOURCE_ROOT");
+    snprintf(path, sizeof path, "%s/tests/stability/table.json", root ? root : ".");
+    if (!open_renderer("vulkan", &suite->renderer))
+        return SKIPPED;
+    open_renderer("egl", &suite->other);
+    conditions->suite = suite;
+    conditions->table = table_open(path);
+    conditions_of_scans(conditions);
+    conditions_of_views(conditions);
+    conditions_of_shapes(conditions);
+    if (!conditions->only && !(conditions->update && suite->whole))
+        table_find_stale(conditions->table, &suite->report, suite->whole);
+    if (conditions->update)
+        table_save(conditions->table, suite->whole && !conditions->only);
+    table_close(conditions->table);
+    return report_finish(&suite->report);
+}
+
 int main(int argc, char **argv)
 {
     struct suite suite = {0};
     const char *words[8] = {"", ""};
     int count = 0, rc = 2;
-    bool update = false;
+    struct conditions conditions = {0};
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--whole"))
             suite.whole = true;
         else if (!strcmp(argv[i], "--verbose"))
             suite.report.verbose = true;
         else if (!strcmp(argv[i], "--update"))
-            update = true;
+            conditions.update = true;
+        else if (!strcmp(argv[i], "--pictures") && i + 1 < argc)
+            conditions.pictures = argv[++i];
         else if (count < 7)
             words[count++] = argv[i];
     }
@@ -112,12 +137,13 @@ int main(int argc, char **argv)
         rc = run_invariants(&suite, words[1], words + 2);
     else if (!strcmp(words[0], "drivers"))
         rc = run_drivers(&suite);
+    else if (!strcmp(words[0], "conditions"))
+        conditions.only = *words[1] ? words[1] : NULL, rc = run_conditions(&suite, &conditions);
     else if (!strcmp(words[0], "plant"))
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
         fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [--update] | plant "
                         "half-pixel|margin-0|pop [--whole]\n");
-    (void)update;
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);
     return rc;

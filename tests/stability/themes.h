@@ -13,4 +13,8 @@ void check_motion(struct suite *suite);   /* no pop along a dolly, a turn, an ap
 void check_layers(struct suite *suite);   /* finite, in range, layers agree with each other; equal bytes on repeat */
 void check_drivers(struct suite *suite);  /* suite->renderer against suite->other */
 
+/* Holds one frame to what each of its layers may hold; a frame of all layers. */
+void check_kinds(struct suite *suite, const struct world *world, const struct spl_view *view,
+                 const struct spl_frame *frame, struct place place);
+
 #endif

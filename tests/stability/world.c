@@ -14,7 +14,7 @@
 #include "support/make_dataset.h"
 #include "synth/exact.h"
 
-enum { TRUTH_SAMPLES = 8 };
+enum { TRUTH_SAMPLES = 4 };
 
 static void must(int rc, const char *what, const struct spl_error *err)
 {

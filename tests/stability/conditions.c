@@ -1,0 +1,143 @@
+/* Measures rows of the table. A row is a condition, its value and a method, at lod 1 and the defaults of everything
+ * else; its truth is exact and its scan's seed fixed, so its figures change only when the packer or the renderer does.
+ * Where there are two devices the second one's frame is held against the same row. */
+#include "conditions.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "measure.h"
+#include "themes.h"
+
+static const double step_px = 1.5;
+
+static void must(int rc, const struct spl_error *err)
+{
+    if (!rc)
+        return;
+    fprintf(stderr, "conditions: %s\n", err->message);
+    exit(1);
+}
+
+bool conditions_wants(const struct conditions *c, const char *condition)
+{
+    return !c->only || !strcmp(c->only, condition);
+}
+
+/* The view from 1.5 pixels further right, as seen at the harmonic mean of the truth's depths. */
+static struct spl_view step_aside(const struct spl_view *view, const struct spl_image *depth)
+{
+    const float *z = depth->pixels;
+    double near = 0, count = 0;
+    for (size_t i = 0; i < (size_t)depth->width * depth->height; i++)
+        if (isfinite(z[i])) {
+            near += 1 / (double)z[i];
+            count++;
+        }
+    struct spl_view aside = *view;
+    for (int a = 0; a < 3 && count; a++)
+        aside.camera.eye[a] += view->camera.rotation[a] * step_px / view->camera.fx * count / near;
+    return aside;
+}
+
+/* Image and truth side by side, over grey, as DIRECTORY/CONDITION-VALUE-METHOD.png. */
+static void save_picture(const char *directory, const struct row *row, const struct spl_image *image,
+                         const struct spl_image *truth)
+{
+    struct spl_image both = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 2 * image->width, image->height, NULL};
+    uint8_t *out = both.pixels = malloc(8 * (size_t)image->width * image->height);
+    struct spl_encoded encoded = {0};
+    struct spl_error err = {0};
+    char path[512];
+    if (!out)
+        abort();
+    for (size_t y = 0; y < both.height; y++)
+        for (size_t x = 0; x < both.width; x++) {
+            const struct spl_image *from = x < image->width ? image : truth;
+            const uint8_t *p = (const uint8_t *)from->pixels + 4 * (y * image->width + x % image->width);
+            for (int k = 0; k < 3; k++)
+                *out++ = (uint8_t)((p[3] * p[k] + (255 - p[3]) * 128 + 127) / 255);
+            *out++ = 255;
+        }
+    must(spl_image_encode(&both, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, &err), &err);
+    int length = snprintf(path, sizeof path, "%s/%s-%s-%s.png", directory, row->condition, row->value, row->method);
+    for (int i = (int)strlen(directory) + 1; i < length && i < (int)sizeof path; i++)
+        if (path[i] == ' ' || path[i] == '/')
+            path[i] = '_';
+    FILE *file = fopen(path, "wb");
+    if (!file || fwrite(encoded.bytes, encoded.length, 1, file) != 1)
+        fprintf(stderr, "%s: cannot be written\n", path);
+    if (file)
+        fclose(file);
+    spl_encoded_finish(&encoded);
+    spl_image_finish(&both);
+}
+
+/* The row's figures on the suite's renderer, flicker on the first one only; false after a failure was reported. */
+static bool measure(struct conditions *c, const struct world *world, const struct spl_view views[2],
+                    struct spl_image truths[2][SPL_LAYER_COUNT], bool first, struct row *row)
+{
+    struct place place = {row->condition, row->value, row->method, NULL};
+    struct spl_motion motion;
+    struct spl_error err = {0};
+    bool rendered = true;
+    spl_motion_init(&motion);
+    for (int i = 0; i < (first ? 2 : 1) && rendered; i++) {
+        struct spl_frame frame;
+        rendered = world_render(c->suite, world, &place, &views[i], &frame);
+        if (!rendered)
+            break;
+        must(spl_motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truths[i][SPL_LAYER_COLOR], 0, &err), &err);
+        check_kinds(c->suite, world, &views[i], &frame, place);
+        if (i == 0) {
+            struct spl_metrics m = measure_frame(world, &views[0], &frame, truths[0]);
+            const double figures[FIGURE_COUNT] = {
+                [FIGURE_PSNR] = m.psnr,
+                [FIGURE_SSIM] = m.ssim,
+                [FIGURE_HOLES] = m.holes,
+                [FIGURE_SEE_THROUGH] = m.see_through,
+                [FIGURE_HALO] = m.halo,
+                [FIGURE_DEPTH_BEYOND] = m.depth_beyond,
+                [FIGURE_DEPTH_MEDIAN] = m.depth_median,
+                [FIGURE_NORMAL_MEDIAN] = m.normal_median,
+            };
+            memcpy(row->figures, figures, FIGURE_FLICKER * sizeof *figures);
+            if (c->pictures && first && frame.images[SPL_LAYER_COLOR].width <= 1024)
+                save_picture(c->pictures, row, &frame.images[SPL_LAYER_COLOR], &truths[0][SPL_LAYER_COLOR]);
+        }
+        spl_frame_finish(&frame);
+    }
+    spl_motion_finish(&motion, first ? &row->figures[FIGURE_FLICKER] : NULL, NULL);
+    return rendered;
+}
+
+void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
+                        const char *condition, const char *value, bool whole_only)
+{
+    if (!conditions_wants(c, condition) || (whole_only && !c->suite->whole))
+        return;
+    struct spl_image truths[2][SPL_LAYER_COUNT];
+    truth_render(world, &view->camera, truths[0]);
+    struct spl_view views[2] = {*view, step_aside(view, &truths[0][SPL_LAYER_DEPTH])};
+    truth_render(world, &views[1].camera, truths[1]);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct row row = {condition, value, spl_method_name((enum spl_method)method), whole_only, {0}};
+        views[0].method = views[1].method = (enum spl_method)method;
+        bool measured = measure(c, world, views, truths, true, &row);
+        if (measured && c->update)
+            table_put(c->table, &row);
+        if (measured)
+            table_judge(c->table, &c->suite->report, &row, spl_renderer_get_device(c->suite->renderer)->backend);
+        if (!c->suite->other)
+            continue;
+        struct spl_renderer *renderer = c->suite->renderer;
+        c->suite->renderer = c->suite->other;
+        if (measure(c, world, views, truths, false, &row))
+            table_judge(c->table, &c->suite->report, &row, spl_renderer_get_device(c->suite->other)->backend);
+        c->suite->renderer = renderer;
+    }
+    truth_finish(truths[0]);
+    truth_finish(truths[1]);
+}

@@ -1,0 +1,29 @@
+/* What degrades: each condition measured against the truth, for the table. */
+#ifndef STABILITY_CONDITIONS_H
+#define STABILITY_CONDITIONS_H
+
+#include "table.h"
+#include "world.h"
+
+struct conditions {
+    struct suite *suite; /* .renderer writes the table, .other (may be NULL) is held against it */
+    struct table *table;
+    const char *only;     /* the one condition that is measured; may be NULL */
+    const char *pictures; /* a folder for a picture of each row; may be NULL */
+    bool update;
+};
+
+/* Every method's row of one view; `whole_only` where the small form leaves it out. The second frame, for flicker, is
+ * from an eye that moved sideways by 1.5 pixels of what is in the middle. Also holds every frame to what its layers
+ * are. */
+void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
+                        const char *condition, const char *value, bool whole_only);
+
+/* Is this condition to be measured? */
+bool conditions_wants(const struct conditions *c, const char *condition);
+
+void conditions_of_scans(struct conditions *c);  /* density, noise, poses, echoes; thin, stepped, leafy, fine things */
+void conditions_of_views(struct conditions *c);  /* where the eye is, what it takes in, how large the image is */
+void conditions_of_shapes(struct conditions *c); /* degenerate neighbourhoods */
+
+#endif
