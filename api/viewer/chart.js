@@ -33,7 +33,7 @@ export class Chart {
 
   /** `frame` as the stage reports it, `setting` what was asked for. */
   show(frame, setting) {
-    if (!this.axes) return;
+    if (!this.axes || frame.stages.frame === undefined) return;
     const used = frame.chosen ?? {method: "splat", lod: 1, supersample: 1, ...setting};
     const known = this.profile.points.find((p) => p.method === used.method && p.lod === Number(used.lod)
       && p.supersample === Number(used.supersample));

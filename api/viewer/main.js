@@ -81,8 +81,9 @@ function showFrame({detail: frame}) {
   $("legend").hidden = !distances;
   const [near, far] = $("legend").querySelectorAll("span");
   if (distances) [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} m`);
-  const took = frame.stages.frame + (frame.stages.encode ?? 0);
-  $("facts").textContent = `${frame.width} × ${frame.height}, ${took.toFixed(0)} ms${frame.full ? "" : ", coarse"}`;
+  const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
+  const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
+  $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;
   chart.show(frame, frame.full ? stage.settings : {});
   if (!frame.full) return;
   const {chosen, promised, demand} = frame;
