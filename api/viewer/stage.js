@@ -133,8 +133,10 @@ export class Stage extends EventTarget {
     }, ms);
   }
 
-  /** Asks for the frame that is missing, if one is and none is on its way. */
+  /** Asks for the frame that is missing, if one is and none is on its way. The element has the class "rest" while the picture
+   * is all that was asked for. */
   async pump() {
+    this.element.classList.toggle("rest", !this.moving && Boolean(this.shown?.full) && same(this.shown.camera, rounded(this.camera)));
     if (!this.dataset || this.flight || this.blocked || document.hidden) return;
     const full = !this.moving;
     if (!full) this.later(this.restAt - performance.now() + 1);

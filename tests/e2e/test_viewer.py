@@ -24,8 +24,7 @@ if not browser.BINARY:
     sys.exit(77)
 
 FACING = "#dataset=wall&eye=3,0,1&target=0,0,1&up=0,0,1&fov=50"
-REST = ("(c => !c.hidden && !c.style.transform)(document.querySelector('canvas'))"
-        " && !(document.querySelector('#facts')?.textContent ?? '').includes('coarse')")
+REST = "document.querySelector('#stage').classList.contains('rest')"
 # A digest of the pixels on screen, and how many colours there are among some of them.
 DIGEST = """(() => { const c = document.querySelector('canvas'), copy = new OffscreenCanvas(c.width, c.height).getContext('2d');
     copy.drawImage(c, 0, 0);
@@ -57,7 +56,6 @@ def page(url=f"{SITE}/{FACING}", ready=REST, complaints=r"(?!)", **how):
 
 def settled(tab, before=None):
     """Digest of the picture at rest; other than `before` if that is given."""
-    time.sleep(0.2)  # a motion ends 160 ms after its last step
     tab.until(REST)
     if before is not None:
         tab.until(f"JSON.stringify({DIGEST}) !== {json.dumps(json.dumps(before, separators=(',', ':')))}", "another picture")
@@ -72,7 +70,7 @@ def link(tab):
 
 def moved(tab, camera):
     """Waits until the fragment has another eye or target, at rest."""
-    settled(tab)
+    tab.until(REST)
     return next_link(tab, lambda now: now["eye"] != camera["eye"] or now["target"] != camera["target"])
 
 
