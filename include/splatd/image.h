@@ -68,4 +68,7 @@ int spl_layer_from_name(const char *name);
 const char *spl_format_name(enum spl_format format);
 int spl_format_from_name(const char *name);
 
+/* "image/jpeg", …; static. */
+const char *spl_format_media_type(enum spl_format format);
+
 #endif

@@ -15,16 +15,18 @@ static const struct {
     const char *name;
     enum spl_pixel_type type;
 } layers[SPL_LAYER_COUNT] = {
-    [SPL_LAYER_COLOR] = {"color", SPL_PIXEL_RGBA8},   [SPL_LAYER_DEPTH] = {"depth", SPL_PIXEL_F32},
-    [SPL_LAYER_RANGE] = {"range", SPL_PIXEL_F32},     [SPL_LAYER_NORMAL] = {"normal", SPL_PIXEL_F32X3},
-    [SPL_LAYER_ID] = {"id", SPL_PIXEL_U32},           [SPL_LAYER_COVERAGE] = {"coverage", SPL_PIXEL_F32},
+    [SPL_LAYER_COLOR] = {"color", SPL_PIXEL_RGBA8}, [SPL_LAYER_DEPTH] = {"depth", SPL_PIXEL_F32},
+    [SPL_LAYER_RANGE] = {"range", SPL_PIXEL_F32},   [SPL_LAYER_NORMAL] = {"normal", SPL_PIXEL_F32X3},
+    [SPL_LAYER_ID] = {"id", SPL_PIXEL_U32},         [SPL_LAYER_COVERAGE] = {"coverage", SPL_PIXEL_F32},
 };
 
-static const char *const formats[SPL_FORMAT_COUNT] = {
-    [SPL_FORMAT_JPEG] = "jpeg",
-    [SPL_FORMAT_PNG] = "png",
-    [SPL_FORMAT_NPY] = "npy",
-    [SPL_FORMAT_RAW] = "raw",
+static const struct {
+    const char *name, *media_type;
+} formats[SPL_FORMAT_COUNT] = {
+    [SPL_FORMAT_JPEG] = {"jpeg", "image/jpeg"},
+    [SPL_FORMAT_PNG] = {"png", "image/png"},
+    [SPL_FORMAT_NPY] = {"npy", "application/x-npy"},
+    [SPL_FORMAT_RAW] = {"raw", "application/octet-stream"},
 };
 
 const char *spl_layer_name(enum spl_layer layer)
@@ -42,15 +44,20 @@ int spl_layer_from_name(const char *name)
 
 const char *spl_format_name(enum spl_format format)
 {
-    return (unsigned)format < SPL_FORMAT_COUNT ? formats[format] : "unknown";
+    return (unsigned)format < SPL_FORMAT_COUNT ? formats[format].name : "unknown";
 }
 
 int spl_format_from_name(const char *name)
 {
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)
-        if (!strcmp(name, formats[i]))
+        if (!strcmp(name, formats[i].name))
             return i;
     return strcmp(name, "jpg") ? -1 : SPL_FORMAT_JPEG;
+}
+
+const char *spl_format_media_type(enum spl_format format)
+{
+    return (unsigned)format < SPL_FORMAT_COUNT ? formats[format].media_type : formats[SPL_FORMAT_RAW].media_type;
 }
 
 uint32_t spl_pixel_bytes(enum spl_pixel_type type)
@@ -112,6 +119,7 @@ int spl_image_encode(const struct spl_image *image, const struct spl_encode_opti
     default:
         rc = spl_encode_raw(image, out, err);
     }
+    out->media_type = spl_format_media_type(options->format);
     if (rc)
         spl_encoded_finish(out);
     return rc;

@@ -55,7 +55,6 @@ int spl_encode_jpeg(const struct spl_image *image, int quality, struct spl_encod
         return spl_fail_field(err, SPL_E_LIMIT, image->width > JPEG_SIDE_MAX ? "width" : "height",
                               "%u x %u pixels: a JPEG has at most %d on a side; ask for PNG", image->width,
                               image->height, JPEG_SIDE_MAX);
-    out->media_type = "image/jpeg";
     if (image->layer == SPL_LAYER_COLOR)
         return compress(image->pixels, TJPF_RGBX, image, quality, out, err);
 

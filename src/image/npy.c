@@ -54,12 +54,10 @@ static int store(const struct spl_image *image, const char *header, size_t heade
 int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err)
 {
     char header[NPY_HEADER_MAX];
-    out->media_type = "application/x-npy";
     return store(image, header, make_header(image, header), out, err);
 }
 
 int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err)
 {
-    out->media_type = "application/octet-stream";
     return store(image, "", 0, out, err);
 }

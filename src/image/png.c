@@ -35,7 +35,7 @@ static void *allocate_zeroed(size_t count, size_t size)
 struct sink {
     uint8_t *bytes;
     size_t length, capacity;
-    bool refused;           /* libspng forgets why a write failed */
+    bool refused; /* libspng forgets why a write failed */
 };
 
 static int append(spng_ctx *ctx, void *user, void *bytes, size_t length)
@@ -76,13 +76,13 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
     if (!ctx)
         return fail(image, SPNG_EMEM, err);
     struct sink sink = {0};
-    struct spng_ihdr header = {.width = image->width, .height = image->height, .bit_depth = shape->bit_depth,
-                               .color_type = shape->color_type};
+    struct spng_ihdr header = {
+        .width = image->width, .height = image->height, .bit_depth = shape->bit_depth, .color_type = shape->color_type};
     size_t bytes = (size_t)image->width * image->height * shape->pixel_bytes;
     /* what the numbers of a depth image mean travels with the file; libspng borrows the text until it is encoded */
     char text[96];
-    int length = snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther",
-                          depth_scale);
+    int length =
+        snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther", depth_scale);
     struct spng_text note = {.keyword = "Depth-Scale", .type = SPNG_TEXT, .length = (size_t)length, .text = text};
 
     int status = spng_set_png_stream(ctx, append, &sink);
@@ -106,7 +106,6 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
 
 int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err)
 {
-    out->media_type = "image/png";
     struct shape shape = {SPNG_COLOR_TYPE_TRUECOLOR_ALPHA, 8, image->pixels, 4};
     if (image->layer == SPL_LAYER_COLOR || image->layer == SPL_LAYER_ID)
         return compress(image, &shape, depth_scale, out, err);

@@ -126,6 +126,14 @@ static json_t *describe_limits(const struct spl_service_options *options)
     return json;
 }
 
+static json_t *describe_cache(const struct spl_cache *cache)
+{
+    struct spl_cache_status status;
+    spl_cache_get_status(cache, &status);
+    return json_pack("{s:o, s:o, s:o, s:o}", "entries", count(status.entries), "bytes", count(status.bytes),
+                     "limit_bytes", count(status.limit_bytes), "evictions", count(status.evictions));
+}
+
 static json_t *describe_queue(size_t length, size_t capacity)
 {
     return json_pack("{s:o, s:o}", "length", count(length), "capacity", count(capacity));
@@ -153,6 +161,7 @@ json_t *spl_describe_status(struct request *request)
         json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
                   count(status.device_limit_bytes), "resident_bytes", count(spl_resident_bytes()), "reply_bytes",
                   count(service->reply_bytes)));
+    set(json, "cache", describe_cache(service->cache));
     set(json, "queues",
         json_pack("{s:o, s:o}", "render", describe_queue(status.render_length, status.render_capacity), "encode",
                   describe_queue(status.encode_length, status.encode_capacity)));

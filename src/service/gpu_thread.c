@@ -14,6 +14,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "service/key.h"
 #include "service/stages.h"
 
 enum { rebuilds_max = 3 };
@@ -65,6 +66,7 @@ static int build(struct gpu *gpu, struct spl_error *err)
     pthread_mutex_lock(&pipeline->mutex);
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
+    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
     TAILQ_FOREACH(entry, &gpu->entries, resident)
     {
         spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
@@ -266,6 +268,9 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
         else
             atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
         job->stats = job->frame.stats;
+        const struct spl_device_info *device = spl_renderer_get_device(gpu->renderer);
+        job->renderer = atomic_load(&pipeline->renderer);
+        snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
         if (job->plan && !job->stats.pages_loaded) // loading is no property of the setting
             spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
         rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);

@@ -1,10 +1,10 @@
 /* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer,
- * and a request whose view is being made is suspended, so that nothing here ever blocks.
+ * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
  * Limits: the connection pool bounds request line and headers together; the request line has its own, smaller bound, so
  * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
  * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes
- * does not extend. Invariant: a suspended request is in `waiting` and has a job. Owned by the loop's thread. */
+ * does not extend. Invariant: a suspended request is in `waiting`. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,7 +128,7 @@ static void on_completed(void *context, struct MHD_Connection *handle, void **re
     if (!request)
         return;
     spl_access_log_write(request, code);
-    spl_assert(!request->job);
+    spl_assert(!request->waits);
     enter(request->connection, PHASE_IDLE);
     service->requests_open--;
     if (request->response)
@@ -231,7 +231,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         else
             spl_route(request, method);
     }
-    return request->job ? MHD_YES : send_reply(request);
+    return request->waits ? MHD_YES : send_reply(request);
 }
 
 static void on_timer(uv_timer_t *timer)

@@ -244,6 +244,11 @@ enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline)
     return (enum spl_pipeline_state)atomic_load(&pipeline->state);
 }
 
+uint64_t spl_pipeline_get_renderer(struct spl_pipeline *pipeline)
+{
+    return atomic_load(&pipeline->renderer);
+}
+
 const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline)
 {
     spl_assert(spl_pipeline_get_state(pipeline) == SPL_PIPELINE_FAILED);

@@ -22,15 +22,20 @@ struct spl_job {
     struct spl_catalog_entry *entry;   /* one reference; may be NULL in tests, as may `plan` */
     const struct spl_dataset *dataset; /* of it */
     struct spl_view_request request;
-    uint64_t accepted_ns, deadline_ns;
-    atomic_bool dropped; /* set by the loop at any time: nobody waits for it, skip the work */
-    void *owner;         // owned by: loop
+    uint64_t accepted_ns;
+    _Atomic uint64_t deadline_ns;      /* the loop may raise it at any time */
+    atomic_bool dropped;               /* set by the loop at any time: nobody waits for it, skip the work */
+    void *owner;                       // owned by: loop
+    void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
 
     struct spl_frame frame; /* between gpu and encode */
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
     size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
     double queue_ms, encode_ms;
+    uint64_t renderer;              /* spl_renderer_hash() of what rendered it */
+    char device[300];               /* the same in words */
+    const char *route;              /* for statistics; static, NULL: none */
     struct spl_plan *plan;          /* of `entry`; NULL: nothing is planned */
     struct spl_choice choice;       /* where request.planned */
     double promised_ms;             /* the same */
@@ -83,6 +88,9 @@ void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *e
 struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline);
 
 enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline);
+
+/* spl_renderer_hash() of what renders at present; 0 before the first. */
+uint64_t spl_pipeline_get_renderer(struct spl_pipeline *pipeline);
 
 /* Why it failed; only once the state is SPL_PIPELINE_FAILED. */
 const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);

@@ -1,14 +1,13 @@
 /* Replies: JSON, RFC 9457 problems, and encoded views with the headers that say what their pixels mean.
  *
  * Bytes of a view are handed to MHD as they came from the encoder, without a copy. Owned by the loop's thread. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "base/memory.h"
+#include "service/headers.h"
 #include "service/state.h"
 
 static void header(struct request *request, const char *name, const char *format, ...)
@@ -89,106 +88,82 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
         header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", spl_pipeline_get_retry_after(request->service->pipeline));
 }
 
-static void add_camera(struct request *request, const struct spl_camera *camera)
+static void add_headers(struct request *request, const char *text)
 {
-    const double *r = camera->rotation, *eye = camera->eye;
-    char far[32] = "null"; // JSON has no infinity
-    if (isfinite(camera->far))
-        snprintf(far, sizeof far, "%.9g", camera->far);
-    header(request, "Splatd-Camera",
-           "{\"eye\":[%.17g,%.17g,%.17g],\"rotation\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g],"
-           "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
-           eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
-           camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+    for (const char *name = text, *value; (value = spl_headers_value(name)); name = spl_headers_next(value))
+        MHD_add_response_header(request->response, name, value);
 }
 
-static void add_depth(struct request *request, const struct spl_job *job)
+static void add_validator(struct request *request, const struct spl_key *key)
 {
-    const struct spl_view_request *view = &job->request;
-    if (view->layer != SPL_LAYER_DEPTH && view->layer != SPL_LAYER_RANGE)
-        return;
-    header(request, "Splatd-Depth-Unit", "m");
-    switch (view->encode.format) {
-    case SPL_FORMAT_PNG:
-        header(request, "Splatd-Depth-Scale", "%.17g", view->encode.depth_scale);
-        header(request, "Splatd-Depth-Invalid", "0");
-        header(request, "Splatd-Depth-Saturated", "%llu", (unsigned long long)job->encoded.saturated);
-        break;
-    case SPL_FORMAT_JPEG:
-        header(request, "Splatd-Depth-Near", "%.9g", (double)job->encoded.near);
-        header(request, "Splatd-Depth-Far", "%.9g", (double)job->encoded.far);
-        break;
-    default:
-        header(request, "Splatd-Depth-Scale", "1");
-        header(request, "Splatd-Depth-Invalid", "NaN");
-        break;
-    }
+    char etag[SPL_ETAG_BYTES];
+    spl_key_etag(key, etag);
+    MHD_add_response_header(request->response, MHD_HTTP_HEADER_ETAG, etag);
+    // what not everybody may see is kept by clients, not by proxies
+    const char *forever =
+        request->service->access ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable";
+    MHD_add_response_header(request->response, MHD_HTTP_HEADER_CACHE_CONTROL,
+                            request->versioned ? forever : "no-cache");
 }
 
-/* What was chosen, what was promised, what it took. Such bytes depend on how busy the machine was: nobody keeps them.
- */
-static void add_plan(struct request *request, const struct spl_job *job)
+static void release_rendering(void *rendering)
 {
-    const struct spl_choice *choice = &job->choice;
-    uint64_t now = spl_now_ns();
-    if (job->plan)
-        spl_plan_learn_reply(job->plan, &job->request, (double)(now - job->rendered_ns) / SPL_NS_PER_MS);
-    if (!job->plan || !job->request.planned)
-        return;
-    double took_ms = (double)(now - job->began_ns) / SPL_NS_PER_MS;
-    bool late = took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
-    char psnr[32] = "";
-    if (isfinite(choice->psnr))
-        snprintf(psnr, sizeof psnr, "; psnr=%.2f", choice->psnr);
-    header(request, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g", spl_method_name(choice->setting.method),
-           choice->setting.lod, choice->setting.supersample);
-    header(request, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
-    header(request, "Splatd-Took", "ms=%.2f", took_ms);
-    header(request, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");
-    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
+    spl_rendering_unref(rendering);
 }
 
-/* Encoded bytes on their way to a client. */
-struct outgoing {
-    struct spl_service *service;
-    struct spl_encoded encoded;
-};
-
-static void release_outgoing(void *context)
+void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin)
 {
-    struct outgoing *outgoing = context;
-    outgoing->service->reply_bytes -= outgoing->encoded.length;
-    spl_encoded_finish(&outgoing->encoded);
-    free(outgoing);
-}
-
-void spl_reply_view(struct request *request, struct spl_job *job)
-{
-    struct spl_pipeline_status status;
-    struct outgoing *outgoing = spl_alloc(1, sizeof *outgoing, NULL);
-    if (!outgoing)
-        return;
+    struct spl_encoded *encoded = &rendering->encoded;
     request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback_cls(job->encoded.length, job->encoded.bytes,
-                                                                               release_outgoing, outgoing);
-    if (!request->response) {
-        free(outgoing);
+    request->response = MHD_create_response_from_buffer_with_free_callback_cls(encoded->length, encoded->bytes,
+                                                                               release_rendering, rendering);
+    if (!request->response)
         return;
+    spl_rendering_ref(rendering);
+    add_headers(request, rendering->headers);
+    if (!strcmp(origin, "hit"))
+        header(request, "Server-Timing", "cache, total;dur=%.3f",
+               (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
+    else
+        header(request, "Server-Timing", "%s, total;dur=%.3f", rendering->timing,
+               (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
+    header(request, "Splatd-Cache", "%s", origin);
+    if (!rendering->reusable)
+        header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
+    else if (request->validated)
+        add_validator(request, &rendering->key);
+}
+
+void spl_reply_not_modified(struct request *request, const struct spl_key *key)
+{
+    request->status = MHD_HTTP_NOT_MODIFIED;
+    request->response = MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT);
+    if (request->response)
+        add_validator(request, key);
+}
+
+static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
+{
+    (void)context;
+    (void)position;
+    (void)buffer;
+    (void)size;
+    return MHD_CONTENT_READER_END_OF_STREAM;
+}
+
+void spl_reply_view_head(struct request *request, const struct spl_view_request *view, const struct spl_key *key)
+{
+    struct spl_headers headers;
+    spl_headers_open(&headers);
+    spl_headers_add_layer(&headers, view, view->layer, NULL);
+    spl_headers_add_camera(&headers, &view->view.camera);
+    if (!spl_headers_close(&headers))
+        return;
+    request->status = MHD_HTTP_OK; // of unknown length: a GET's Content-Length is known only once it is rendered
+    request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 16, read_nothing, NULL, NULL);
+    if (request->response) {
+        add_headers(request, headers.text);
+        add_validator(request, key);
     }
-    *outgoing = (struct outgoing){request->service, job->encoded};
-    request->service->reply_bytes += job->encoded.length;
-    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", job->encoded.media_type);
-    const struct spl_frame_stats *s = &job->stats;
-    header(request, "Server-Timing",
-           "queue;dur=%.3f, frame;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, resolve;dur=%.3f, "
-           "readback;dur=%.3f, encode;dur=%.3f, total;dur=%.3f",
-           job->queue_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms, s->readback_ms,
-           job->encode_ms, (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
-    add_camera(request, &job->request.view.camera);
-    add_depth(request, job);
-    add_plan(request, job);
-    job->encoded = (struct spl_encoded){0}; // the response owns the bytes
-    header(request, "Splatd-Complete", "%s", s->complete ? "true" : "false");
-    spl_pipeline_get_status(request->service->pipeline, &status);
-    header(request, "Splatd-Device", "%s: %s", status.device.backend, status.device.name);
+    free(headers.text);
 }

@@ -79,6 +79,13 @@ static int resolve_demand(const struct values *values, struct spl_view_request *
     return 0;
 }
 
+static void resolve_version(const struct values *values, struct spl_view_request *out)
+{
+    const struct spl_value *v = &values->v[PARAM_v];
+    out->versioned = v->given;
+    out->version = v->given ? (uint64_t)v->n[0] << 32 | (uint64_t)v->n[1] : 0;
+}
+
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
@@ -89,5 +96,6 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
         (rc = resolve_drawing(values, out, err)) || (rc = resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, out, err)))
         return rc;
+    resolve_version(values, out);
     return spl_view_check(&out->view, err);
 }

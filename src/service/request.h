@@ -15,6 +15,8 @@ struct spl_view_request {
     struct spl_view view; /* deadline_ns is left at "none" */
     enum spl_layer layer; /* the one bit of view.layers */
     struct spl_encode_options encode;
+    bool versioned; /* v was given: only this version of the dataset will do */
+    uint64_t version;
     bool planned;             /* budget or psnr was given: the service chooses what demand.keep_* leaves open */
     struct spl_demand demand; /* extra_ms is left at 0 */
 };

@@ -184,8 +184,9 @@ void spl_route(struct request *request, const char *method)
     }
     if (!spl_access_admit(request, method))
         return;
+    request->head = !strcmp(method, MHD_HTTP_METHOD_HEAD);
     unsigned wanted = 0, allowed = 0, count = sizeof methods / sizeof *methods;
-    const char *name = strcmp(method, MHD_HTTP_METHOD_HEAD) ? method : MHD_HTTP_METHOD_GET;
+    const char *name = request->head ? MHD_HTTP_METHOD_GET : method;
     while (wanted < count && strcmp(name, methods[wanted]))
         wanted++;
     for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {

@@ -237,7 +237,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     if ((rc = open_sockets(service, err)) || (rc = spl_access_init(service, err)) ||
         (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
                                err)) ||
-        (rc = start_pipeline(service, err)))
+        (rc = spl_cache_create(options->cache_bytes, &service->cache, err)) || (rc = start_pipeline(service, err)))
         goto done;
     spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);
@@ -249,6 +249,7 @@ done:
     spl_library_stop(service);
     spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_pipeline_destroy(service->pipeline);
+    spl_cache_destroy(service->cache);
     free(service->entries);
     spl_access_finish(service);
     if (service->listen_fd >= 0)

@@ -16,10 +16,10 @@ struct spl_pipeline {
     size_t encode_started;
     bool gpu_started;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
-    _Atomic uint64_t device_bytes, device_limit_bytes, frame_ns;
+    _Atomic uint64_t device_bytes, device_limit_bytes, frame_ns, renderer;
     _Atomic uint64_t moved_ns; /* when a thread last began or ended a step of its work */
-    atomic_int state;         /* enum spl_pipeline_state */
-    struct spl_error failure; /* written by the gpu thread before state becomes FAILED */
+    atomic_int state;          /* enum spl_pipeline_state */
+    struct spl_error failure;  /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
     pthread_cond_t released;
     size_t frame_bytes;                       // guarded by: mutex; pixels of all frames between gpu and encode

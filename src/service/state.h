@@ -9,6 +9,7 @@
 
 #include "service/access.h"
 #include "service/access_log.h"
+#include "service/cache.h"
 #include "service/catalog.h"
 #include "service/latency.h"
 #include "service/pipeline.h"
@@ -37,9 +38,20 @@ struct connection {
     uint64_t sent_bytes; /* at the end of the last request that was logged */
 };
 
+/* A claim on a view that is on its way; in the caller's storage. */
+struct ticket {
+    LIST_ENTRY(ticket) link; // flight.tickets
+    struct flight *flight;   // NULL: nothing is claimed
+    uint64_t deadline_ns;
+    const char *route; /* for statistics; static, NULL: none */
+    bool shared;       /* it was on its way for another request already */
+    /* Once, unless it is dropped: the rendering, borrowed, or NULL and why not. */
+    void (*done)(struct ticket *ticket, struct spl_rendering *rendering, const struct spl_error *err);
+};
+
 /* One request, from its first line until its reply is written. */
 struct request {
-    LIST_ENTRY(request) link; // spl_service.waiting, while `job` is set
+    LIST_ENTRY(request) link; // spl_service.waiting, while `waits`
     struct spl_service *service;
     struct MHD_Connection *handle;
     struct connection *connection;
@@ -54,8 +66,13 @@ struct request {
     size_t body_length, body_capacity, body_seen;
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     bool started;
-    bool abandoned;                /* the client has left: close without a reply */
-    struct spl_job *job;           /* in the pipeline; NULL otherwise */
+    bool head;      /* the method is HEAD */
+    bool abandoned; /* the client has left: close without a reply */
+    bool waits;     /* suspended, until a view is ready or deadline_ns */
+    uint64_t deadline_ns;
+    struct ticket ticket;          /* of the view that it waits for */
+    bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
+    bool versioned;                /* the URL names the dataset's version */
     struct MHD_Response *response; // may be NULL
     unsigned status;
 };
@@ -101,8 +118,10 @@ struct spl_service {
     struct MHD_Daemon *daemon; // may be NULL
     LIST_HEAD(, connection) connections;
     LIST_HEAD(, request) waiting;
+    LIST_HEAD(, flight) flights;
+    struct spl_cache *cache;
     size_t waiting_count, requests_open, connections_open;
-    size_t reply_bytes; /* of views that clients have not read yet */
+    size_t reply_bytes; /* of views that clients have not read yet and that are not in the cache */
     bool leaving;       /* asked to stop: /readyz says no */
     bool draining;      /* nothing more is accepted */
     uint64_t drain_began_ns;
@@ -115,10 +134,18 @@ void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempote
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
 void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
 
-/* waiting.c: requests whose view is in the pipeline. */
-void spl_waiting_add(struct request *request, struct spl_job *job);
-void spl_waiting_complete(struct spl_service *service); /* answers every job that is done */
-void spl_waiting_sweep(struct spl_service *service);    /* deadlines and departures */
+/* flights.c: views on their way. Boards the flight of an equal request or launches one; SPL_E_BUSY when the queue is
+ * full. The caller has set ticket->deadline_ns, route and done, and keeps the ticket where it is until then or until it
+ * is dropped: the view is given up with its last ticket. */
+int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct spl_catalog_entry *entry,
+                     const struct spl_view_request *request, const struct spl_key *key, struct spl_error *err);
+void spl_ticket_drop(struct ticket *ticket); /* harmless where nothing is claimed */
+
+/* waiting.c: requests that wait for views. */
+void spl_waiting_add(struct request *request, uint64_t deadline_ns); /* suspends it */
+void spl_waiting_resume(struct request *request);                    /* its response is set */
+void spl_waiting_complete(struct spl_service *service);              /* hands out every job that is done */
+void spl_waiting_sweep(struct spl_service *service);                 /* deadlines and departures */
 void spl_waiting_refuse_all(struct spl_service *service);
 
 /* library.c: datasets that come, change and go while the service runs. */
@@ -130,7 +157,7 @@ void spl_library_stop(struct spl_service *service);         /* waits for the thr
 void spl_route(struct request *request, const char *method);
 
 /* What a route's handler is called with; valid during the call. */
-enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET: MHD leaves the body out */
+enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET as well: MHD leaves the body out */
 struct spl_call {
     enum spl_http_method method;
     char id[256];                    /* of the dataset in the path, decoded; "" without */
@@ -161,7 +188,12 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
 void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
-void spl_reply_view(struct request *request, struct spl_job *job);          /* takes job->encoded */
+
+/* The same for views. `origin` is Splatd-Cache's value. */
+void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin);
+void spl_reply_not_modified(struct request *request, const struct spl_key *key);
+/* What HEAD says of a view that nobody has rendered. */
+void spl_reply_view_head(struct request *request, const struct spl_view_request *view, const struct spl_key *key);
 
 /* describe.c: new references; NULL without memory. */
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);

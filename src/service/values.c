@@ -79,6 +79,18 @@ static int parse_duration(struct spl_value *value, const char *name, const char 
     return 0;
 }
 
+static int parse_version(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    size_t length = strspn(text, "0123456789abcdef");
+    if (length != 16 || text[length])
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no version; write the dataset's 16 hex digits",
+                              name, text);
+    uint64_t version = strtoull(text, NULL, 16);
+    value->n[0] = (double)(version >> 32);
+    value->n[1] = (double)(version & UINT32_MAX);
+    return 0;
+}
+
 static int flag_from_name(const char *name)
 {
     return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
@@ -99,6 +111,8 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_color(value, name, text, err);
     if (kind == SPL_KIND_DURATION)
         return parse_duration(value, name, text, err);
+    if (kind == SPL_KIND_VERSION)
+        return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)
         return spl_value_from_choice(value, (enum spl_value_kind)kind, name, text, err);
     int choice = table[kind].lookup(text);

@@ -17,6 +17,7 @@ enum {
     SPL_KIND_LAYER,
     SPL_KIND_FORMAT,
     SPL_KIND_DURATION, /* ms */
+    SPL_KIND_VERSION,  /* upper and lower 32 bits */
 };
 
 enum param {

@@ -1,8 +1,8 @@
-/* One view of a dataset: checked, then handed to the pipeline. Owned by the loop's thread. */
+/* One view of a dataset: checked, then answered from what is known, or rendered. Owned by the loop's thread. */
+#include <stddef.h>
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/memory.h"
 #include "service/state.h"
 
 static int parse_view(struct request *request, const struct spl_catalog_entry *entry, bool post,
@@ -19,34 +19,81 @@ static int parse_view(struct request *request, const struct spl_catalog_entry *e
     return rc;
 }
 
+static void answer(struct ticket *ticket, struct spl_rendering *rendering, const struct spl_error *err)
+{
+    struct request *request = (struct request *)((char *)ticket - offsetof(struct request, ticket));
+    if (err->code == SPL_E_TIMEOUT)
+        spl_count(&request->service->counters, deadline_missed);
+    if (rendering)
+        spl_reply_rendering(request, rendering, ticket->shared ? "shared" : "miss");
+    else
+        spl_reply_error(request, err);
+    spl_waiting_resume(request);
+}
+
+/* What can be said without rendering: the client has it, the cache has it, or HEAD does not want it. */
+static bool answer_at_once(struct request *request, const struct spl_view_request *view, const struct spl_key *key)
+{
+    struct spl_service *service = request->service;
+    char etag[SPL_ETAG_BYTES];
+    spl_key_etag(key, etag);
+    const char *known = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
+    if (request->validated && known && spl_etag_matches(known, etag)) {
+        spl_count(&service->counters, not_modified);
+        spl_reply_not_modified(request, key);
+        return true;
+    }
+    struct spl_rendering *rendering = spl_cache_find(service->cache, key);
+    if (rendering) {
+        spl_count(&service->counters, cache_hits);
+        spl_reply_rendering(request, rendering, "hit");
+        return true;
+    }
+    if (request->head)
+        spl_reply_view_head(request, view, key);
+    else
+        spl_count(&service->counters, cache_misses);
+    return request->head;
+}
+
+/* A URL that names a version means that one, whatever is served by now. */
+static int check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
+                         struct spl_error *err)
+{
+    if (!view->versioned || view->version == info->version)
+        return 0;
+    return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
+                          (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+}
+
 void spl_make_view(struct request *request, const struct spl_call *call)
 {
-    const struct spl_catalog_entry *entry = call->entry;
+    struct spl_catalog_entry *entry = call->entry;
     struct spl_service *service = request->service;
     struct spl_error err = {0};
     struct spl_view_request view;
-    struct spl_job *job = NULL;
-    if (parse_view(request, entry, call->method == SPL_POST, &view, &err))
+    struct spl_key key = {0};
+    if (parse_view(request, entry, call->method == SPL_POST, &view, &err) || check_version(&view, entry->info, &err))
         goto refuse;
+    if (!view.planned) {
+        key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->pipeline));
+        request->validated = call->method == SPL_GET;
+        request->versioned = view.versioned;
+        if (answer_at_once(request, &view, &key))
+            return;
+    }
     if (service->reply_bytes > reply_bytes_max) {
         spl_fail(&err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
         goto refuse;
     }
-    if (!(job = spl_alloc(1, sizeof *job, &err)))
-        goto refuse;
-    job->entry = spl_catalog_entry_ref(call->entry);
-    job->dataset = entry->dataset;
-    job->plan = entry->plan;
-    job->request = view;
-    job->accepted_ns = spl_now_ns();
-    job->deadline_ns = job->accepted_ns + service->options->deadline_ms * SPL_NS_PER_MS;
-    job->owner = request;
-    if (!spl_pipeline_submit(service->pipeline, job, &err)) {
-        spl_waiting_add(request, job);
+    request->ticket.done = answer;
+    request->ticket.route = request->route;
+    request->ticket.deadline_ns = spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS;
+    if (!spl_flight_board(service, &request->ticket, entry, &view, &key, &err)) {
+        spl_waiting_add(request, request->ticket.deadline_ns);
         return;
     }
     spl_count(&service->counters, refused_full);
 refuse:
-    spl_job_destroy(job);
     spl_reply_error(request, &err);
 }

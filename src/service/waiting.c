@@ -1,9 +1,9 @@
-/* Requests whose view is in the pipeline: their MHD connection is suspended until a job comes back, the deadline passes
- * or the client leaves.
+/* Requests that wait for views: their MHD connection is suspended until all is ready, the deadline passes or the client
+ * leaves.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
- * closed its sending side counts as gone, as with nginx. Invariant: request->job is set exactly while the request is in
- * the list; a job that was let go keeps no owner and is destroyed when it comes back. Owned by the loop's thread. */
+ * closed its sending side counts as gone, as with nginx. Invariant: request->waits is set exactly while the request is
+ * in the list. Owned by the loop's thread. */
 #include <poll.h>
 
 #include "base/clock.h"
@@ -16,39 +16,37 @@ static void on_timer(uv_timer_t *timer)
     spl_waiting_sweep(timer->data);
 }
 
-void spl_waiting_add(struct request *request, struct spl_job *job)
+void spl_waiting_add(struct request *request, uint64_t deadline_ns)
 {
     struct spl_service *service = request->service;
-    request->job = job;
+    request->waits = true;
+    request->deadline_ns = deadline_ns;
     LIST_INSERT_HEAD(&service->waiting, request, link);
     if (!service->waiting_count++)
         uv_timer_start(&service->wait_timer, on_timer, sweep_ms, sweep_ms);
     MHD_suspend_connection(request->handle);
 }
 
-/* Takes the request off the list and lets MHD go on with it. */
-static void resume(struct request *request)
+void spl_waiting_resume(struct request *request)
 {
     struct spl_service *service = request->service;
     LIST_REMOVE(request, link);
-    request->job = NULL;
+    request->waits = false;
     if (!--service->waiting_count)
         uv_timer_stop(&service->wait_timer);
     MHD_resume_connection(request->handle);
 }
 
-/* The pipeline may still hold the job: it is marked, and destroyed when it comes back. */
 static void let_go(struct request *request)
 {
-    request->job->owner = NULL;
-    atomic_store(&request->job->dropped, true);
-    resume(request);
+    spl_ticket_drop(&request->ticket);
+    spl_waiting_resume(request);
 }
 
 /* Latencies of what was rendered, for whoever waited. */
-static void observe(struct spl_service *service, const struct request *request, const struct spl_job *job)
+static void observe(struct spl_service *service, const struct spl_job *job)
 {
-    const char *route = request ? request->route : NULL;
+    const char *route = job->route;
     if (!job->rendered_ns)
         return;
     spl_latency_observe(&service->latencies, route, SPL_LATENCY_QUEUE, job->queue_ms / 1000);
@@ -61,18 +59,11 @@ static void observe(struct spl_service *service, const struct request *request, 
 void spl_waiting_complete(struct spl_service *service)
 {
     for (struct spl_job *job; (job = spl_pipeline_take(service->pipeline));) {
-        struct request *request = job->owner;
-        observe(service, request, job);
-        if (request) {
-            if (job->err.code == SPL_E_TIMEOUT)
-                spl_count(&service->counters, deadline_missed);
-            if (job->err.code)
-                spl_reply_error(request, &job->err);
-            else
-                spl_reply_view(request, job);
-            resume(request);
-        }
-        spl_job_destroy(job);
+        observe(service, job);
+        if (job->done)
+            job->done(job);
+        else
+            spl_job_destroy(job);
     }
     spl_http_pump(service);
 }
@@ -108,7 +99,7 @@ void spl_waiting_sweep(struct spl_service *service)
     uint64_t now = spl_now_ns();
     for (request = LIST_FIRST(&service->waiting); request; request = next) {
         next = LIST_NEXT(request, link);
-        if (now >= request->job->deadline_ns) {
+        if (now >= request->deadline_ns) {
             give_up(request);
             continue;
         }

@@ -2,6 +2,7 @@
 problem, every reply to be what api/openapi.yaml promises (openapi.py); every daemon must end the way the test says."""
 import http.client
 import inspect
+import itertools
 import json
 import os
 import queue
@@ -122,6 +123,14 @@ class Daemon:
             sys.stdout.write("".join(self.lines) + f"the daemon's exit code: {code}\n")
         if not kind:
             assert code == 0, f"exit code {code}"
+
+
+_fresh = itertools.count(1)
+
+
+def fresh(path):
+    """A view like that of `path` that nobody has asked for before: another near plane in front of everything."""
+    return f"{path}{'&' if '?' in path else '?'}near={1e-6 * next(_fresh):.6f}"
 
 
 def eventually(condition, seconds=30):

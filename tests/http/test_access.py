@@ -239,4 +239,15 @@ def test_connections_are_capped():
         eventually(lambda: d.status()["connections"] == 1)
 
 
+def test_what_is_cached_is_still_guarded():
+    with guarded() as d:
+        version = d.ask("/v1/datasets/wall", headers=bearer(VIEWER)).json()["version"]
+        first = d.ask(f"{SMALL}&v={version}", headers=bearer(VIEWER))
+        assert first.headers["Cache-Control"] == "private, max-age=31536000, immutable"
+        assert d.ask(SMALL, headers=bearer(VIEWER)).headers["Splatd-Cache"] == "hit"
+        tag = {"If-None-Match": first.headers["ETag"]}
+        assert d.ask(SMALL, headers=bearer(VIEWER, **tag)).status == 304
+        assert d.ask(SMALL, headers=tag).status == 401 and d.ask(SMALL, "HEAD").status == 401
+
+
 run(globals())

@@ -7,7 +7,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, WALL, Daemon, eventually, run
+from harness import FAKE, REAL, WALL, Daemon, eventually, fresh, run
 
 WATCH = ("--watch", "30")
 
@@ -37,7 +37,7 @@ def listed(d):
 
 
 def small(d, name, **kw):
-    return d.ask(f"/v1/datasets/{name}/view?width=16&height=16", **kw)
+    return d.ask(fresh(f"/v1/datasets/{name}/view?width=16&height=16"), **kw)
 
 
 def test_an_empty_directory_fills_up():

@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 
-from harness import FAKE, REAL, VIEW, Daemon, eventually, run, together
+from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 
@@ -20,12 +20,12 @@ def statuses(replies):
 
 def test_a_full_queue_is_said_at_once():
     with Daemon(FAKE, "--queue", "2", FAKE_FRAME_MS=200) as d:
-        assert d.ask(SMALL).status == 200  # so that the service knows how long a frame takes
+        assert d.ask(fresh(SMALL)).status == 200  # so that the service knows how long a frame takes
         times = {}
 
         def ask(i):
             began = time.monotonic()
-            reply = d.ask(SMALL)
+            reply = d.ask(fresh(SMALL))
             times.setdefault(reply.status, []).append(time.monotonic() - began)
             return reply
         got = statuses(together(12, ask))
@@ -38,37 +38,37 @@ def test_a_full_queue_is_said_at_once():
 def test_the_deadline_ends_a_wait():
     with Daemon(FAKE, "--deadline", "300", FAKE_FRAME_MS=200) as d:
         began = time.monotonic()
-        got = statuses(together(6, lambda i: d.ask(SMALL)))
+        got = statuses(together(6, lambda i: d.ask(fresh(SMALL))))
         assert time.monotonic() - began < 1.5
         assert got.count(200) == 1 and got.count(503) == 5, got
         eventually(lambda: d.status()["queues"]["render"]["length"] == 0)
         status = d.status()
         assert status["counters"]["deadline_missed"] == 5 and status["counters"]["frames"] == 1, status
-        assert d.ask(SMALL).status == 200
+        assert d.ask(fresh(SMALL)).status == 200
 
 
 def test_a_frame_slower_than_the_deadline_ends_too():
     with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=5000) as d:
         assert d.post({"width": 16, "height": 16}).status == 503
-        reply = d.ask(SMALL)
+        reply = d.ask(fresh(SMALL))
         assert reply.status == 503 and "100 ms" in reply.json()["detail"] or "deadline" in reply.json()["detail"]
 
 
 def test_work_of_clients_that_left_is_dropped():
     with Daemon(FAKE, FAKE_FRAME_MS=300) as d:
-        first = threading.Thread(target=lambda: d.ask(SMALL))
+        first = threading.Thread(target=lambda: d.ask(fresh(SMALL)))
         first.start()
         eventually(lambda: d.status()["counters"]["requests"] >= 2)
         gone = []
         for _ in range(8):
             s = socket.create_connection(("127.0.0.1", d.port))
-            s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
             gone.append(s)
         eventually(lambda: d.status()["queues"]["render"]["length"] >= 7)
         for s in gone:
             s.close()
         began = time.monotonic()
-        assert d.ask(SMALL).status == 200
+        assert d.ask(fresh(SMALL)).status == 200
         assert time.monotonic() - began < 8 * 0.3, "frames were rendered for nobody"
         first.join()
         counters = d.status()["counters"]
@@ -79,7 +79,7 @@ def lose_under_load(d, losses):
     def work(i):
         connection, got = d.connect(), []
         for _ in range(25):
-            reply = d.ask(SMALL, connection=connection)
+            reply = d.ask(fresh(SMALL), connection=connection)
             got.append((reply.status, reply.body if reply.status == 200 else reply.json()["type"]))
         return got
     results = together(6, work)
@@ -90,7 +90,7 @@ def lose_under_load(d, losses):
     assert {status for status, _ in replies} == {200, 503}
     assert {kind for status, kind in replies if status == 503} == {"urn:splatd:error:device-lost"}
     assert len({body for status, body in replies if status == 200}) == 1, "frames differ after the loss"
-    assert d.ask(SMALL).status == 200
+    assert d.ask(fresh(SMALL)).status == 200
     status = d.status()
     assert status["state"] == "ready" and status["counters"]["device_losses"] == losses, status
 
@@ -110,7 +110,7 @@ def test_too_many_losses_end_the_daemon():
     got = []
     try:
         for _ in range(50):
-            got.append(d.ask(SMALL).status)
+            got.append(d.ask(fresh(SMALL)).status)
     except OSError:
         pass  # it has ended
     assert d.wait_exit() == 1
@@ -120,7 +120,7 @@ def test_too_many_losses_end_the_daemon():
 
 def test_a_device_that_stays_away_ends_the_daemon():
     d = Daemon(FAKE, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
-    assert [d.ask(SMALL).status for _ in range(2)] == [200, 503]
+    assert [d.ask(fresh(SMALL)).status for _ in range(2)] == [200, 503]
     assert d.wait_exit() == 1
 
 
@@ -134,7 +134,7 @@ def test_sigterm_under_load_drops_no_reply():
             while True:
                 asked = stopping.is_set()
                 try:
-                    reply = d.ask(SMALL, connection=connection)
+                    reply = d.ask(fresh(SMALL), connection=connection)
                 except OSError:
                     assert asked, "a request sent before the signal was dropped"
                     return good
@@ -156,7 +156,7 @@ def test_sigterm_under_load_drops_no_reply():
 def test_sigterm_finishes_a_long_frame():
     d = Daemon(FAKE, FAKE_FRAME_MS=1500)
     replies = []
-    asking = threading.Thread(target=lambda: replies.append(d.ask(SMALL)))
+    asking = threading.Thread(target=lambda: replies.append(d.ask(fresh(SMALL))))
     asking.start()
     eventually(lambda: d.status()["counters"]["requests"] >= 2)
     d.process.send_signal(signal.SIGTERM)
@@ -174,7 +174,7 @@ def test_sigterm_finishes_a_long_frame():
 def test_a_second_signal_ends_at_once():
     d = Daemon(FAKE, FAKE_FRAME_MS=5000)
     s = socket.create_connection(("127.0.0.1", d.port))
-    s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
     eventually(lambda: d.status()["counters"]["requests"] >= 2)
     began = time.monotonic()
     d.process.send_signal(signal.SIGTERM)
@@ -200,7 +200,7 @@ def test_slow_requests_are_cut_and_cost_nothing():
                 except OSError:
                     cut += 1
             reply_began = time.monotonic()
-            assert d.ask(SMALL).status == 200 and time.monotonic() - reply_began < 1
+            assert d.ask(fresh(SMALL)).status == 200 and time.monotonic() - reply_began < 1
             time.sleep(0.5)
         assert cut == len(slow), cut
         assert 8 < time.monotonic() - began < 25
@@ -211,7 +211,7 @@ def test_idle_connections_do_not_stop_the_daemon():
     with Daemon(FAKE) as d:
         idle = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(20)]
         keep = d.connect()
-        assert d.ask(SMALL, connection=keep).status == 200
+        assert d.ask(fresh(SMALL), connection=keep).status == 200
         began = time.monotonic()
         assert d.stop() == 0 and time.monotonic() - began < 3
         for s in idle:
@@ -219,7 +219,7 @@ def test_idle_connections_do_not_stop_the_daemon():
 
 
 def test_equal_requests_get_equal_bytes_under_load():
-    with Daemon(REAL, "--queue", "64") as d:
+    with Daemon(REAL, "--queue", "64", "--cache", "0") as d:
         got = together(20, lambda i: [d.ask(VIEW + "?width=160&height=90").body for _ in range(5)])
         assert len({body for bodies in got for body in bodies}) == 1
 
@@ -227,7 +227,7 @@ def test_equal_requests_get_equal_bytes_under_load():
 def test_memory_is_flat():
     def resident():
         return d.status()["memory"]["resident_bytes"]
-    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+    with Daemon(FAKE, "--cache", "0", FAKE_FRAME_MS=0) as d:
         for _ in range(100):
             d.ask(VIEW)
         before = resident()

@@ -7,7 +7,7 @@ import subprocess
 import threading
 import time
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run, together
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 
@@ -52,7 +52,7 @@ def test_all_is_well():
 def test_metrics_count_what_happens():
     with Daemon(REAL) as d:
         for _ in range(3):
-            assert d.ask(SMALL).status == 200
+            assert d.ask(fresh(SMALL)).status == 200
         assert d.ask(VIEW + "?width=0").status == 400 and d.ask("/nowhere").status == 404
         status, got = d.status(), metrics(d)
         counters = {**status["counters"], "replies_2xx": status["counters"]["replies_2xx"] + 1}  # its own reply
@@ -80,12 +80,12 @@ def test_not_ready_while_loading():
         assert reply.status == 503 and b"loaded" in reply.body, reply.body
         assert metrics(d)["splatd_ready"] == 0
         eventually(lambda: d.ops("/readyz").status == 200)
-        assert d.ask(SMALL).status == 200
+        assert d.ask(fresh(SMALL)).status == 200
 
 
 def test_not_ready_while_the_queue_is_full():
     with Daemon(FAKE, "--queue", "2", FAKE_FRAME_MS=400) as d:
-        work = threading.Thread(target=together, args=(8, lambda i: d.ask(SMALL)))
+        work = threading.Thread(target=together, args=(8, lambda i: d.ask(fresh(SMALL))))
         work.start()
         eventually(lambda: b"the queue is full: 2 of 2" in d.ops("/readyz").body)
         assert d.ops("/healthz").status == 200
@@ -95,7 +95,7 @@ def test_not_ready_while_the_queue_is_full():
 
 def test_not_ready_while_the_device_is_reopened():
     with Daemon(FAKE, FAKE_OPEN_MS=700, SPLATD_INJECT_LOSS_AFTER="1") as d:
-        assert [d.ask(SMALL).status for _ in range(2)] == [200, 503]
+        assert [d.ask(fresh(SMALL)).status for _ in range(2)] == [200, 503]
         reply = d.ops("/readyz")
         assert reply.status == 503 and b"reopened" in reply.body, reply.body
         assert d.ops("/healthz").status == 200
@@ -106,7 +106,7 @@ def test_not_ready_while_the_device_is_reopened():
 def test_a_hanging_driver_fails_liveness_and_ends_the_process():
     d = Daemon(FAKE, "--deadline", "100", "--stall", "800", FAKE_HANG_MS=120000)
     assert d.ops("/healthz").status == 200
-    assert d.ask(SMALL).status == 503  # at its deadline
+    assert d.ask(fresh(SMALL)).status == 503  # at its deadline
     assert d.ops("/healthz").status == 200  # slow is not dead
     eventually(lambda: d.ops("/healthz").status == 503)
     assert b"nothing has moved" in d.ops("/healthz").body and d.ops("/readyz").status == 503
@@ -145,7 +145,7 @@ def test_a_full_main_listener_does_not_keep_probes_out():
 def test_a_stopping_service_says_so_and_finishes():
     d = Daemon(FAKE, FAKE_FRAME_MS=900)
     replies = []
-    asking = threading.Thread(target=lambda: replies.append(d.ask(SMALL)))
+    asking = threading.Thread(target=lambda: replies.append(d.ask(fresh(SMALL))))
     asking.start()
     eventually(lambda: d.status()["counters"]["requests"] >= 2)
     d.process.send_signal(signal.SIGTERM)
@@ -159,7 +159,7 @@ def test_a_drain_delay_lets_balancers_notice():
     d = Daemon(FAKE, "--drain-delay", "1200")
     d.process.send_signal(signal.SIGTERM)
     eventually(lambda: d.ops("/readyz").status == 503)
-    reply = d.ask(SMALL)  # a new connection
+    reply = d.ask(fresh(SMALL))  # a new connection
     assert reply.status == 200 and reply.headers["Connection"] != "close"
     assert d.wait_exit() == 0
 

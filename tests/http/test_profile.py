@@ -111,7 +111,7 @@ def test_budget_and_psnr_choose():
         setting, reply = ask(d, budget="1ms")
         assert setting == ("points", 4, 1) and reply.headers["Splatd-Demand"] == "best-effort"
         plain = d.view(width=500, height=500)
-        assert plain.headers["Splatd-Chosen"] is None and plain.headers["Cache-Control"] is None
+        assert plain.headers["Splatd-Chosen"] is None and plain.headers["Cache-Control"] == "no-cache"
         reply = d.post({"width": 500, "height": 500, "budget": 24, "format": "raw"})
         assert fields(reply.headers["Splatd-Chosen"])["lod"] in ("2", "4")
         reply = d.post({"width": 500, "height": 500, "budget": "24ms", "psnr": 20, "format": "raw"})

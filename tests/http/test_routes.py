@@ -176,7 +176,7 @@ def test_a_body_says_all_that_a_query_does():
 
 
 def test_the_same_request_gives_the_same_bytes():
-    with Daemon(REAL) as d:
+    with Daemon(REAL, "--cache", "0") as d:
         for form in ("jpeg", "png"):
             connection = d.connect()
             path = f"{VIEW}?width=320&height=180&format={form}"

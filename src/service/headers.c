@@ -1,0 +1,83 @@
+/* Headers of views: written once when a view is ready (or asked for by HEAD), copied into each reply that carries it.
+ */
+#include "service/headers.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+void spl_headers_open(struct spl_headers *headers)
+{
+    *headers = (struct spl_headers){0};
+    headers->stream = open_memstream(&headers->text, &headers->length);
+}
+
+void spl_headers_add(struct spl_headers *headers, const char *name, const char *format, ...)
+{
+    char text[1024];
+    if (!headers->stream)
+        return;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    for (char *c = text; *c; c++)
+        if (*c < 0x20 || *c > 0x7e)
+            *c = '?'; // names of devices come from drivers
+    fprintf(headers->stream, "%s%c%s%c", name, 0, text, 0);
+}
+
+bool spl_headers_close(struct spl_headers *headers)
+{
+    bool failed = !headers->stream || fputc(0, headers->stream) == EOF;
+    if (headers->stream && fclose(headers->stream))
+        failed = true;
+    headers->stream = NULL;
+    if (failed) {
+        free(headers->text);
+        headers->text = NULL;
+    }
+    return !failed;
+}
+
+void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_request *request, enum spl_layer layer,
+                           const struct spl_encoded *encoded)
+{
+    enum spl_format format = request->encode.format;
+    spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
+    if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
+        return;
+    spl_headers_add(headers, "Splatd-Depth-Unit", "m");
+    switch (format) {
+    case SPL_FORMAT_PNG:
+        spl_headers_add(headers, "Splatd-Depth-Scale", "%.17g", request->encode.depth_scale);
+        spl_headers_add(headers, "Splatd-Depth-Invalid", "0");
+        if (encoded)
+            spl_headers_add(headers, "Splatd-Depth-Saturated", "%llu", (unsigned long long)encoded->saturated);
+        break;
+    case SPL_FORMAT_JPEG:
+        if (!encoded)
+            break;
+        spl_headers_add(headers, "Splatd-Depth-Near", "%.9g", (double)encoded->near);
+        spl_headers_add(headers, "Splatd-Depth-Far", "%.9g", (double)encoded->far);
+        break;
+    default:
+        spl_headers_add(headers, "Splatd-Depth-Scale", "1");
+        spl_headers_add(headers, "Splatd-Depth-Invalid", "NaN");
+        break;
+    }
+}
+
+void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
+{
+    const double *r = camera->rotation, *eye = camera->eye;
+    char far[32] = "null"; // JSON has no infinity
+    if (isfinite(camera->far))
+        snprintf(far, sizeof far, "%.9g", camera->far);
+    spl_headers_add(
+        headers, "Splatd-Camera",
+        "{\"eye\":[%.17g,%.17g,%.17g],\"rotation\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g],"
+        "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
+        eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
+        camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+}

@@ -1,0 +1,180 @@
+/* Canonical forms: what means the same has one key, what changes a byte has another; If-None-Match. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <math.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "service/key.h"
+
+enum { version = 7, renderer = 9 };
+
+static struct spl_key key_of(const char *query)
+{
+    static const struct spl_camera_defaults defaults = {
+        .eye = {10, 0, 0}, .target = {0, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    struct spl_view_request request;
+    struct spl_error err = {0};
+    bool json = query[0] == '{';
+    int rc = json ? spl_view_request_from_json(query, strlen(query), &defaults, &limits, &request, &err)
+                  : spl_view_request_from_query(query, strlen(query), &defaults, &limits, &request, &err);
+    if (rc)
+        fail_msg("%s: %s", query, err.message);
+    return spl_key_make(&request, version, renderer);
+}
+
+static void what_means_the_same_has_one_key(void **state)
+{
+    (void)state;
+    static const char *const pairs[][2] = {
+        {"", "{}"},
+        {"", "method=splat&lod=1.0&layer=color&format=jpg&quality=90&margin=1&transparent=false&width=1280&height=720"},
+        {"", "eye=10,0,-0&target=0,0,0&up=0,0,2&fov=60&near=0.01&background=%23000000"},
+        {"", "v=0123456789abcdef"},
+        {"", "depth_scale=5000"},
+        {"layer=depth", "layer=depth&background=ff0000&quality=50&format=png"},
+        {"layer=depth&format=npy", "layer=depth&format=npy&depth_scale=5000"},
+        {"format=png", "format=png&quality=10"},
+        {"transparent=true&background=102030", "background=10203000"},
+        {"fx=100&width=64&height=64",
+         "{\"camera\":{\"fx\":100,\"fy\":100,\"cx\":32,\"cy\":32},\"width\":64,\"height\":64}"},
+        {"eye=5,0,0&target=0,0,0&fx=50",
+         "{\"camera\":{\"matrix\":[0,0,-1,5,1,0,0,0,0,-1,0,0,0,0,0,1],\"convention\":\"opencv\",\"fx\":50}}"},
+    };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        struct spl_key a = key_of(pairs[i][0]), b = key_of(pairs[i][1]);
+        if (!spl_key_equal(&a, &b))
+            fail_msg("'%s' and '%s' differ", pairs[i][0], pairs[i][1]);
+    }
+}
+
+static void what_changes_a_byte_has_a_key_of_its_own(void **state)
+{
+    (void)state;
+    static const char *const queries[] = {
+        "",
+        "eye=10,0,1e-9",
+        "target=0,0,1",
+        "up=0,1,1",
+        "fov=61",
+        "fx=700",
+        "fx=700&fy=701",
+        "cx=640.5",
+        "cy=361",
+        "width=1281",
+        "height=721",
+        "width=720&height=1280",
+        "near=0.02",
+        "far=100",
+        "method=points",
+        "lod=1.5",
+        "lod=0",
+        "layer=depth",
+        "layer=range",
+        "layer=normal",
+        "layer=id",
+        "layer=coverage",
+        "supersample=2",
+        "supersample=0.5",
+        "margin=0",
+        "margin=1.5",
+        "background=000001",
+        "background=00000000",
+        "format=png",
+        "format=npy",
+        "format=raw",
+        "quality=91",
+        "layer=depth&depth_scale=5000",
+        "layer=depth&format=jpeg",
+        "layer=depth&format=jpeg&quality=91",
+        "layer=depth&format=raw",
+    };
+    enum { count = sizeof queries / sizeof *queries };
+    struct spl_key keys[count];
+    for (size_t i = 0; i < count; i++) {
+        keys[i] = key_of(queries[i]);
+        for (size_t j = 0; j < i; j++)
+            if (spl_key_equal(&keys[i], &keys[j]))
+                fail_msg("'%s' and '%s' share a key", queries[i], queries[j]);
+    }
+}
+
+static void version_and_renderer_are_part_of_it(void **state)
+{
+    (void)state;
+    struct spl_view_request request = {.encode.quality = 90};
+    spl_view_init(&request.view);
+    struct spl_key key = spl_key_make(&request, 1, 1), other = spl_key_make(&request, 2, 1);
+    assert_false(spl_key_equal(&key, &other));
+    other = spl_key_make(&request, 1, 2);
+    assert_false(spl_key_equal(&key, &other));
+    other = spl_key_make(&request, 1, 1);
+    assert_true(spl_key_equal(&key, &other));
+
+    struct spl_device_info a = {.backend = "vulkan", .name = "one", .driver = "1.0"}, b = a;
+    assert_true(spl_renderer_hash(&a) == spl_renderer_hash(&b));
+    strcpy(b.driver, "1.1");
+    assert_true(spl_renderer_hash(&a) != spl_renderer_hash(&b));
+    b = a;
+    strcpy(b.name, "two");
+    assert_true(spl_renderer_hash(&a) != spl_renderer_hash(&b));
+    b = a;
+    strcpy(b.backend, "egl");
+    assert_true(spl_renderer_hash(&a) != spl_renderer_hash(&b));
+}
+
+static void if_none_match_is_read_as_the_standard_says(void **state)
+{
+    (void)state;
+    struct spl_key key = {.words = {0x0123456789abcdef, 1}};
+    char etag[SPL_ETAG_BYTES];
+    spl_key_etag(&key, etag);
+    assert_string_equal(etag, "\"0123456789abcdef0000000000000001\"");
+    static const char *const good[] = {
+        "*",    " * ",     "%s",      " %s ",          "W/%s", "\"x\", %s", "\"x\",W/\"y\",%s",
+        ",,%s", "\"\",%s", "%s, \"x", "\"a,b\"\t,\t%s"};
+    static const char *const bad[] = {"",
+                                      " ",
+                                      "**",
+                                      "* x",
+                                      "\"",
+                                      "\"x\"",
+                                      "x",
+                                      "x, %s",
+                                      "W/",
+                                      "w/%s",
+                                      "\"%s",
+                                      "\"x\" y, %s",
+                                      "\"0123456789abcdef000000000000000\"",
+                                      "0123456789abcdef0000000000000001"};
+    char text[160];
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        const char *hole = strstr(good[i], "%s");
+        snprintf(text, sizeof text, "%.*s%s%s", hole ? (int)(hole - good[i]) : (int)strlen(good[i]), good[i],
+                 hole ? etag : "", hole ? hole + 2 : "");
+        if (!spl_etag_matches(text, etag))
+            fail_msg("%s does not match", text);
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        const char *hole = strstr(bad[i], "%s");
+        snprintf(text, sizeof text, "%.*s%s%s", hole ? (int)(hole - bad[i]) : (int)strlen(bad[i]), bad[i],
+                 hole ? etag : "", hole ? hole + 2 : "");
+        if (spl_etag_matches(text, etag))
+            fail_msg("%s matches", text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_means_the_same_has_one_key),
+        cmocka_unit_test(what_changes_a_byte_has_a_key_of_its_own),
+        cmocka_unit_test(version_and_renderer_are_part_of_it),
+        cmocka_unit_test(if_none_match_is_read_as_the_standard_says),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
