@@ -189,8 +189,7 @@ static bool answer_preflight(struct request *request, const char *method)
     if (strcmp(method, MHD_HTTP_METHOD_OPTIONS) || !allowed_origin(request) ||
         !MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, "Access-Control-Request-Method"))
         return false;
-    request->status = MHD_HTTP_NO_CONTENT;
-    request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT);
+    spl_reply_empty(request, MHD_HTTP_NO_CONTENT);
     if (!request->response)
         return true;
     MHD_add_response_header(request->response, "Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, DELETE");

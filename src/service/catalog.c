@@ -159,17 +159,22 @@ struct spl_catalog_slot *spl_catalog_add_slot(struct spl_catalog *catalog, const
     return &grown[at];
 }
 
-void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
+void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, const char *path)
 {
-    const char *slash = strrchr(slot->path, '/');
-    size_t folder = slash ? (size_t)(slash + 1 - slot->path) : 0, used = 0;
-    while (*message && used + 1 < sizeof slot->reason) {
-        if (folder && !strncmp(message, slot->path, folder))
+    const char *slash = strrchr(path, '/');
+    size_t folder = slash ? (size_t)(slash + 1 - path) : 0, used = 0;
+    while (*message && used + 1 < capacity) {
+        if (folder && !strncmp(message, path, folder))
             message += folder;
         else
-            slot->reason[used++] = *message++;
+            out[used++] = *message++;
     }
-    slot->reason[used] = '\0';
+    out[used] = '\0';
+}
+
+void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
+{
+    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, slot->path);
 }
 
 void spl_catalog_remove_slot(struct spl_catalog *catalog, struct spl_catalog_slot *slot)

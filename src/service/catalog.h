@@ -70,6 +70,9 @@ void spl_catalog_remove_slot(struct spl_catalog *catalog, struct spl_catalog_slo
 /* Remembers why the slot's file is not served, without the folder it lies in: clients read it. */
 void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message);
 
+/* Copies `message` without the folder of `path`, wherever it names it. */
+void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, const char *path);
+
 /* The id that the file at `path` has, of *length bytes; NULL for one that cannot have any. */
 const char *spl_catalog_id_of(const char *path, size_t *length);
 

@@ -4,7 +4,8 @@
  * Limits: the connection pool bounds request line and headers together; the request line has its own, smaller bound, so
  * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
  * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes
- * does not extend. Invariant: a suspended request is in `waiting`. Owned by the loop's thread. */
+ * does not extend. A PUT is routed before its body, which change_route.c takes whatever its size. Invariant: a
+ * suspended request is in `waiting`, or has a change. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,8 +26,7 @@ enum {
 
 /* How long a connection may stay in a phase; MHD's own limit (idle_s) is about silence only. */
 static const uint64_t phase_max_ns[] = {
-    [PHASE_IDLE] = 40 * SPL_NS_PER_S,
-    [PHASE_READING] = 10 * SPL_NS_PER_S,
+    [PHASE_IDLE] = 40 * SPL_NS_PER_S,     [PHASE_READING] = 10 * SPL_NS_PER_S, [PHASE_UPLOADING] = 60 * SPL_NS_PER_S,
     [PHASE_WORKING] = SPL_NEVER, // views have deadlines
     [PHASE_WRITING] = 120 * SPL_NS_PER_S,
 };
@@ -35,6 +35,11 @@ static void enter(struct connection *connection, enum phase phase)
 {
     connection->phase = phase;
     connection->since_ns = spl_now_ns();
+}
+
+void spl_http_enter_upload(struct request *request)
+{
+    enter(request->connection, PHASE_UPLOADING);
 }
 
 static void on_connection(void *context, struct MHD_Connection *handle, void **socket_context,
@@ -129,6 +134,7 @@ static void on_completed(void *context, struct MHD_Connection *handle, void **re
         return;
     spl_access_log_write(request, code);
     spl_assert(!request->waits);
+    spl_change_abandon(request);
     enter(request->connection, PHASE_IDLE);
     service->requests_open--;
     if (request->response)
@@ -191,17 +197,38 @@ static void refuse_body(struct request *request)
     spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", "the body is larger than 1 MiB");
 }
 
-/* Replies at once to a body that is announced as too large, where the client waits for our word before it sends or
- * means to send more than we care to read. */
-static bool refuse_announced_body(struct request *request)
+/* Does the client wait for our word before it sends its body, or mean to send more than `most`? */
+static bool announces_more(struct request *request, uint64_t most)
 {
     const char *length = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_LENGTH);
     bool asks = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_EXPECT);
-    unsigned long long announced = length ? strtoull(length, NULL, 10) : 0;
-    if (announced <= (asks ? (unsigned long long)body_max : (unsigned long long)drain_max))
+    uint64_t announced = length ? strtoull(length, NULL, 10) : 0;
+    return announced > (asks ? most : (uint64_t)drain_max);
+}
+
+/* What can be said before the body: that it is too large, or all of a PUT that is refused. */
+static bool answer_headers(struct request *request)
+{
+    if (!strcmp(request->method, MHD_HTTP_METHOD_PUT)) {
+        spl_http_enter_upload(request);
+        spl_route(request, request->method);
+        return !request->change && announces_more(request, 0);
+    }
+    if (!announces_more(request, body_max))
         return false;
     refuse_body(request);
     return true;
+}
+
+/* False: the connection had better end. */
+static bool take_body(struct request *request, const char *data, size_t length)
+{
+    if (request->change)
+        return spl_change_take(request, data, length);
+    if (!request->response)
+        return append_body(request, data, length);
+    request->body_seen += length; // refused; read and dropped
+    return request->body_seen <= drain_max;
 }
 
 static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, const char *url, const char *method,
@@ -217,21 +244,24 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         request->started = true;
         snprintf(request->method, sizeof request->method, "%s", method);
         spl_request_set_id(request, MHD_lookup_connection_value(handle, MHD_HEADER_KIND, "X-Request-Id"));
-        return refuse_announced_body(request) ? send_reply(request) : MHD_YES;
+        return answer_headers(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {
-        bool taken = append_body(request, data, *length);
+        bool taken = take_body(request, data, *length);
         *length = 0;
         return taken ? MHD_YES : MHD_NO;
     }
-    if (!request->response) {
+    if (request->change) {
+        enter(request->connection, PHASE_WORKING);
+        spl_change_end(request);
+    } else if (!request->response) {
         enter(request->connection, PHASE_WORKING);
         if (request->body_seen > body_max)
             refuse_body(request);
         else
             spl_route(request, method);
     }
-    return request->waits ? MHD_YES : send_reply(request);
+    return request->waits || request->change ? MHD_YES : send_reply(request);
 }
 
 static void on_timer(uv_timer_t *timer)

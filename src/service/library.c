@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/log.h"
 #include "base/memory.h"
@@ -19,6 +20,7 @@ enum { looks_before_drop = 2 };
 struct look {
     uv_work_t work;
     struct spl_service *service;
+    uint64_t changes; /* of clients, when it began */
     struct spl_catalog_files files;
     struct spl_error err;
 };
@@ -149,10 +151,12 @@ void spl_library_take_changes(struct spl_service *service)
         struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, entry->info->id);
         if (slot && slot->next == entry && entry->state == SPL_ENTRY_RESIDENT) {
             put_in_place(slot, entry);
+            spl_change_settle(service, entry, NULL);
             continue;
         }
         if (slot && slot->next == entry)
             refuse(slot, &entry->err);
+        spl_change_settle(service, entry, &entry->err);
         spl_catalog_entry_unref(entry);
     }
 }
@@ -219,9 +223,10 @@ static void after_look(uv_work_t *work, int status)
     if (look->err.code && strcmp(library->last.message, look->err.message))
         spl_log_warn("datasets are left as they are: %s", look->err.message);
     library->last = look->err;
-    for (size_t i = 0; i < look->files.count && !look->err.code && !library->stopped; i++)
+    bool good = !look->err.code && !library->stopped && look->changes == library->changes_made;
+    for (size_t i = 0; i < look->files.count && good; i++)
         meet(service, &look->files.items[i]);
-    if (!look->err.code && !library->stopped)
+    if (good)
         drop_missing(service, &look->files);
     spl_catalog_files_finish(&look->files);
     free(look);
@@ -235,6 +240,7 @@ static void on_timer(uv_timer_t *timer)
         return;
     look->work.data = look;
     look->service = service;
+    look->changes = service->library.changes_made;
     if (uv_queue_work(&service->loop, &look->work, run_look, after_look)) {
         free(look);
         return;
@@ -246,7 +252,12 @@ static void on_timer(uv_timer_t *timer)
 void spl_library_start(struct spl_service *service)
 {
     uint64_t interval_ms = service->options->watch_ms;
+    const struct spl_text_list *paths = &service->options->datasets;
+    struct stat status;
     service->library.timer.data = service;
+    for (size_t i = 0; i < paths->count && !service->library.directory; i++)
+        if (!stat(paths->items[i], &status) && S_ISDIR(status.st_mode))
+            service->library.directory = paths->items[i];
     if (interval_ms)
         uv_timer_start(&service->library.timer, on_timer, interval_ms, interval_ms);
 }

@@ -37,6 +37,12 @@ static void set_text(struct request *request, unsigned status, const char *type,
         header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
 }
 
+void spl_reply_empty(struct request *request, unsigned status)
+{
+    request->status = status;
+    request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT);
+}
+
 void spl_reply_text(struct request *request, const char *type, char *body)
 {
     set_text(request, MHD_HTTP_OK, type, body);

@@ -14,6 +14,8 @@ static const char *const methods[] = {[SPL_GET] = MHD_HTTP_METHOD_GET,
 enum {
     GET = 1 << SPL_GET, /* and HEAD */
     POST = 1 << SPL_POST,
+    PUT = 1 << SPL_PUT,
+    DELETE = 1 << SPL_DELETE,
 };
 
 static void index_page(struct request *request, const struct spl_call *call)
@@ -75,6 +77,8 @@ static const struct route {
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
     {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
     {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, false, show_dataset},
+    {"/v1/datasets/{id}", PUT, SPL_SCOPE_ADMIN, false, spl_put_dataset}, // called before the body
+    {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
 };
@@ -142,10 +146,10 @@ static int fill(const struct holes *holes, struct spl_call *call, struct spl_err
     return rc;
 }
 
-/* Finds the dataset; PUT and DELETE take what is not served as well. */
-static int find(const struct spl_catalog *catalog, struct spl_call *call, struct spl_error *err)
+/* Finds the dataset; what changes datasets takes one that is not served as well. */
+static int find(const struct spl_catalog *catalog, enum spl_scope scope, struct spl_call *call, struct spl_error *err)
 {
-    if (!*call->id || (call->entry = spl_catalog_find(catalog, call->id)) || call->method >= SPL_PUT)
+    if (!*call->id || (call->entry = spl_catalog_find(catalog, call->id)) || scope == SPL_SCOPE_ADMIN)
         return 0;
     const struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, call->id);
     if (slot && slot->reason[0])
@@ -169,7 +173,7 @@ static void enter(struct request *request, const struct route *route, enum spl_h
         return;
     if (request->query[0] && (method == SPL_POST || !route->query))
         refuse_query(request, method);
-    else if (find(&request->service->catalog, &call, &err))
+    else if (find(&request->service->catalog, route->scope, &call, &err))
         spl_reply_error(request, &err);
     else
         route->handle(request, &call);

@@ -32,6 +32,7 @@ static void on_drain_timer(uv_timer_t *timer)
     uint64_t elapsed_ms = (spl_now_ns() - service->drain_began_ns) / SPL_NS_PER_MS;
     if (elapsed_ms > service->options->deadline_ms + drain_grace_ms) {
         spl_waiting_refuse_all(service);
+        spl_change_refuse_all(service);
         uv_stop(&service->loop);
     } else if (elapsed_ms >= drain_least_ms && !service->requests_open) {
         uv_stop(&service->loop);

@@ -22,8 +22,9 @@ enum {
 };
 
 enum phase {
-    PHASE_IDLE,    /* between a reply and the next request's first line */
-    PHASE_READING, /* from accept, or a first line, to the end of the request */
+    PHASE_IDLE,      /* between a reply and the next request's first line */
+    PHASE_READING,   /* from accept, or a first line, to the end of the request */
+    PHASE_UPLOADING, /* a dataset's body, from one MiB to the next */
     PHASE_WORKING,
     PHASE_WRITING,
 };
@@ -73,6 +74,7 @@ struct request {
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */
+    struct change *change;         /* of a dataset, in progress; NULL otherwise */
     struct MHD_Response *response; // may be NULL
     unsigned status;
 };
@@ -80,10 +82,13 @@ struct request {
 /* Looks at the served paths and brings the catalog up to date with them. */
 struct library {
     uv_timer_t timer;
-    size_t tasks;          /* in the thread pool */
-    bool looking;          /* one of them is a look */
-    bool stopped;          /* nothing new is begun, what comes back is thrown away */
-    struct spl_error last; /* of the last look, so that it is logged once */
+    size_t tasks;                /* in the thread pool */
+    bool looking;                /* one of them is a look */
+    bool stopped;                /* nothing new is begun, what comes back is thrown away */
+    struct spl_error last;       /* of the last look, so that it is logged once */
+    const char *directory;       // may be NULL; where clients' datasets go: the first directory served
+    LIST_HEAD(, change) changes; /* of clients, in progress */
+    uint64_t changes_made;       /* a look that began before one of them says nothing */
 };
 
 struct spl_service {
@@ -130,9 +135,10 @@ struct spl_service {
 
 /* http.c: the MHD daemon inside the uv loop. */
 int spl_http_start(struct spl_service *service, struct spl_error *err);
-void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
-void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
-void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
+void spl_http_quiesce(struct spl_service *service);  /* stops accepting; idempotent */
+void spl_http_stop(struct spl_service *service);     /* closes every connection; idempotent */
+void spl_http_enter_upload(struct request *request); /* its time to send the next MiB begins */
+void spl_http_pump(struct spl_service *service);     /* lets MHD work; call after a resume */
 
 /* flights.c: views on their way. Boards the flight of an equal request or launches one; SPL_E_BUSY when the queue is
  * full. The caller has set ticket->deadline_ns, route and done, and keeps the ticket where it is until then or until it
@@ -153,6 +159,16 @@ void spl_library_start(struct spl_service *service);        /* once the pipeline
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
 void spl_library_stop(struct spl_service *service);         /* waits for the thread pool; idempotent */
 
+/* change_route.c: PUT and DELETE of a dataset. */
+void spl_put_dataset(struct request *request, const struct spl_call *call);
+void spl_delete_dataset(struct request *request, const struct spl_call *call);
+bool spl_change_take(struct request *request, const char *data, size_t length); /* of the body; false: no memory */
+void spl_change_end(struct request *request);                                   /* of the body */
+void spl_change_abandon(struct request *request);                               /* its client has left; idempotent */
+void spl_change_refuse_all(struct spl_service *service);
+/* `entry` is resident, or `refused` says why not. */
+void spl_change_settle(struct spl_service *service, struct spl_catalog_entry *entry, const struct spl_error *refused);
+
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);
 
@@ -161,7 +177,7 @@ enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET 
 struct spl_call {
     enum spl_http_method method;
     char id[256];                    /* of the dataset in the path, decoded; "" without */
-    struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or PUT and DELETE, which look for themselves
+    struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a route of scope ADMIN
     char name[256];                  /* the path's other segment, decoded; "" without */
 };
 
@@ -187,6 +203,7 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
                        const char *detail);
 void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
+void spl_reply_empty(struct request *request, unsigned status);
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
 
 /* The same for views. `origin` is Splatd-Cache's value. */

@@ -46,11 +46,13 @@ def check_problem(reply, method):
 class Daemon:
     """with Daemon(REAL) as d: …   ends it with SIGTERM and expects exit code 0, unless the test stopped it itself."""
 
-    def __init__(self, binary, *args, datasets=(WALL,), wait_for=r"( |\"message\":\")ready(\"})?\n", **environment):
+    def __init__(self, binary, *args, datasets=(WALL,), wait_for=r"( |\"message\":\")ready(\"})?\n", preexec=None,
+                 **environment):
         self.process = subprocess.Popen(
             [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0",
              *([] if "--ops-listen" in args else ["--ops-listen", "127.0.0.1:0"]), *args, *datasets],
-            stderr=subprocess.PIPE, text=True, env={**os.environ, **{k: str(v) for k, v in environment.items()}})
+            stderr=subprocess.PIPE, text=True, preexec_fn=preexec,
+            env={**os.environ, **{k: str(v) for k, v in environment.items()}})
         self.lines, self.port, self.ops_port, self.code = [], None, None, None
         ready = queue.Queue()
         threading.Thread(target=self._read, args=(ready, wait_for), daemon=True).start()

@@ -1,0 +1,239 @@
+"""PUT and DELETE of datasets: who may, which names, bodies of every kind, clients that leave, disks that are full."""
+import contextlib
+import os
+import pathlib
+import socket
+import struct
+import tempfile
+import threading
+import time
+
+from harness import FAKE, REAL, WALL, Daemon, eventually, run, together
+
+ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
+AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/octet-stream"}
+WALL_1, WALL_2 = pathlib.Path(WALL).read_bytes(), pathlib.Path(os.environ["SPLATD_WALL_2"]).read_bytes()
+
+
+@contextlib.contextmanager
+def serving(*args, binary=FAKE, named=(), **environment):
+    with tempfile.TemporaryDirectory() as top:
+        home = pathlib.Path(top, "home")
+        home.mkdir()
+        tokens = pathlib.Path(top, "tokens")
+        tokens.write_text(f"{ADMIN} view,admin,tour\n{VIEWER} view\n")
+        tokens.chmod(0o600)
+        with Daemon(binary, "--watch", "30", "--tokens", str(tokens), *args, datasets=[str(home), *named],
+                    **environment) as d:
+            d.home = home
+            yield d
+
+
+def put(d, name, body, headers=AUTH, **kw):
+    return d.ask(f"/v1/datasets/{name}", "PUT", body, headers, **kw)
+
+
+def delete(d, name, headers=AUTH):
+    return d.ask(f"/v1/datasets/{name}", "DELETE", headers=headers)
+
+
+def listed(d):
+    return {dataset["id"]: dataset for dataset in d.ask("/v1/datasets", headers=AUTH).json()["datasets"]}
+
+
+def small(d, name):
+    return d.ask(f"/v1/datasets/{name}/view?width=16&height=16", headers=AUTH)
+
+
+def left_over(d):
+    return [p.name for p in d.home.iterdir() if p.name.startswith(".")]
+
+
+def test_only_an_admin_changes_datasets():
+    with serving() as d:
+        for headers, status in (({}, 401), ({"Authorization": f"Bearer {VIEWER}"}, 403),
+                                ({"Authorization": "Bearer nobody-0123456789abcdef"}, 401)):
+            assert put(d, "a", WALL_1, headers).status == status and delete(d, "a", headers).status == status
+        assert list(d.home.iterdir()) == []
+    with Daemon(FAKE) as d:  # nobody is one without --tokens
+        assert put(d, "wall", WALL_1, {}).status == 403 and delete(d, "wall", {}).status == 403
+        assert d.ask("/v1/datasets/wall").status == 200
+
+
+def test_put_get_replace_delete():
+    with serving(binary=REAL) as d:
+        reply = put(d, "a", WALL_1)
+        assert reply.status == 201 and reply.headers["Location"] == "/v1/datasets/a", reply.body
+        assert reply.json()["state"] == "ready" and reply.json()["version"] == listed(d)["a"]["version"]
+        assert (d.home / "a.spld").read_bytes() == WALL_1 and left_over(d) == []
+        assert small(d, "a").status == 200
+        reply = put(d, "a", WALL_2)
+        assert reply.status == 200 and reply.json()["leaf_splats"] == 800, reply.body
+        assert listed(d)["a"]["version"] == reply.json()["version"] and small(d, "a").status == 200
+        (d.home / "a.profile.json").write_text("{}")
+        assert delete(d, "a").status == 204
+        assert listed(d) == {} and list(d.home.iterdir()) == [] and small(d, "a").status == 404
+        assert delete(d, "a").status == 404
+        time.sleep(0.2)
+        assert listed(d) == {}, "a look from before brought it back"
+
+
+def test_names_that_are_no_ids_make_no_files():
+    with serving() as d:
+        outside = set(d.home.parent.iterdir())
+        for name in ("..%2fx", "%2e%2e%2fx", "..", ".x", "a%2fb", "a%5cb", "%2fetc%2fx", "a%20b", "a%00b", "%c3%bc", "a" * 128,
+                     "a:b", "*", "%2e", "a;b"):
+            for reply in (put(d, name, WALL_1), delete(d, name)):
+                assert reply.status == 400 and reply.json()["field"] == "id", (name, reply.status, reply.body)
+        for name in ("../x", "a/b", "a/../b", ""):
+            assert put(d, name, WALL_1).status in (404, 405), name
+        assert list(d.home.iterdir()) == [] and set(d.home.parent.iterdir()) == outside
+        assert put(d, "a" * 127, WALL_1).status == 201
+
+
+def test_bodies_that_are_no_datasets_leave_what_was_there():
+    broken = bytearray(WALL_1)
+    broken[-5000] ^= 1
+    with serving() as d:
+        assert put(d, "a", WALL_1).status == 201
+        for body in (b"", b"x", b"ply\nformat ascii 1.0\n", bytes(broken), WALL_1[:-1], WALL_1 + b"x", b"\0" * 3_000_000):
+            for name in ("a", "b"):
+                reply = put(d, name, body)
+                assert reply.status == 422 and reply.json()["field"] == "body", (len(body), reply.status, reply.body)
+                assert str(d.home) not in reply.body.decode() and ".incoming" not in reply.body.decode()
+        assert list(listed(d)) == ["a"] and listed(d)["a"].get("reason") is None, listed(d)
+        assert [p.name for p in d.home.iterdir()] == ["a.spld"] and (d.home / "a.spld").read_bytes() == WALL_1
+        assert small(d, "a").status == 200
+
+
+def test_sizes_are_capped_and_large_bodies_only_go_here():
+    with serving("--max-upload", "100000") as d:
+        assert len(WALL_1) < 100000 and put(d, "a", WALL_1).status == 201
+        reply = put(d, "b", b"x" * 100001)
+        assert reply.status == 413 and "100000" in reply.json()["detail"], reply.body
+
+        def chunks():
+            for _ in range(200):
+                yield b"x" * 1000
+        reply = d.ask("/v1/datasets/b", "PUT", chunks(), AUTH)
+        assert reply.status == 413 and list(listed(d)) == ["a"] and left_over(d) == []
+        reply = d.ask("/v1/datasets/a/view", "POST", b" " * 2_000_000, AUTH)
+        assert reply.status == 413
+        head = (f"PUT /v1/datasets/b HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999\r\nExpect: 100-continue\r\n"
+                f"Authorization: Bearer {VIEWER}\r\n\r\n").encode()
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            s.sendall(head)
+            assert b" 403 " in s.recv(4096)
+
+
+def large(megabytes):
+    """No dataset, but as long as one."""
+    return b"SPLATD" + b"\0" * (megabytes << 20)
+
+
+def test_large_bodies_go_to_disk_while_views_go_on():
+    with serving(FAKE_FRAME_MS=1) as d:
+        assert put(d, "a", WALL_1).status == 201
+
+        def work(i):
+            if i < 2:
+                return put(d, f"big{i}", large(24)).status
+            connection = d.connect()
+            return {d.ask("/v1/datasets/a/view?width=16&height=16", headers=AUTH, connection=connection).status
+                    for _ in range(100)}
+        results = together(6, work)
+        assert results == [422, 422] + 4 * [{200}], results
+        assert d.ask("/v1/status", headers=AUTH).json()["memory"]["resident_bytes"] < 150 << 20
+        assert left_over(d) == []
+
+
+def test_clients_that_leave_leave_nothing():
+    with serving() as d:
+        for sent in (0, 1000, 1_500_000, 3_000_000):
+            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: x\r\nContent-Length: 9999999\r\n"
+                          f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + b"x" * sent)
+                eventually(lambda: "gone" in listed(d))
+                if sent > 2_000_000:  # reset instead of the end of a stream
+                    s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            eventually(lambda: "gone" not in listed(d))
+            eventually(lambda: left_over(d) == [])
+        assert put(d, "gone", WALL_1).status == 201
+
+
+def test_one_change_of_a_dataset_at_a_time():
+    with serving() as d:
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: x\r\nContent-Length: {len(WALL_1)}\r\n"
+                      f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
+            eventually(lambda: listed(d).get("a", {}).get("state") == "loading")
+            assert small(d, "a").status == 503
+            for reply in (put(d, "a", WALL_2), delete(d, "a")):
+                assert reply.status == 503 and reply.json()["field"] == "id", reply.body
+            s.sendall(WALL_1[1000:])
+            assert b" 201 " in s.recv(4096)
+        assert small(d, "a").status == 200
+
+
+def test_a_file_that_was_named_itself_is_the_operators():
+    with serving(named=[WALL]) as d:
+        assert put(d, "wall", WALL_2).status == 409 and delete(d, "wall").status == 409
+        assert small(d, "wall").status == 200 and os.path.exists(WALL)
+    with tempfile.NamedTemporaryFile("w") as tokens:
+        tokens.write(f"{ADMIN} admin\n")
+        tokens.flush()
+        with Daemon(FAKE, "--tokens", tokens.name) as d:
+            assert put(d, "new", WALL_1).status == 409
+
+
+def test_put_under_load_fails_nobody():
+    with serving("--queue", "256", FAKE_FRAME_MS=2) as d:
+        assert put(d, "a", WALL_1).status == 201
+        stop, failures = threading.Event(), []
+
+        def load():
+            connection = d.connect()
+            while not stop.is_set():
+                reply = d.ask("/v1/datasets/a/view?width=16&height=16", headers=AUTH, connection=connection)
+                if reply.status != 200:
+                    failures.append(reply.body)
+        threads = [threading.Thread(target=load) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        versions = {put(d, "a", WALL_2 if i % 2 else WALL_1).json()["version"] for i in range(8)}
+        stop.set()
+        for thread in threads:
+            thread.join()
+        assert not failures and len(versions) == 2, failures[:2]
+
+
+def test_a_full_disk_is_said():
+    def limit():  # bytes a file may have; as with a full disk, write() fails
+        import resource
+        import signal
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))
+    with serving("--max-upload", "4096T", preexec=limit) as d:
+        reply = put(d, "a", large(5))
+        assert reply.status == 507 and reply.json()["field"] == "body", reply.body
+        assert listed(d) == {} and left_over(d) == []
+        reply = d.ask("/v1/datasets/a", "PUT", b"", {**AUTH, "Content-Length": str(1 << 50)})
+        assert reply.status == 507 and "free" in reply.json()["detail"], reply.body
+        assert put(d, "a", WALL_1).status == 201
+
+
+def test_sigterm_waits_for_an_upload():
+    with serving() as d:
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: x\r\nContent-Length: {len(WALL_1)}\r\n"
+                      f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
+            eventually(lambda: "a" in listed(d))
+            d.process.terminate()
+            time.sleep(0.3)
+            s.sendall(WALL_1[1000:])
+            assert b" 201 " in s.recv(4096)
+        assert d.wait_exit() == 0
+        assert (d.home / "a.spld").read_bytes() == WALL_1 and left_over(d) == []
+
+
+run(globals())
