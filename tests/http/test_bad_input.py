@@ -87,7 +87,7 @@ def test_wrong_methods_say_what_is_allowed():
     with Daemon(FAKE) as d:
         for path, methods, allow in [("/", ["POST", "DELETE", "OPTIONS"], "GET, HEAD"),
                                      ("/v1/status", ["POST", "PUT"], "GET, HEAD"),
-                                     ("/v1/datasets/wall", ["PATCH", "DELETE"], "GET, HEAD"),
+                                     ("/v1/datasets/wall", ["PATCH", "POST"], "GET, HEAD, PUT, DELETE"),
                                      (VIEW, ["PUT", "DELETE", "OPTIONS", "BREW"], "GET, HEAD, POST")]:
             for method in methods:
                 reply = d.ask(path, method)
