@@ -85,7 +85,7 @@ fetch "$url?width=1280&height=720" "$dir/view.jpg"
 fetch "$url?width=1280&height=720&layer=depth&format=png" "$dir/depth.png"
 say "colour           $dir/view.jpg"
 say "depth in mm      $dir/depth.png"
-say "open             $url"
+say "look round       http://127.0.0.1:$port/"
 [ -z "$once" ] || exit 0
 say "Ctrl-C ends the daemon"
 wait "$daemon"
