@@ -73,7 +73,7 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
 int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, double fps, double seconds,
                           size_t *count_out, double *fps_out, struct spl_error *err)
 {
-    bool timed = path->times && path->count > 1;
+    bool timed = path->times && path->count > 1, given = !isnan(seconds);
     if (!isnan(fps) && !(fps > 0 && fps <= fps_max))
         return spl_fail_field(err, SPL_E_INPUT, "fps", "fps %g is outside 0 (exclusive) to %g", fps, fps_max);
     if (!isnan(seconds) && !(seconds > 0 && seconds <= seconds_max))
@@ -91,6 +91,8 @@ int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, dou
                               "keyframes without times do not say how long the way is; give frames or seconds");
     if (!frames && isnan(seconds))
         seconds = path->times[path->count - 1] - path->times[0];
+    if (!frames && !given && path->closed) // the way back takes the mean of the others
+        seconds *= (double)path->count / (double)(path->count - 1);
     double count = frames ? (double)frames : floor(seconds * *fps_out + 0.5);
     if (count > SPL_CAMERA_PATH_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, frames ? "frames" : "seconds", "%.0f frames; the limit is %d", count,

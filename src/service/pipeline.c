@@ -156,7 +156,8 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     int rc;
     if ((rc = spl_queue_create(options->queue, &pipeline->render, err)) ||
         (rc = spl_queue_create(options->encoders, &pipeline->encode, err)) ||
-        (rc = spl_queue_create(2 * options->queue + 2 * options->encoders + 1, &pipeline->done, err)))
+        (rc = spl_queue_create(2 * options->queue + 2 * options->encoders + 2 * SPL_QUEUE_BEHIND + 1, &pipeline->done,
+                               err)))
         goto fail;
     for (; pipeline->encode_started < options->encoders; pipeline->encode_started++) {
         pthread_t *thread = &pipeline->encode_threads[pipeline->encode_started];
@@ -224,7 +225,7 @@ int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, stru
     if (!atomic_load(&pipeline->in_flight))
         spl_pipeline_touch(pipeline); // the end of idleness is no hang
     if (atomic_fetch_add(&pipeline->in_flight, 1) < spl_queue_get_capacity(pipeline->done) &&
-        spl_queue_try_push(pipeline->render, job))
+        (job->behind ? spl_queue_try_push_behind(pipeline->render, job) : spl_queue_try_push(pipeline->render, job)))
         return 0;
     atomic_fetch_sub(&pipeline->in_flight, 1);
     return spl_fail(err, SPL_E_BUSY, "the queue of %zu views is full; come back later",

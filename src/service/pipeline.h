@@ -25,6 +25,8 @@ struct spl_job {
     uint64_t accepted_ns;
     _Atomic uint64_t deadline_ns;      /* the loop may raise it at any time */
     atomic_bool dropped;               /* set by the loop at any time: nobody waits for it, skip the work */
+    bool behind;                       /* a tour's frame: made while nobody's view waits */
+    size_t frame_number;               /* of it */
     void *owner;                       // owned by: loop
     void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
 

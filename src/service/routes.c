@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "service/state.h"
+#include "service/tour.h"
 
 static const char *const methods[] = {[SPL_GET] = MHD_HTTP_METHOD_GET,
                                       [SPL_POST] = MHD_HTTP_METHOD_POST,
@@ -59,8 +60,8 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request));
 }
 
-/* "{id}" stands for a dataset, "{name}" for any other segment. Methods of one pattern that need different scopes are
- * rows of their own. */
+/* "{id}" stands for a dataset, "{n}" for a number, "{name}" for any other segment. Methods of one pattern that need
+ * different scopes are rows of their own. */
 static const struct route {
     const char *pattern;
     unsigned methods;
@@ -81,12 +82,21 @@ static const struct route {
     {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
+    {"/v1/datasets/{id}/tours", POST, SPL_SCOPE_TOUR, false, spl_create_tour},
+    {"/v1/tours", GET, SPL_SCOPE_TOUR, false, spl_list_tours},
+    {"/v1/tours/{name}", GET, SPL_SCOPE_TOUR, false, spl_show_tour},
+    {"/v1/tours/{name}", DELETE, SPL_SCOPE_TOUR, false, spl_remove_tour},
+    {"/v1/tours/{name}/events", GET, SPL_SCOPE_TOUR, false, spl_show_tour_events},
+    {"/v1/tours/{name}/stream", GET, SPL_SCOPE_TOUR, false, spl_show_tour_stream},
+    {"/v1/tours/{name}/frames/{n}", GET, SPL_SCOPE_TOUR, false, spl_show_tour_frame},
+    {"/v1/tours/{name}/frames.zip", GET, SPL_SCOPE_TOUR, false, spl_show_tour_zip},
+    {"/v1/tours/{name}/video.mp4", GET, SPL_SCOPE_TOUR, false, spl_show_tour_video},
 };
 
 /* What a path has in the holes of a pattern, still encoded. */
 struct holes {
-    const char *id, *name; // may be NULL
-    size_t id_length, name_length;
+    const char *id, *name, *number; // may be NULL
+    size_t id_length, name_length, number_length;
 };
 
 static bool match(const char *pattern, const char *path, struct holes *holes)
@@ -102,6 +112,8 @@ static bool match(const char *pattern, const char *path, struct holes *holes)
             return false;
         if (!strncmp(pattern, "{id}", 4))
             holes->id = path, holes->id_length = length;
+        else if (!strncmp(pattern, "{n}", 3))
+            holes->number = path, holes->number_length = length;
         else
             holes->name = path, holes->name_length = length;
         pattern = strchr(pattern, '}') + 1;
@@ -141,6 +153,8 @@ static int fill(const struct holes *holes, struct spl_call *call, struct spl_err
     int rc = 0;
     if (holes->name)
         rc = spl_percent_decode(holes->name, holes->name_length, call->name, sizeof call->name, "name", err);
+    if (!rc && holes->number)
+        rc = spl_percent_decode(holes->number, holes->number_length, call->number, sizeof call->number, "n", err);
     if (!rc && holes->id)
         rc = spl_percent_decode(holes->id, holes->id_length, call->id, sizeof call->id, "id", err);
     return rc;

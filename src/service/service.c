@@ -19,6 +19,7 @@
 #include "service/ops.h"
 #include "service/state.h"
 #include "service/supervisor.h"
+#include "service/tour.h"
 
 enum {
     drain_check_ms = 20,
@@ -50,6 +51,7 @@ static void drain(struct spl_service *service)
         return;
     }
     spl_http_quiesce(service);
+    spl_tours_end_streams(service->tours);
     uv_timer_start(&service->drain_timer, on_drain_timer, drain_check_ms, drain_check_ms);
 }
 
@@ -115,6 +117,7 @@ static void on_wake(uv_async_t *handle)
     }
     spl_library_take_changes(service);
     spl_waiting_complete(service);
+    spl_tours_pump(service->tours);
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
         service->failure = *spl_pipeline_get_failure(service->pipeline);
         drain(service);
@@ -165,6 +168,7 @@ static int init_loop(struct spl_service *service, struct spl_error *err)
     service->hangup.data = service;
     uv_signal_start(&service->hangup, on_hangup, SIGHUP);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); // a file at its limit is an error like a full disk
     return 0;
 }
 
@@ -238,7 +242,8 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     if ((rc = open_sockets(service, err)) || (rc = spl_access_init(service, err)) ||
         (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
                                err)) ||
-        (rc = spl_cache_create(options->cache_bytes, &service->cache, err)) || (rc = start_pipeline(service, err)))
+        (rc = spl_cache_create(options->cache_bytes, &service->cache, err)) ||
+        (*options->tours && (rc = spl_tours_open(service, options->tours, err))) || (rc = start_pipeline(service, err)))
         goto done;
     spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);
@@ -247,6 +252,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
         *err = service->failure;
 done:
     spl_ops_stop(service);
+    spl_tours_stop(service->tours);
     spl_library_stop(service);
     spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_pipeline_destroy(service->pipeline);
@@ -256,6 +262,7 @@ done:
     if (service->listen_fd >= 0)
         close(service->listen_fd);
     finish_loop(service);
+    spl_tours_close(service->tours);
 free_service:
     free(service);
     return rc;

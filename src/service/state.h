@@ -98,6 +98,7 @@ struct spl_service {
     struct library library;
     struct spl_access *access; // may be NULL: there is nothing to check
     struct spl_pipeline *pipeline;
+    struct spl_tours *tours; /* tour.h; NULL without --tours */
     struct spl_counters counters;
     struct spl_latencies latencies;
     struct spl_access_log access_log;
@@ -179,6 +180,7 @@ struct spl_call {
     char id[256];                    /* of the dataset in the path, decoded; "" without */
     struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a route of scope ADMIN
     char name[256];                  /* the path's other segment, decoded; "" without */
+    char number[24];                 /* the path's {n}, decoded; "" without */
 };
 
 /* view_route.c: /v1/datasets/{id}/view. */

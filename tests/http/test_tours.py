@@ -1,0 +1,370 @@
+"""Tours: made to their end, watched, cancelled, killed in the middle and gone on with, refused, out of disk."""
+import http.client
+import io
+import json
+import os
+import pathlib
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import zipfile
+
+from harness import FAKE, REAL, VIEW, WALL, Daemon, check_problem, eventually, run, Reply
+
+TOURS = "/v1/datasets/wall/tours"
+SMALL = dict(width=64, height=48)
+
+
+def look(x, y=0.2, z=1.0, **more):
+    return {"camera": {"eye": [x, y, z], "target": [0, 0, 1], "fov": 60}, **more}
+
+
+def body(frames=6, **more):
+    return {"path": {"keyframes": [look(3), look(2, -1, 2), look(4, 1)]}, "frames": frames, "settings": SMALL, **more}
+
+
+class Folder:
+    def __enter__(self):
+        self.path = pathlib.Path(tempfile.mkdtemp(prefix="splatd-tours-"))
+        return self.path
+
+    def __exit__(self, *_):
+        shutil.rmtree(self.path, ignore_errors=True)
+
+
+def begin(d, document, status=202):
+    reply = d.post(document, TOURS)
+    assert reply.status == status, (reply.status, reply.body)
+    if status == 202:
+        assert reply.headers["Location"] == reply.json()["uri"]
+    return reply.json()
+
+
+def ended(d, uri, state="done"):
+    eventually(lambda: d.ask(uri).json()["state"] in ("done", "failed"), 120)
+    tour = d.ask(uri).json()
+    assert tour["state"] == state, tour
+    return tour
+
+
+def read_stream(d, uri):
+    """Reads a stream to its end as a client that takes its time would; the headers and the whole body."""
+    connection = d.connect(120)
+    connection.request("GET", uri)
+    answer = connection.getresponse()
+    reply = Reply(answer.status, answer.headers, answer.read())
+    connection.close()
+    return reply
+
+
+def events_of(text):
+    found = []
+    for block in text.decode().split("\n\n"):
+        fields = dict(re.findall(r"^(event|data|id|retry): (.*)$", block, re.M))
+        if "event" in fields:
+            found.append((fields["event"], json.loads(fields["data"])))
+    return found
+
+
+def parts_of(reply):
+    assert reply.headers["Content-Type"] == "multipart/x-mixed-replace; boundary=splatd-frame"
+    parts, rest = [], reply.body
+    while not rest.startswith(b"--splatd-frame--"):
+        head, rest = rest.split(b"\r\n\r\n", 1)
+        assert head.startswith(b"--splatd-frame\r\nContent-Type: image/"), head
+        length = int(re.search(rb"Content-Length: (\d+)", head)[1])
+        parts.append(rest[:length])
+        assert rest[length:length + 2] == b"\r\n"
+        rest = rest[length + 2:]
+    return parts
+
+
+def frames_of(d, tour):
+    return [d.ask(tour["frame"].replace("{n}", str(n))).body for n in range(tour["frames"])]
+
+
+def test_without_a_folder_every_route_says_so():
+    with Daemon(FAKE) as d:
+        for method, path in [("POST", TOURS), ("GET", "/v1/tours"), ("GET", "/v1/tours/0123456789abcdef"),
+                             ("DELETE", "/v1/tours/0123456789abcdef"), ("GET", "/v1/tours/0123456789abcdef/events"),
+                             ("GET", "/v1/tours/0123456789abcdef/stream"), ("GET", "/v1/tours/0123456789abcdef/frames/0"),
+                             ("GET", "/v1/tours/0123456789abcdef/frames.zip"),
+                             ("GET", "/v1/tours/0123456789abcdef/video.mp4")]:
+            reply = d.ask(path, method, json.dumps(body()) if method == "POST" else None)
+            assert reply.status == 501 and "--tours DIR" in reply.json()["detail"], (path, reply.body)
+
+
+def nerfstudio():
+    matrices = [[0, 0, 1, 3 - 0.25 * i, 1, 0, 0, 0.1 * i, 0, 1, 0, 1, 0, 0, 0, 1] for i in range(4)]
+    return matrices, {"camera_type": "perspective", "render_width": 64, "render_height": 48, "fps": 24, "seconds": 1,
+                      "is_cycle": False, "keyframes": [], "camera_path":
+                      [{"camera_to_world": m, "fov": 60, "aspect": 4 / 3} for m in matrices]}
+
+
+def check_files(d, tour, frames):
+    uri = tour["frame"].replace("{n}", "1")
+    whole = d.ask(uri)
+    tag = {"If-Range": whole.headers["ETag"]}
+    assert whole.headers["Content-Type"] == "image/jpeg" and whole.body == frames[1]
+    for text, first, last in [("0-9", 0, 10), ("5-", 5, None), ("-7", -7, None), ("10-99999999", 10, None)]:
+        part = d.ask(uri, headers={"Range": "bytes=" + text, **tag})
+        assert part.status == 206 and part.body == whole.body[first:last], (text, part.status)
+    assert d.ask(uri, headers={"Range": "bytes=0-9", "If-Range": '"another"'}).body == whole.body
+    assert d.ask(uri, headers={"Range": "bytes=0-1,4-5"}).status == 200
+    assert d.ask(uri, headers={"Range": f"bytes={len(whole.body)}-"}).status == 416
+    assert d.ask(uri, headers={"If-None-Match": whole.headers["ETag"]}).status == 304
+    head = d.ask(uri, "HEAD")
+    assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body) and not head.body
+    for n in ("4", "-1", "1e0", "99999999999", "x"):
+        assert d.ask(tour["frame"].replace("{n}", n)).status == 404
+    archive = zipfile.ZipFile(io.BytesIO(d.ask(tour["zip"]).body))
+    assert archive.testzip() is None and archive.namelist() == [f"{n:06}.jpeg" for n in range(4)]
+    assert [archive.read(name) for name in archive.namelist()] == frames
+
+
+def check_video(d, tour, frames):
+    reply = d.ask(tour["video"])
+    if reply.status == 501:
+        return
+    assert reply.status == 200 and reply.headers["Content-Type"] == "video/mp4"
+    assert d.ask(tour["video"], headers={"Range": "bytes=4-7"}).body == b"ftyp"
+    assert d.ask(tour["video"], headers={"Range": "bytes=0-1", "If-Range": '"x"'}).body == reply.body
+    assert d.ask(tour["video"], headers={"Range": "bytes=999999999-"}).status == 416
+    assert d.ask(tour["video"], headers={"If-None-Match": "*"}).status == 304
+    if not shutil.which("ffprobe"):
+        return
+    with tempfile.NamedTemporaryFile(suffix=".mp4") as file:
+        file.write(reply.body)
+        file.flush()
+        probe = ["ffprobe", "-v", "error", "-count_frames", "-of", "json", "-show_entries",
+                 "stream=codec_name,width,height,nb_read_frames,avg_frame_rate,pix_fmt,color_space", file.name]
+        [stream] = json.loads(subprocess.run(probe, check=True, stdout=subprocess.PIPE).stdout)["streams"]
+    assert stream == {"codec_name": "h264", "width": 64, "height": 48, "pix_fmt": "yuv420p", "color_space": "bt709",
+                      "avg_frame_rate": "24/1", "nb_read_frames": str(frames)}, stream
+
+
+def can_make_video(d):
+    return d.post({**body(), "video": True, "settings": {"width": 63, "height": 48}}, TOURS).status != 501
+
+
+def test_a_camera_path_becomes_frames_a_zip_a_stream_and_a_video():
+    matrices, path = nerfstudio()
+    with Folder() as folder, Daemon(REAL, "--tours", str(folder)) as d:
+        video = can_make_video(d)
+        uri = begin(d, {"path": path, "video": video, "settings": {"lod": 0.5}})["uri"]
+        events = events_of(read_stream(d, uri + "/events").body)
+        tour = ended(d, uri)
+        assert events[-1][0] == "end" and events[-1][1] == tour, (events[-1], tour)
+        assert {name for name, _ in events[:-1]} <= {"progress"}
+        done = [status["frames_done"] for _, status in events]
+        assert done == sorted(done) and done[-1] == 4 and tour["progress"] == 1 and tour["remaining_s"] == 0
+        assert (tour["fps"], tour["width"], tour["height"], tour["format"]) == (24, 64, 48, "jpeg")
+        assert d.ask("/v1/tours").json()["tours"] == [tour] and tour["ended"] >= tour["created"]
+        frames = frames_of(d, tour)
+        for matrix, frame in zip(matrices, frames):  # a frame is the view from there
+            view = {"camera": {"matrix": matrix, "convention": "opengl", "fov": 60}, "lod": 0.5, **SMALL}
+            assert d.post(view).body == frame
+        assert len(set(frames)) == 4
+        check_files(d, tour, frames)
+        if video:
+            check_video(d, tour, 4)
+        assert parts_of(read_stream(d, tour["stream"])) == frames
+        eventually(lambda: sum(f.stat().st_size for f in (folder / tour["name"]).iterdir() if f.name[0] != ".")
+                   == d.ask("/v1/tours").json()["bytes"])
+        assert d.ask(uri, "DELETE").status == 204 and d.ask(uri).status == 404
+        assert d.ask("/v1/tours").json() == {"tours": [], "bytes": 0, "bytes_max": 10 << 30}
+        eventually(lambda: not list(folder.iterdir()))
+
+
+def test_every_format_and_member_is_taken():
+    extrinsic = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]
+    intrinsic = {"width": 64, "height": 48, "intrinsic_matrix": [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1]}
+    paths = [
+        ("1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n", 2),
+        ({"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": extrinsic, "intrinsic": intrinsic}]}, 1),
+        ({"cameras_txt": "1 PINHOLE 64 48 50 50 32 24\n", "images_txt": "1 1 0 0 0 0 0 0 1 a.png\n\n"}, 1),
+        ({"frames": [look(3), look(4), look(5)]}, 3),
+    ]
+    motion = {"positions": "uniform", "rotations": "slerp", "ease": "in-out", "closed": True}
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
+        for path, frames in paths:
+            tour = begin(d, {"path": path, "settings": SMALL})
+            assert tour["frames"] == frames
+            ended(d, tour["uri"])
+        tour = begin(d, {"path": {"keyframes": [look(3, time=0), look(4, time=0.5)]}, "settings": SMALL, "fps": 10,
+                         "seconds": 1, "interpolation": motion})
+        assert tour["frames"] == 10 and tour["fps"] == 10
+        ended(d, tour["uri"])
+        for layer, kind, start in [("depth", "png", b"\x89PNG"), ("normal", "npy", b"\x93NUMPY"), ("id", "raw", b"\xff" * 0)]:
+            tour = begin(d, body(2, settings={**SMALL, "layer": layer, "format": kind}))
+            ended(d, tour["uri"])
+            assert all(frame.startswith(start) for frame in frames_of(d, tour))
+        assert d.ask(tour["stream"]).status == 409 and d.ask(tour["uri"] + "/video.mp4").status == 404
+
+
+def test_bad_tours_are_refused_by_field():
+    cases = [
+        ("", "body"), ("[]", "body"), ("{", "body"), ({}, "path"), ({"path": 5}, "path"), ({"path": {}}, "path"),
+        ({"path": "1 2 3"}, "tz"), ({**body(), "shade": 1}, "shade"), ({**body(), "frames": 0}, "frames"),
+        ({**body(), "frames": 1.5}, "frames"), ({**body(), "frames": "2"}, "frames"), ({**body(), "fps": 0}, "fps"),
+        ({**body(), "seconds": 2}, "seconds"), ({"path": body()["path"]}, "frames"),
+        ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].eye"),
+        ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
+        ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
+        ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),
+        ({**body(), "interpolation": {"positions": "cubic"}}, "positions"),
+        ({**body(), "interpolation": {"rotations": 7}}, "rotations"), ({**body(), "settings": []}, "settings"),
+        ({**body(), "settings": {"width": 64}}, "settings.width"),
+        ({**body(), "settings": {"width": 64, "height": 9999}}, "settings.height"),
+        ({**body(), "settings": {"quality": 500}}, "settings.quality"),
+        ({**body(), "settings": {"camera": {}}}, "settings.camera"), ({**body(), "settings": {"x": 1}}, "settings.x"),
+        ({**body(), "settings": {"budget": "5ms"}}, "settings.budget"),
+        ({**body(), "settings": {"psnr": 30}}, "settings.psnr"), ({**body(), "settings": {"v": "0" * 16}}, "settings.v"), ({**body(), "video": 1}, "video"),
+        ({**body(), "video": True, "settings": {**SMALL, "layer": "depth", "format": "png"}}, "video"),
+    ]
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
+        for document, field in cases:
+            reply = d.post(document, TOURS)
+            assert reply.status == 400 and reply.json()["field"] == field, (document, reply.body)
+        if can_make_video(d):
+            assert begin(d, body(video=True, settings={"width": 64, "height": 47}), 400)["field"] == "height"
+        assert d.ask("/v1/datasets/none/tours", "POST", json.dumps(body())).status == 404
+        for path in ("/v1/tours/..%2f..%2fetc", "/v1/tours/0123456789abcdef", "/v1/tours/x/events"):
+            assert d.ask(path).status == 404
+        assert d.ask("/v1/tours?x=1").status == 400 and d.ask("/v1/tours", "DELETE").status == 405
+        assert not list(folder.iterdir())
+
+
+def test_quotas():
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-frames", "8", "--tour-pixels", "20000",
+                                    "--tour-disk", "60K", "--tour-age", "1") as d:
+        assert begin(d, body(9), 400)["field"] == "frames"
+        assert begin(d, body(7), 400)["field"] == "frames"  # 21,504 pixels
+        kept = begin(d, body(6))
+        ended(d, kept["uri"])
+        full = begin(d, body(6, settings={**SMALL, "format": "raw"}))  # 12 KiB a frame
+        failed = ended(d, full["uri"], "failed")
+        assert "61440 bytes" in failed["error"] and 0 < failed["frames_done"] < 6, failed
+        assert d.ask(failed["frame"].replace("{n}", "0")).status == 200
+        assert d.ask(failed["frame"].replace("{n}", "5")).status == 409
+        assert len(zipfile.ZipFile(io.BytesIO(d.ask(failed["zip"]).body)).namelist()) == failed["frames_done"]
+        assert d.ask(failed["stream"]).status == 409  # raw
+        eventually(lambda: d.ask("/v1/tours").json()["tours"] == [], 60)  # old
+        eventually(lambda: not list(folder.iterdir()))
+        ended(d, begin(d, body(2))["uri"])
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "0") as d:
+        assert "0 bytes" in begin(d, body(), 503)["detail"]
+
+
+def test_cancelling_ends_streams_and_removes_files():
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:
+        tour = begin(d, body(5000))
+        other = begin(d, body(1))
+        assert d.ask(tour["zip"]).status == 409 and d.ask(tour["frame"].replace("{n}", "4999")).status == 409
+        replies = {}
+        threads = [threading.Thread(target=lambda name=name: replies.update({name: read_stream(d, tour[name])}))
+                   for name in ("events", "stream")]
+        for thread in threads:
+            thread.start()
+        eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > 5)
+        status = d.ask(tour["uri"]).json()
+        assert status["state"] == "rendering" and status["remaining_s"] > 0 and 0 < status["progress"] < 1
+        assert d.view(**SMALL).status == 200  # in between
+        assert d.ask(tour["uri"], "DELETE").status == 204 and d.ask(tour["uri"], "DELETE").status == 404
+        for thread in threads:
+            thread.join(60)
+        assert events_of(replies["events"].body)[-1][0] == "removed"
+        assert parts_of(replies["stream"])
+        ended(d, other["uri"])
+        eventually(lambda: {p.name for p in folder.iterdir()} == {other["name"]})
+        assert d.status()["counters"]["tour_frames"] < 5000
+
+
+def depth_tour(frames):
+    return body(frames, settings={**SMALL, "layer": "depth", "format": "png", "depth_scale": 100})
+
+
+def test_a_killed_tour_goes_on_with_the_same_bytes():
+    with Folder() as folder, Folder() as plain:
+        with Daemon(FAKE, "--tours", str(plain)) as d:
+            wanted = frames_of(d, ended(d, begin(d, depth_tour(60))["uri"]))
+        assert len(set(wanted)) > 30  # the fake renderer's depth follows the eye
+        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=10) as d:
+            tour = begin(d, depth_tour(60))
+            eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] >= 15)
+            d.process.send_signal(signal.SIGKILL)
+            d.wait_exit()
+        files = {f.name: f.stat().st_ino for f in (folder / tour["name"]).iterdir() if f.name[0] != "."}
+        assert 15 <= len(files) - 1 < 60, files
+        (folder / "0123456789abcdef").mkdir()  # no tour of ours: left alone, and said so
+        (folder / ".fedcba9876543210").mkdir()  # half removed
+        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:  # ended by SIGTERM, a stream open
+            stream = threading.Thread(target=read_stream, args=(d, tour["events"]))
+            stream.start()
+            eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > len(files))
+            assert any("0123456789abcdef is left alone" in line for line in d.lines)
+            assert d.stop() == 0
+            stream.join(60)
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            tour = ended(d, tour["uri"])
+            assert frames_of(d, tour) == wanted
+            after = {f.name: f.stat().st_ino for f in (folder / tour["name"]).iterdir()}
+            assert {n: i for n, i in after.items() if n in files and n != "tour.json"} == \
+                {n: i for n, i in files.items() if n != "tour.json"}  # not made again
+            assert not (folder / ".fedcba9876543210").exists()
+        with Daemon(FAKE, "--tours", str(folder)) as d:  # done is done
+            assert d.ask(tour["uri"]).json() == tour and frames_of(d, tour)[:2] == wanted[:2]
+            shutil.rmtree(folder / "0123456789abcdef")
+
+
+def test_a_lost_device_does_not_end_a_tour():
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), SPLATD_INJECT_LOSS_AFTER="5x2") as d:
+        assert ended(d, begin(d, body(20))["uri"])["frames_done"] == 20
+
+
+def test_a_full_disk_ends_the_tour_and_nothing_else():
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
+        resource.prlimit(d.process.pid, resource.RLIMIT_FSIZE, (8000, 8000))
+        tour = ended(d, begin(d, body(6, settings={**SMALL, "format": "raw"}))["uri"], "failed")
+        assert "File too large" in tour["error"] and tour["frames_done"] == 0, tour
+        assert not [f for f in (folder / tour["name"]).iterdir() if f.name.endswith("raw")]
+        assert d.view(**SMALL).status == 200
+        assert ended(d, begin(d, body(2))["uri"])["frames_done"] == 2
+        if can_make_video(d):
+            tour = ended(d, begin(d, body(400, video=True))["uri"],
+                         "failed")
+            assert "File too large" in tour["error"] and tour["frames_done"] == 400, tour
+    if os.getuid():
+        return  # what follows needs the right to mount
+    with Folder() as folder:
+        small = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], stderr=subprocess.DEVNULL)
+        if small.returncode:
+            return
+        try:
+            with Daemon(FAKE, "--tours", str(folder)) as d:
+                tour = ended(d, begin(d, body(20, settings={**SMALL, "format": "raw"}))["uri"], "failed")
+                assert "No space left" in tour["error"] and 0 < tour["frames_done"] < 20, tour
+                assert d.ask(tour["uri"], "DELETE").status == 204
+                eventually(lambda: not list(folder.iterdir()))
+                ended(d, begin(d, body(2))["uri"])
+        finally:
+            subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_two_services_do_not_share_a_folder():
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder)):
+        second = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", str(folder), WALL], timeout=60,
+                                stderr=subprocess.PIPE, text=True)
+        assert second.returncode == 2 and "another service keeps its tours" in second.stderr, second
+    for where in ("/proc/none/x", WALL):
+        refused = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", where, WALL], timeout=60,
+                                 stderr=subprocess.PIPE, text=True)
+        assert refused.returncode and "tours' folder" in refused.stderr, refused
+
+
+run(globals())
