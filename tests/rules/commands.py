@@ -21,7 +21,7 @@ def check(arguments, code, where):
 
 overview = check(["--help"], 0, "stdout")
 commands = re.findall(r"^  ([a-z]+) {2,}\S", overview, re.MULTILINE)
-if sorted(commands) != sorted("serve pack render info synth bench compare devices sign".split()):
+if sorted(commands) != sorted("serve pack render tour info synth bench compare devices sign".split()):
     wrong.append(f"splatd --help lists {commands}")
 for command in commands:
     text = check([command, "--help"], 0, "stdout")
