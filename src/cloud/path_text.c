@@ -94,14 +94,13 @@ static int by_name(const void *a, const void *b)
 int spl_path_read_views(struct spl_path_reader *reader, struct spl_view_list *views, struct spl_error *err)
 {
     const struct spl_camera_defaults *defaults = reader->options->defaults;
-    const struct spl_camera *first = &views->views[0].camera;
     int rc = 0;
     reader->path->whole = true;
     reader->list = "images";
     if (!views->count)
         return 0;
     qsort(views->views, views->count, sizeof *views->views, by_name);
-    rc = spl_path_set_size(reader, first->width, first->height, err);
+    rc = spl_path_set_size(reader, views->views[0].camera.width, views->views[0].camera.height, err);
     for (size_t i = 0; !rc && i < views->count; i++) {
         struct spl_camera camera = views->views[i].camera;
         struct spl_error why = {0};

@@ -1,6 +1,6 @@
 """The figures of RESULTS.md, one subcommand each, on the scan of a vault (11.6 M points) that lies beside the checkout.
 
-usage: measure.py frames|scaling|http|pack|size|planner
+usage: measure.py frames|scaling|http|pack|size|planner|tours [FRAMES]
 
 Prints what was measured and, where a figure has a bound, how it stands to it; exit 1 beyond a bound, 77 without the data.
 Frame times are bounded in units of the calibrator that 'splatd bench' runs beside each frame, so a slow or busy machine
@@ -361,9 +361,73 @@ def planner():
         daemon.wait(30)
 
 
+def tour_body(frames):
+    """From the overview to the close view of the scan."""
+    views = json.loads((DATA / "cameras.json").read_text())["grenoble"]
+    keys = [{"camera": {**{k: v[k] for k in ("eye", "target", "up")}, "fov": v["vfov_deg"]}}
+            for v in (views["overview"], views["close"])]
+    return {"path": {"keyframes": keys}, "frames": frames, "settings": {"width": 1280, "height": 720, "lod": 2}}
+
+
+def served_tour(port, body):
+    """Seconds from the first frame on disk to the last, as the tour's events say."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
+    connection.request("POST", "/v1/datasets/grenoble/tours", json.dumps(body))
+    uri = json.loads(connection.getresponse().read())["uri"]
+    connection.request("GET", uri + "/events")
+    events, first, done = connection.getresponse(), None, 0
+    for line in events:
+        if line.startswith(b"data: "):
+            status, now = json.loads(line[6:]), time.monotonic()
+            if status["frames_done"] and first is None:
+                first, begun = status["frames_done"], now
+            if status["frames_done"] > done:
+                done, last = status["frames_done"], now
+    if status["state"] != "done":
+        sys.exit(f"the tour has failed: {status['error']}")
+    connection.request("DELETE", uri)
+    connection.getresponse().read()
+    return (last - begun) / (done - first)
+
+
+def bare_tour(dataset, body, folder):
+    """The same in one process: render, encode, write, one after the other."""
+    path = pathlib.Path(folder) / "path.json"
+    path.write_text(json.dumps(body["path"]))
+    said = subprocess.run([SPLATD, "tour", dataset, "--path", path, "--frames", str(body["frames"]), "--size", "1280x720",
+                           "--lod", "2", "-o", pathlib.Path(folder) / "bare"], check=True, stderr=subprocess.PIPE, text=True)
+    return float(re.search(r"in ([\d.]+) s", said.stderr)[1]) / (body["frames"] - 1)
+
+
+def tours():
+    frames = int(sys.argv[2]) if len(sys.argv) > 2 else 300
+    dataset, port, body, ratios = packed(scan(), "grenoble"), free_port(), tour_body(frames), []
+    with tempfile.TemporaryDirectory() as folder:
+        for turn in range(3):
+            daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--tours", folder + "/tours",
+                                       "--quiet", dataset])
+            try:
+                while True:
+                    try:
+                        if get(port, "/v1/tours")[0] == 200:
+                            break
+                    except OSError:
+                        time.sleep(0.05)
+                served = served_tour(port, body)
+            finally:
+                daemon.send_signal(signal.SIGTERM)
+                daemon.wait(30)
+            bare = bare_tour(dataset, body, folder)
+            ratios.append(served / bare)
+            print(f"turn {turn + 1}: a frame of the tour {1000 * served:.1f} ms, a bare one {1000 * bare:.1f} ms")
+    print("ratios: " + ", ".join(f"{r:.3f}" for r in ratios))
+    bound(f"{frames} frames of a tour against as many bare ones", statistics.median(ratios), 1.05, "times")
+
+
 if __name__ == "__main__":
-    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner}
-    if len(sys.argv) != 2 or sys.argv[1] not in figures:
+    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner,
+               "tours": tours}
+    if not 2 <= len(sys.argv) <= (3 if sys.argv[1:2] == ["tours"] else 2) or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)
     if sys.argv[1] != "planner":
