@@ -9,6 +9,7 @@ import {askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
+import {renderTours} from "./tour_render.js";
 
 const $ = (id) => document.getElementById(id);
 const SETTINGS = ["layer", "method", "lod", "supersample", "budget"];
@@ -50,13 +51,14 @@ function writeLink() {
 async function open() {
   const wanted = parse(location.hash);
   try {
-    const [{datasets}, {limits, device}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
+    const [{datasets}, {limits, device, tours}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
     const ids = datasets.map(({id}) => id);
     const id = wanted.dataset ?? ids[0];
     choices($("dataset"), ids.includes(id) || !id ? ids : [...ids, id], id);
     if (!id) return stage.report(Object.assign(new Error("No dataset is served yet"), {kind: "gone"}));
     const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
     stage.pixels = limits.pixels;
+    $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
     choices($("method"), dataset.methods, wanted.method ?? "splat");
     for (const name of ["lod", "supersample", "budget"]) $(name).value = wanted[name] ?? (name === "budget" ? "" : 1);
@@ -112,9 +114,9 @@ async function lookAt({detail: pixel}) {
   const found = await points.find(pixel).catch(() => null);
   if (!found) return say("Nothing there");
   const {eye, target} = stage.camera;
-  const began = performance.now();
+  const began = performance.now(), span = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : 300; // ms
   const step = (now) => {
-    const t = Math.min(1, Math.max(0, (now - began) / 300));
+    const t = Math.min(1, Math.max(0, (now - began) / span));
     const s = t * t * (3 - 2 * t);
     stage.setCamera({...stage.camera, eye, target: target.map((x, i) => x + s * (found.position[i] - x))});
     if (t < 1) requestAnimationFrame(step);
@@ -135,6 +137,7 @@ stage.addEventListener("state", ({detail: problem}) => {
   $("token").hidden = problem?.kind !== "token";
 });
 editTour(tour, say);
+renderTours(tour, say);
 
 for (const name of [...SETTINGS, "moving"])
   $(name).addEventListener("change", () => $(name).checkValidity() && stage.dataset && stage.set(readSettings()));

@@ -40,6 +40,15 @@ export async function ask(path, options = {}) {
 
 export const askJson = async (path, options) => (await ask(path, options)).json();
 
+/** Saves what lies at `path`, under `name` if the service gives it none. Without a token the browser streams it to disk itself. */
+export async function download(path, name) {
+  const link = document.createElement("a");
+  link.href = sessionStorage.getItem(TOKEN) ? URL.createObjectURL(await (await ask(path)).blob()) : path;
+  link.download = name;
+  link.click();
+  if (link.href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
 /** Parameters of a view as a query, vectors joined by commas; what is null or "" is left out. */
 export function query(params) {
   return Object.entries(params).filter(([, value]) => value != null && value !== "")

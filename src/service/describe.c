@@ -157,6 +157,7 @@ json_t *spl_describe_status(struct request *request)
     set(json, "limits", describe_limits(service->options));
     set(json, "parameters", spl_service_options_describe(service->options));
     set(json, "datasets", ids);
+    set(json, "tours", service->tours ? json_string("/v1/tours") : json_null());
     set(json, "memory",
         json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
                   count(status.device_limit_bytes), "resident_bytes", count(spl_resident_bytes()), "reply_bytes",

@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 import urllib.parse
+import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "http"))
 import browser
@@ -274,6 +275,15 @@ def test_everything_has_a_name_and_takes_the_focus():
         assert not missed, missed
 
 
+def appeared(folder, pattern):
+    """A download has its name once it is whole."""
+    end = time.monotonic() + browser.PATIENCE
+    while not (found := list(pathlib.Path(folder).glob(pattern))):
+        assert time.monotonic() < end, f"{pattern} was not downloaded"
+        time.sleep(0.05)
+    return found[0]
+
+
 def test_tours():
     with tempfile.TemporaryDirectory() as folder, page() as tab:
         chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
@@ -291,12 +301,7 @@ def test_tours():
         assert tab.text("#said") == "keyframe 3 moved up"
         cameras = [cameras[0], cameras[2], cameras[1]]
         tab.press_on("#download")
-        file = pathlib.Path(folder, "wall-tour.json")
-        end = time.monotonic() + browser.PATIENCE
-        while not file.exists():
-            assert time.monotonic() < end, "nothing was downloaded"
-            time.sleep(0.05)
-        tour = json.loads(file.read_text())
+        tour = json.loads(appeared(folder, "wall-tour.json").read_text())
         assert [key["camera"]["eye"] for key in tour["keyframes"]] == [c["eye"] for c in cameras]
         assert [key["time"] for key in tour["keyframes"]] == [0, 0.4, 3.4] and tour["closed"] is False
         tab.choose("#keyframes li:nth-child(2) input", "0.2")
@@ -307,6 +312,33 @@ def test_tours():
         assert tab.text("#length") == "2 keyframes, 0.4 s"
         tab.go(f"{SITE}/{FACING}&lod=2")
         tab.until("document.querySelectorAll('#keyframes li').length === 2", "keyframes outlive the page")
+
+
+def test_the_service_renders_tours():
+    with tempfile.TemporaryDirectory() as folder, Daemon(REAL, "--tours", folder + "/tours") as d:
+        chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
+        with page(f"http://127.0.0.1:{d.port}/{FACING}") as tab:
+            tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+            tab.press_on("#add")
+            assert tab.run("document.querySelector('#render').disabled"), "one keyframe is no tour"
+            start, (x, y) = link(tab), middle(tab)
+            tab.drag((x, y), (x + 60, y))
+            moved(tab, start)
+            tab.press_on("#add")
+            tab.choose("#keyframes li:first-child input", "0.3")
+            tab.press_on("#render")
+            tab.until("!document.querySelector('#result').hidden")
+            frames = int(re.fullmatch(r"(\d+) frames are ready", tab.text("#far")).group(1))
+            assert 9 <= frames <= 10 and tab.run("document.querySelector('#progress').hidden")
+            tab.press_on("#result")
+            with zipfile.ZipFile(appeared(folder, "*.zip")) as archive:
+                pictures = {archive.read(name) for name in archive.namelist()}
+            assert len(pictures) == frames and all(picture.startswith(b"\xff\xd8") for picture in pictures)
+            tab.press_on("#cancel")
+            tab.until("document.querySelector('#making').hidden")
+            assert not d.ask("/v1/tours").json()["tours"]
+    with page() as tab:
+        assert tab.run("document.querySelector('#making-of').hidden"), "a service without a place for tours"
 
 
 def test_the_chart_has_the_frame_on_it():
