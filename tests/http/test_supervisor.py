@@ -51,9 +51,9 @@ def test_ready_status_stopping():
         with Daemon(FAKE, NOTIFY_SOCKET=s.path, FAKE_OPEN_MS=300, FAKE_FRAME_MS=300, SPLATD_INJECT_LOSS_AFTER="1") as d:
             eventually(lambda: s.said("READY=1") == 1)
             assert s.said("STATUS=rendering on flat colour (software)") == 1, s.lines
-            assert [d.ask(SMALL).status for _ in range(2)] == [200, 503]
+            assert [d.ask(f"{SMALL}&lod={lod}").status for lod in (2, 3)] == [200, 503]  # equal ones would come from the cache
             eventually(lambda: d.ops("/readyz").status == 200)
-            asking = threading.Thread(target=d.ask, args=(SMALL,))
+            asking = threading.Thread(target=d.ask, args=(SMALL + "&lod=4",))
             asking.start()
             eventually(lambda: d.status()["counters"]["requests"] >= 3)
             d.process.send_signal(signal.SIGTERM)
