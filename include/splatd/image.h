@@ -2,6 +2,7 @@
 #ifndef SPLATD_IMAGE_H
 #define SPLATD_IMAGE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -32,12 +33,14 @@ enum spl_format {
                         id RGBA8 (little-endian bytes of the id); coverage 8 bit grey */
     SPL_FORMAT_NPY,  /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
     SPL_FORMAT_RAW,  /* the same bytes without a header, little-endian */
+    SPL_FORMAT_WEBP, /* lossy; as JPEG, with the alpha of color; only where it was built in */
     SPL_FORMAT_COUNT
 };
 
 struct spl_encode_options {
     enum spl_format format;
-    int quality;          /* JPEG, 1..100; 0 = 90 */
+    int quality;          /* JPEG and WebP, 1..100; 0 = 90 */
+    int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
 };
 
@@ -67,6 +70,12 @@ const char *spl_layer_name(enum spl_layer layer);
 int spl_layer_from_name(const char *name);
 const char *spl_format_name(enum spl_format format);
 int spl_format_from_name(const char *name);
+
+/* False for a format whose library this build does without. */
+bool spl_format_is_built(enum spl_format format);
+
+/* 420 or 444: what a JPEG of these options has. */
+int spl_encode_chroma(const struct spl_encode_options *options);
 
 /* "image/jpeg", …; static. */
 const char *spl_format_media_type(enum spl_format format);

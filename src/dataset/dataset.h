@@ -15,6 +15,11 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 /* The bytes of page `index` (< info.pages), 64 KiB-aligned in the file. */
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
 
+/* Decodes splat `id` of any level; false (*splat untouched) when there is none. Its position is relative to its node.
+ */
+struct spl_splat;
+bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, struct spl_splat *splat);
+
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,

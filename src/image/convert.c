@@ -1,7 +1,7 @@
 /* Layers of numbers as 8 or 16 bit pictures.
  *
- * A pixel with nothing in it is black (0) in every picture, and no pixel with something in it is: the darkest end of the
- * colour map, hashed ids and 16 bit depths keep clear of 0. Pure functions; any thread. */
+ * A pixel with nothing in it is black (0) in every picture, and no pixel with something in it is: the darkest end of
+ * the colour map, hashed ids and 16 bit depths keep clear of 0. Pure functions; any thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +11,8 @@
 
 /* Near is warm and light, far is blue and dark; lightness falls evenly along the map, so steps look equal. */
 static const uint8_t anchors[][3] = {
-    {253, 243, 181}, {253, 203, 104}, {243, 153, 62}, {219, 105, 79}, {180, 73, 106}, {134, 54, 122}, {88, 43, 116},
-    {52, 30, 85},
+    {253, 243, 181}, {253, 203, 104}, {243, 153, 62}, {219, 105, 79},
+    {180, 73, 106},  {134, 54, 122},  {88, 43, 116},  {52, 30, 85},
 };
 enum { ANCHORS = sizeof anchors / sizeof *anchors, MAP_STEPS = 256 };
 
@@ -148,4 +148,25 @@ uint64_t spl_convert_depth16(const float *values, size_t count, double scale, ui
         }
     }
     return saturated;
+}
+
+int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl_encoded *encoded,
+                        struct spl_error *err)
+{
+    size_t count = (size_t)image->width * image->height;
+    bool grey = image->layer == SPL_LAYER_COVERAGE;
+    uint8_t *picture = *out = spl_alloc_raw(count, grey ? 1 : 3, err);
+    if (!picture)
+        return SPL_E_NOMEM;
+    if (grey) {
+        spl_convert_coverage(image->pixels, count, picture);
+        encoded->far = 1;
+    } else if (image->layer == SPL_LAYER_NORMAL) {
+        spl_convert_normal(image->pixels, count, picture);
+    } else if (image->layer == SPL_LAYER_ID) {
+        spl_convert_id(image->pixels, count, picture);
+    } else {
+        return spl_convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
+    }
+    return SPL_OK;
 }

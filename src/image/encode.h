@@ -7,13 +7,21 @@
 
 #include "base/error.h"
 
-int spl_encode_jpeg(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err);
+int spl_encode_jpeg(const struct spl_image *image, int quality, int chroma, struct spl_encoded *out,
+                    struct spl_error *err);
+int spl_encode_webp(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err);
+extern const bool spl_webp_is_built;
 int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err);
 int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
 int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
 
 /* ---- 8 bit pictures of the layers that are no picture yet (convert.c) ----
  * `count` pixels each; outputs hold 3 bytes a pixel, coverage 1. */
+
+/* The picture of a layer that is none: RGB, or one grey byte a pixel for coverage. The caller frees *out; near and far
+ * of `encoded` are set. */
+int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl_encoded *encoded,
+                        struct spl_error *err);
 
 /* Depth or range through the colour map, nothing = black. near and far get the values at the map's ends: the 1st and
  * 99th percentile to within 1 % of their value, 0 and 0 where nothing is. */

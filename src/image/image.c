@@ -23,10 +23,9 @@ static const struct {
 static const struct {
     const char *name, *media_type;
 } formats[SPL_FORMAT_COUNT] = {
-    [SPL_FORMAT_JPEG] = {"jpeg", "image/jpeg"},
-    [SPL_FORMAT_PNG] = {"png", "image/png"},
-    [SPL_FORMAT_NPY] = {"npy", "application/x-npy"},
-    [SPL_FORMAT_RAW] = {"raw", "application/octet-stream"},
+    [SPL_FORMAT_JPEG] = {"jpeg", "image/jpeg"},      [SPL_FORMAT_PNG] = {"png", "image/png"},
+    [SPL_FORMAT_NPY] = {"npy", "application/x-npy"}, [SPL_FORMAT_RAW] = {"raw", "application/octet-stream"},
+    [SPL_FORMAT_WEBP] = {"webp", "image/webp"},
 };
 
 const char *spl_layer_name(enum spl_layer layer)
@@ -60,6 +59,19 @@ const char *spl_format_media_type(enum spl_format format)
     return (unsigned)format < SPL_FORMAT_COUNT ? formats[format].media_type : formats[SPL_FORMAT_RAW].media_type;
 }
 
+bool spl_format_is_built(enum spl_format format)
+{
+    return format == SPL_FORMAT_WEBP ? spl_webp_is_built : (unsigned)format < SPL_FORMAT_COUNT;
+}
+
+int spl_encode_chroma(const struct spl_encode_options *options)
+{
+    enum { full_chroma_quality = 95 };
+    if (options->chroma)
+        return options->chroma;
+    return options->quality >= full_chroma_quality ? 444 : 420;
+}
+
 uint32_t spl_pixel_bytes(enum spl_pixel_type type)
 {
     return type == SPL_PIXEL_F32X3 ? 12 : 4;
@@ -87,6 +99,8 @@ static int check(const struct spl_image *image, const struct spl_encode_options 
         return spl_fail_field(err, SPL_E_UNSUPPORTED, "format", "image format %d does not exist", (int)options->format);
     if (options->quality < 0 || options->quality > 100)
         return spl_fail_field(err, SPL_E_USAGE, "quality", "quality %d is not in 1..100", options->quality);
+    if (options->chroma != 0 && options->chroma != 420 && options->chroma != 444)
+        return spl_fail_field(err, SPL_E_USAGE, "chroma", "chroma %d is neither 420 nor 444", options->chroma);
     if (!isfinite(options->depth_scale) || options->depth_scale < 0)
         return spl_fail_field(err, SPL_E_USAGE, "depth_scale", "%g is not a positive number of steps per unit",
                               options->depth_scale);
@@ -108,10 +122,14 @@ int spl_image_encode(const struct spl_image *image, const struct spl_encode_opti
         return rc;
     switch (options->format) {
     case SPL_FORMAT_JPEG:
-        rc = spl_encode_jpeg(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
+        rc = spl_encode_jpeg(image, options->quality ? options->quality : DEFAULT_QUALITY, spl_encode_chroma(options),
+                             out, err);
         break;
     case SPL_FORMAT_PNG:
         rc = spl_encode_png(image, options->depth_scale > 0 ? options->depth_scale : default_depth_scale, out, err);
+        break;
+    case SPL_FORMAT_WEBP:
+        rc = spl_encode_webp(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
         break;
     case SPL_FORMAT_NPY:
         rc = spl_encode_npy(image, out, err);

@@ -11,13 +11,13 @@
 #include "base/memory.h"
 #include "image/encode.h"
 
-enum { JPEG_SIDE_MAX = 65535, FULL_CHROMA_QUALITY = 95 };
+enum { JPEG_SIDE_MAX = 65535 };
 
-static int compress(const uint8_t *pixels, int pixel_format, const struct spl_image *image, int quality,
+static int compress(const uint8_t *pixels, int pixel_format, const struct spl_image *image, int quality, int chroma,
                     struct spl_encoded *out, struct spl_error *err)
 {
     int width = (int)image->width, height = (int)image->height;
-    int sampling = pixel_format == TJPF_GRAY ? TJSAMP_GRAY : quality >= FULL_CHROMA_QUALITY ? TJSAMP_444 : TJSAMP_420;
+    int sampling = pixel_format == TJPF_GRAY ? TJSAMP_GRAY : chroma == 444 ? TJSAMP_444 : TJSAMP_420;
     unsigned long length = tjBufSize(width, height, sampling);
     if (length == (unsigned long)-1)
         return spl_fail(err, SPL_E_LIMIT, "a JPEG of %d x %d pixels is larger than memory can address", width, height);
@@ -49,33 +49,21 @@ done:
     return rc;
 }
 
-int spl_encode_jpeg(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err)
+int spl_encode_jpeg(const struct spl_image *image, int quality, int chroma, struct spl_encoded *out,
+                    struct spl_error *err)
 {
     if (image->width > JPEG_SIDE_MAX || image->height > JPEG_SIDE_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, image->width > JPEG_SIDE_MAX ? "width" : "height",
                               "%u x %u pixels: a JPEG has at most %d on a side; ask for PNG", image->width,
                               image->height, JPEG_SIDE_MAX);
     if (image->layer == SPL_LAYER_COLOR)
-        return compress(image->pixels, TJPF_RGBX, image, quality, out, err);
+        return compress(image->pixels, TJPF_RGBX, image, quality, chroma, out, err);
 
-    size_t count = (size_t)image->width * image->height;
-    bool grey = image->layer == SPL_LAYER_COVERAGE;
-    uint8_t *picture = spl_alloc_raw(count, grey ? 1 : 3, err);
-    if (!picture)
-        return SPL_E_NOMEM;
-    int rc = SPL_OK;
-    if (grey) {
-        spl_convert_coverage(image->pixels, count, picture);
-        out->far = 1;
-    } else if (image->layer == SPL_LAYER_NORMAL) {
-        spl_convert_normal(image->pixels, count, picture);
-    } else if (image->layer == SPL_LAYER_ID) {
-        spl_convert_id(image->pixels, count, picture);
-    } else {
-        rc = spl_convert_distance(image->pixels, count, picture, &out->near, &out->far, err);
-    }
+    uint8_t *picture = NULL;
+    int rc = spl_convert_picture(image, &picture, out, err);
     if (!rc)
-        rc = compress(picture, grey ? TJPF_GRAY : TJPF_RGB, image, quality, out, err);
+        rc = compress(picture, image->layer == SPL_LAYER_COVERAGE ? TJPF_GRAY : TJPF_RGB, image, quality, chroma, out,
+                      err);
     free(picture);
     return rc;
 }

@@ -28,11 +28,6 @@ static const char *method_name(int i)
     return spl_method_name((enum spl_method)i);
 }
 
-static const char *format_name(int i)
-{
-    return spl_format_name((enum spl_format)i);
-}
-
 static json_t *count(uint64_t n)
 {
     return json_integer((json_int_t)n);
@@ -82,7 +77,11 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", names(layer_name, SPL_LAYER_COUNT));
     set(json, "methods", names(method_name, SPL_METHOD_COUNT));
-    set(json, "formats", names(format_name, SPL_FORMAT_COUNT));
+    json_t *formats = json_array();
+    for (int i = 0; i < SPL_FORMAT_COUNT; i++)
+        if (spl_format_is_built((enum spl_format)i))
+            json_array_append_new(formats, json_string(spl_format_name((enum spl_format)i)));
+    set(json, "formats", formats);
     set(json, "default_view",
         json_pack("{s:o, s:o, s:o, s:f}", "eye", vector(info->default_eye), "target", vector(info->default_target),
                   "up", vector(info->default_up), "fov", info->default_fov));

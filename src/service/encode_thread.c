@@ -1,6 +1,8 @@
-/* The encode threads: one layer of one frame in, bytes of a format out. Each frame's pixels are released as soon as
- * they are encoded, so that what waits for slow clients is compressed. */
+/* The encode threads: one frame in, bytes of a format out: an image, several in a container, or what a pick found. Each
+ * frame's pixels are released as soon as they are encoded, so that what waits for slow clients is compressed. */
 #include "base/clock.h"
+#include "service/bundle.h"
+#include "service/pick.h"
 #include "service/stages.h"
 
 static void encode(struct spl_job *job)
@@ -9,7 +11,12 @@ static void encode(struct spl_job *job)
     if (spl_job_is_over(job))
         return;
     const struct spl_view_request *request = &job->request;
-    spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
+    if (request->picks)
+        spl_pick_encode(request, &job->frame, job->dataset, &job->encoded, &job->err);
+    else if (request->container)
+        spl_bundle_layers(request, &job->frame, &job->encoded, &job->err);
+    else
+        spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
     job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
 }
 

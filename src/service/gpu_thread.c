@@ -271,7 +271,8 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
         const struct spl_device_info *device = spl_renderer_get_device(gpu->renderer);
         job->renderer = atomic_load(&pipeline->renderer);
         snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
-        if (job->plan && !job->stats.pages_loaded) // loading is no property of the setting
+        bool usual = !job->request.picks && !job->request.container;
+        if (job->plan && usual && !job->stats.pages_loaded) // loading is no property of the setting
             spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
         rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
     }

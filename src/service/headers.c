@@ -6,6 +6,8 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
+#include "service/bundle.h"
+
 void spl_headers_open(struct spl_headers *headers)
 {
     *headers = (struct spl_headers){0};
@@ -43,7 +45,7 @@ bool spl_headers_close(struct spl_headers *headers)
 void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_request *request, enum spl_layer layer,
                            const struct spl_encoded *encoded)
 {
-    enum spl_format format = request->encode.format;
+    enum spl_format format = spl_view_get_encoding(request, layer).format;
     spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
@@ -80,4 +82,16 @@ void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera
         "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
         eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
         camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+}
+
+void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_request *request,
+                          const struct spl_encoded *encoded)
+{
+    if (request->picks)
+        spl_headers_add(headers, "Content-Type", "application/json");
+    else if (request->container)
+        spl_headers_add(headers, "Content-Type", "%s", spl_container_media_type(request->container));
+    else
+        spl_headers_add_layer(headers, request, request->layer, encoded);
+    spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
 }

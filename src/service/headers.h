@@ -40,6 +40,10 @@ static inline const char *spl_headers_value(const char *name)
 void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_request *request, enum spl_layer layer,
                            const struct spl_encoded *encoded);
 
+/* Of a whole reply: its Content-Type, what its values mean where it is one image, and the camera. */
+void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_request *request,
+                          const struct spl_encoded *encoded);
+
 /* The camera that was used, as JSON. */
 void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera);
 

@@ -36,7 +36,7 @@ uint64_t spl_renderer_hash(const struct spl_device_info *device)
 }
 
 struct form {
-    uint64_t words[64];
+    uint64_t words[96];
     size_t count;
 };
 
@@ -71,9 +71,11 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
 
 static void add_encoding(struct form *form, const struct spl_view_request *request, enum spl_layer layer)
 {
-    const struct spl_encode_options *encode = &request->encode;
+    struct spl_encode_options options = spl_view_get_encoding(request, layer), *encode = &options;
+    bool jpeg = encode->format == SPL_FORMAT_JPEG, webp = encode->format == SPL_FORMAT_WEBP;
     add(form, (uint64_t)layer << 32 | (uint64_t)encode->format);
-    add(form, encode->format == SPL_FORMAT_JPEG ? (uint64_t)encode->quality : 0);
+    add(form, jpeg || webp ? (uint64_t)encode->quality : 0);
+    add(form, jpeg ? (uint64_t)spl_encode_chroma(encode) : 0);
     bool distance = layer == SPL_LAYER_DEPTH || layer == SPL_LAYER_RANGE;
     add_number(form, encode->format == SPL_FORMAT_PNG && distance ? encode->depth_scale : 0);
 }
@@ -92,7 +94,13 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     add_number(&form, view->supersample);
     add_number(&form, view->margin < 0 ? 1 : view->margin);
     add(&form, view->layers & 1u << SPL_LAYER_COLOR ? background : 0);
-    for (unsigned layer = 0; layer < SPL_LAYER_COUNT; layer++)
+    add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
+    if (request->picks) {
+        add_camera(&form, &request->pick.camera);
+        add_number(&form, request->pick.x);
+        add_number(&form, request->pick.y);
+    }
+    for (unsigned layer = 0; layer < SPL_LAYER_COUNT && !request->picks; layer++)
         if (view->layers >> layer & 1)
             add_encoding(&form, request, (enum spl_layer)layer);
     XXH128_hash_t hash = XXH3_128bits(form.words, form.count * sizeof *form.words);

@@ -33,7 +33,7 @@ bool spl_job_is_over(struct spl_job *job)
 
 static size_t frame_bytes(const struct spl_view *view)
 {
-    size_t pixel = view->layers & 1u << SPL_LAYER_NORMAL ? 12 : 4;
+    size_t pixel = 4 * (size_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
     return pixel * view->camera.width * view->camera.height;
 }
 

@@ -17,8 +17,11 @@
 #include "base/memory.h"
 
 static const double encoding_margin = 1.25, encoding_gain = 0.2, encoding_step = 1; /* ln */
-static const double encoding_first[SPL_FORMAT_COUNT] = {
-    [SPL_FORMAT_JPEG] = 6, [SPL_FORMAT_PNG] = 60, [SPL_FORMAT_NPY] = 3, [SPL_FORMAT_RAW] = 3}; /* ms a megapixel */
+static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
+                                                        [SPL_FORMAT_PNG] = 60,
+                                                        [SPL_FORMAT_NPY] = 3,
+                                                        [SPL_FORMAT_RAW] = 3,
+                                                        [SPL_FORMAT_WEBP] = 60}; /* ms a megapixel */
 
 struct spl_plan {
     char *path; /* of the profile */

@@ -16,7 +16,7 @@ static void add_plan(struct spl_headers *headers, const struct spl_job *job)
 {
     const struct spl_choice *choice = &job->choice;
     uint64_t now = spl_now_ns();
-    if (job->plan)
+    if (job->plan && !job->request.picks && !job->request.container)
         spl_plan_learn_reply(job->plan, &job->request, (double)(now - job->rendered_ns) / SPL_NS_PER_MS);
     if (!job->plan || !job->request.planned)
         return;
@@ -36,8 +36,7 @@ static bool write_headers(const struct spl_job *job, char **text, size_t *length
 {
     struct spl_headers headers;
     spl_headers_open(&headers);
-    spl_headers_add_layer(&headers, &job->request, job->request.layer, &job->encoded);
-    spl_headers_add_camera(&headers, &job->request.view.camera);
+    spl_headers_add_view(&headers, &job->request, &job->encoded);
     add_plan(&headers, job);
     spl_headers_add(&headers, "Splatd-Complete", "%s", job->stats.complete ? "true" : "false");
     spl_headers_add(&headers, "Splatd-Device", "%s", job->device);

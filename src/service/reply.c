@@ -161,8 +161,7 @@ void spl_reply_view_head(struct request *request, const struct spl_view_request 
 {
     struct spl_headers headers;
     spl_headers_open(&headers);
-    spl_headers_add_layer(&headers, view, view->layer, NULL);
-    spl_headers_add_camera(&headers, &view->view.camera);
+    spl_headers_add_view(&headers, view, NULL);
     if (!spl_headers_close(&headers))
         return;
     request->status = MHD_HTTP_OK; // of unknown length: a GET's Content-Length is known only once it is rendered

@@ -11,10 +11,20 @@
 #include "geom/camera_json.h"
 #include "measure/planner.h"
 
+/* What several images are sent as. */
+enum spl_container { SPL_CONTAINER_NONE, SPL_CONTAINER_MULTIPART, SPL_CONTAINER_ZIP };
+
 struct spl_view_request {
-    struct spl_view view; /* deadline_ns is left at "none" */
-    enum spl_layer layer; /* the one bit of view.layers */
-    struct spl_encode_options encode;
+    struct spl_view view;             /* deadline_ns is left at "none" */
+    enum spl_layer layer;             /* the one bit of view.layers, or the first of several */
+    enum spl_container container;     /* of `layers`; NONE: there is one layer, sent as it is */
+    struct spl_encode_options encode; /* of `layer`; see spl_view_get_encoding() for several */
+    bool natural;                     /* format was left out: each layer has its own */
+    bool picks;                       /* no image is wanted but what `pick` shows; view.camera sees that point alone */
+    struct spl_pick {
+        double x, y;              /* pixels of `camera` */
+        struct spl_camera camera; /* that was asked for */
+    } pick;
     bool versioned; /* v was given: only this version of the dataset will do */
     uint64_t version;
     bool planned;             /* budget or psnr was given: the service chooses what demand.keep_* leaves open */
@@ -30,6 +40,14 @@ int spl_view_request_from_query(const char *query, size_t length, const struct s
 int spl_view_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
+
+/* GET …/pick: `query` holds x, y, the camera and how splats are drawn. */
+int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
+                                struct spl_error *err);
+
+/* How `layer`, a bit of view.layers, is encoded. */
+struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *request, enum spl_layer layer);
 
 /* Decodes %XX of `text[0..length)` into `out` with a closing NUL. Refuses stray '%', control characters and more than
  * `capacity` - 1 bytes, naming `field`. '+' stays '+', so that 1e+3 means what it says. */

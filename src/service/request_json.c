@@ -21,6 +21,18 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
         value->n[0] = json_number_value(json);
         return 0;
     }
+    if (kind == SPL_KIND_LAYERS && json_is_array(json)) {
+        if (!json_array_size(json))
+            return spl_fail_field(err, SPL_E_INPUT, name, "%s is empty", name);
+        int rc = 0;
+        for (size_t i = 0; !rc && i < json_array_size(json); i++) {
+            const char *text = json_string_value(json_array_get(json, i));
+            rc = text ? spl_value_add_layer(value, name, text, err)
+                      : spl_fail_field(err, SPL_E_INPUT, name, "%s must hold text, not %s", name,
+                                       spl_json_type_name(json_array_get(json, i)));
+        }
+        return rc;
+    }
     if (kind == SPL_KIND_FLAG || !json_is_string(json))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name,
                               kind == SPL_KIND_FLAG ? "true or false" : "text", spl_json_type_name(json));

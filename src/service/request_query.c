@@ -72,7 +72,8 @@ static int parse_numbers(struct spl_value *value, const char *text, const char *
     }
 }
 
-static int parse_pair(struct values *values, const char *pair, size_t length, struct spl_error *err)
+static int parse_pair(struct values *values, const char *pair, size_t length, enum spl_value_place place,
+                      struct spl_error *err)
 {
     char name[name_max], text[text_max];
     const char *equals = memchr(pair, '=', length);
@@ -80,7 +81,7 @@ static int parse_pair(struct values *values, const char *pair, size_t length, st
     int rc = spl_percent_decode(pair, name_length, name, sizeof name, "a parameter's name", err);
     if (rc)
         return rc;
-    enum param param = spl_param_find(name, SPL_QUERY, err);
+    enum param param = spl_param_find(name, place, err);
     if (param == PARAM_COUNT)
         return SPL_E_INPUT;
     if (!equals)
@@ -100,18 +101,25 @@ static int parse_pair(struct values *values, const char *pair, size_t length, st
     return spl_value_check(value, (enum spl_value_kind)kind, name, err);
 }
 
+int spl_values_from_query(struct values *values, const char *query, size_t length, enum spl_value_place place,
+                          struct spl_error *err)
+{
+    for (size_t at = 0; at < length;) {
+        const char *end = memchr(query + at, '&', length - at);
+        size_t pair = end ? (size_t)(end - query) - at : length - at;
+        int rc = pair ? parse_pair(values, query + at, pair, place, err) : 0;
+        if (rc)
+            return rc;
+        at += pair + 1;
+    }
+    return 0;
+}
+
 int spl_view_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
                                 const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err)
 {
     struct values values = {0};
-    for (size_t at = 0; at < length;) {
-        const char *end = memchr(query + at, '&', length - at);
-        size_t pair = end ? (size_t)(end - query) - at : length - at;
-        int rc = pair ? parse_pair(&values, query + at, pair, err) : 0;
-        if (rc)
-            return rc;
-        at += pair + 1;
-    }
-    return spl_values_resolve(&values, defaults, limits, out, err);
+    int rc = spl_values_from_query(&values, query, length, SPL_QUERY, err);
+    return rc ? rc : spl_values_resolve(&values, defaults, limits, out, err);
 }

@@ -183,8 +183,9 @@ struct spl_call {
     char number[24];                 /* the path's {n}, decoded; "" without */
 };
 
-/* view_route.c: /v1/datasets/{id}/view. */
+/* view_route.c: /v1/datasets/{id}/view and /pick. */
 void spl_make_view(struct request *request, const struct spl_call *call);
+void spl_pick(struct request *request, const struct spl_call *call);
 
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);

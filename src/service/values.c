@@ -2,9 +2,12 @@
  * functions, any thread. */
 #include "service/values.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+#define LAYER_NAMES "color, depth, range, normal, id, coverage"
 
 const struct param_info spl_params[PARAM_COUNT] = {
 #define PARAM(name, alias, kind, places, help) {#name, alias, SPL_KIND_##kind, places},
@@ -16,14 +19,17 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
 {
     for (int i = 0; i < PARAM_COUNT; i++) {
         const struct param_info *info = &spl_params[i];
-        bool alias = place == SPL_QUERY && info->alias[0] && !strcasecmp(name, info->alias);
+        bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
         if (strcmp(name, info->name) && !alias)
             continue;
-        if (info->places & place)
+        bool camera = place == SPL_PICK && i < (int)SPL_CAMERA_PARAMS && info->places & SPL_QUERY;
+        if (info->places & place || camera)
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
-                       info->places & SPL_CAMERA ? "give it in the \"camera\" object of a POST"
-                                                 : "give it beside \"camera\"");
+                       place == SPL_PICK           ? "a pick takes x, y, a camera, method, lod, margin and v"
+                       : info->places == SPL_PICK  ? "it is a parameter of a pick"
+                       : info->places & SPL_CAMERA ? "give it in the \"camera\" object of a POST"
+                                                   : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
     spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; api/openapi.yaml lists those of a view", name);
@@ -91,6 +97,44 @@ static int parse_version(struct spl_value *value, const char *name, const char *
     return 0;
 }
 
+int spl_value_add_layer(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    int layer = spl_layer_from_name(text);
+    if (layer < 0)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s: '%.32s' is unknown; known are " LAYER_NAMES, name, text);
+    unsigned set = (unsigned)value->n[0];
+    if (set >> layer & 1)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s has '%s' twice", name, text);
+    value->n[0] = set | 1u << layer;
+    return 0;
+}
+
+static int parse_layers(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    char word[32];
+    for (const char *p = text;; p++) {
+        size_t length = strcspn(p, ",");
+        snprintf(word, sizeof word, "%.*s", (int)(length < sizeof word ? length : sizeof word - 1), p);
+        int rc = spl_value_add_layer(value, name, word, err);
+        if (rc)
+            return rc;
+        p += length;
+        if (!*p)
+            return 0;
+    }
+}
+
+static int container_from_name(const char *name)
+{
+    return !strcmp(name, "multipart") ? SPL_CONTAINER_MULTIPART : !strcmp(name, "zip") ? SPL_CONTAINER_ZIP : -1;
+}
+
+static int built_format_from_name(const char *name)
+{
+    int format = spl_format_from_name(name);
+    return format >= 0 && spl_format_is_built((enum spl_format)format) ? format : -1;
+}
+
 static int flag_from_name(const char *name)
 {
     return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
@@ -98,19 +142,24 @@ static int flag_from_name(const char *name)
 
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err)
 {
-    static const struct {
+    const struct {
         int (*lookup)(const char *name);
         const char *choices;
     } table[] = {
         [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
         [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points"},
-        [SPL_KIND_LAYER] = {spl_layer_from_name, "color, depth, range, normal, id, coverage"},
-        [SPL_KIND_FORMAT] = {spl_format_from_name, "jpeg, png, npy, raw"},
+        [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
+        [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
+                                                         ? "jpeg, png, webp, npy, raw"
+                                                         : "jpeg, png, npy, raw (this build makes no webp)"},
+        [SPL_KIND_CONTAINER] = {container_from_name, "multipart, zip"},
     };
     if (kind == SPL_KIND_COLOR)
         return parse_color(value, name, text, err);
     if (kind == SPL_KIND_DURATION)
         return parse_duration(value, name, text, err);
+    if (kind == SPL_KIND_LAYERS)
+        return parse_layers(value, name, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

@@ -15,7 +15,9 @@ enum {
     SPL_KIND_COLOR,
     SPL_KIND_METHOD,
     SPL_KIND_LAYER,
+    SPL_KIND_LAYERS, /* bit per enum spl_layer */
     SPL_KIND_FORMAT,
+    SPL_KIND_CONTAINER,
     SPL_KIND_DURATION, /* ms */
     SPL_KIND_VERSION,  /* upper and lower 32 bits */
 };
@@ -51,8 +53,19 @@ int spl_values_claim(struct values *values, enum param param, const char *name, 
 /* Text to the numbers of a choice, a flag, a colour or a duration. */
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err);
 
+/* The same for LAYERS: adds one name to the set; refuses what is in it already. */
+int spl_value_add_layer(struct spl_value *value, const char *name, const char *text, struct spl_error *err);
+
+/* A query's parameters, those of `place`. */
+int spl_values_from_query(struct values *values, const char *query, size_t length, enum spl_value_place place,
+                          struct spl_error *err);
+
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
+
+/* The parts of it that picks share: method, lod, margin; the version. */
+int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err);
+void spl_values_resolve_version(const struct values *values, struct spl_view_request *out);
 
 #endif

@@ -5,15 +5,17 @@
 #include "base/clock.h"
 #include "service/state.h"
 
-static int parse_view(struct request *request, const struct spl_catalog_entry *entry, bool post,
+typedef int parse_fn(const char *text, size_t length, const struct spl_camera_defaults *defaults,
+                     const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
+
+static int parse_view(struct request *request, const struct spl_catalog_entry *entry, parse_fn *parse,
                       struct spl_view_request *view, struct spl_error *err)
 {
     struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX,
                                        .pixels = request->service->options->pixels_max};
-    int rc =
-        post
-            ? spl_view_request_from_json(request->body, request->body_length, &entry->defaults, &limits, view, err)
-            : spl_view_request_from_query(request->query, strlen(request->query), &entry->defaults, &limits, view, err);
+    bool json = parse == spl_view_request_from_json;
+    const char *text = json ? request->body : request->query;
+    int rc = parse(text, json ? request->body_length : strlen(text), &entry->defaults, &limits, view, err);
     if (rc && rc != SPL_E_NOMEM)
         err->code = SPL_E_INPUT; // whatever is wrong with a view is the client's to change
     return rc;
@@ -66,14 +68,14 @@ static int check_version(const struct spl_view_request *view, const struct spl_d
                           (unsigned long long)view->version, info->id, (unsigned long long)info->version);
 }
 
-void spl_make_view(struct request *request, const struct spl_call *call)
+static void make(struct request *request, const struct spl_call *call, parse_fn *parse)
 {
     struct spl_catalog_entry *entry = call->entry;
     struct spl_service *service = request->service;
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_key key = {0};
-    if (parse_view(request, entry, call->method == SPL_POST, &view, &err) || check_version(&view, entry->info, &err))
+    if (parse_view(request, entry, parse, &view, &err) || check_version(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
         key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->pipeline));
@@ -96,4 +98,14 @@ void spl_make_view(struct request *request, const struct spl_call *call)
     spl_count(&service->counters, refused_full);
 refuse:
     spl_reply_error(request, &err);
+}
+
+void spl_make_view(struct request *request, const struct spl_call *call)
+{
+    make(request, call, call->method == SPL_POST ? spl_view_request_from_json : spl_view_request_from_query);
+}
+
+void spl_pick(struct request *request, const struct spl_call *call)
+{
+    make(request, call, spl_pick_request_from_query);
 }

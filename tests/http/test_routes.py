@@ -6,9 +6,11 @@ import re
 import struct
 import zlib
 
+import openapi
 from harness import REAL, VIEW, WALL, Daemon, run
 
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
+WEBP = os.environ["SPLATD_WEBP"] == "1"
 COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
               "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4)}
 LOOK = dict(eye="3,0.2,1", target="0,0,1", up="0,0,1")
@@ -57,7 +59,7 @@ def test_datasets_are_described():
         low, high = full["bounds"]["min"], full["bounds"]["max"]
         assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
         assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points"]
-        assert full["formats"] == ["jpeg", "png", "npy", "raw"]
+        assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
 
@@ -204,13 +206,17 @@ def test_keep_alive_serves_one_after_the_other():
 
 def test_openapi_knows_every_parameter_and_route():
     text = (ROOT / "api" / "openapi.yaml").read_text()
-    listed = set(re.findall(r"^        - name: (\w+)$", text, re.M))
+    listed = {operation["operationId"]: {p["name"] for p in parameters if p["in"] == "query"}
+              for _, _, operation, parameters in openapi.operations()}
     schemas = {name: set(re.findall(r"^        (\w+):", body, re.M)) for name, body in
                re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
     table = "".join((ROOT / name).read_text() for name in ("src/geom/camera_params.def", "src/service/view_params.def"))
     rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z_| ]+),', table, re.M)
     assert len(rows) > 20
-    assert listed == {name for name, _, places in rows if "QUERY" in places}
+    assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
+    camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in
+              (ROOT / "src/geom/camera_params.def").read_text()}
+    assert listed["pick"] == {name for name, _, places in rows if "PICK" in places} | camera
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
     assert all(f"Alias {alias}." in text for _, alias, _ in rows if alias)

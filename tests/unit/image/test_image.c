@@ -377,7 +377,7 @@ static void every_failed_allocation_is_reported(void **state)
         depth[i] = (float)i;
     struct spl_image color = make_color(8, 8), distance = {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 8, 8, depth};
     for (int format = 0; format < SPL_FORMAT_COUNT; format++)
-        for (int layer = 0; layer < 2; layer++) {
+        for (int layer = 0; layer < 2 && spl_format_is_built((enum spl_format)format); layer++) {
             int rc = SPL_E_NOMEM;
             long attempt = 1;
             for (; rc && attempt < 1000; attempt++) {
@@ -394,7 +394,7 @@ static void every_failed_allocation_is_reported(void **state)
                 spl_encoded_finish(&out);
             }
             assert_int_equal(rc, SPL_OK);
-            assert_true(attempt > 2);
+            assert_true(attempt > 2 || format == SPL_FORMAT_WEBP); // colour goes in as it lies; libwebp allocates by itself
         }
     spl_image_finish(&color);
 }

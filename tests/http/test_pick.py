@@ -1,0 +1,112 @@
+"""Picking: what lies under a pixel agrees with the layers and the camera of the image, sub-pixels included."""
+import json
+import math
+import struct
+
+from harness import REAL, VIEW, Daemon, run
+
+PICK = VIEW.replace("/view", "/pick")
+WIDTH, HEIGHT = 160, 120
+CAMERAS = ["eye=3,0.2,1&target=0,0,1&fov=50", "eye=2,-1.5,2.5&target=0,0.3,0.8&fx=140&fy=150&cx=70.25&cy=66.5&method=points",
+           "eye=1.5,0.4,1&target=0,0,1&up=0,1,0.2&lod=0&margin=0.5"]
+
+
+def project(camera, point):
+    ray = [p - e for p, e in zip(point, camera["eye"])]
+    c = [sum(camera["rotation"][3 * row + i] * ray[i] for i in range(3)) for row in range(3)]
+    return camera["fx"] * c[0] / c[2] + camera["cx"], camera["fy"] * c[1] / c[2] + camera["cy"], c[2]
+
+
+def layer(d, camera, name, count, kind="f"):
+    body = d.ask(f"{VIEW}?{camera}&width={WIDTH}&height={HEIGHT}&layer={name}&format=raw").body
+    values = struct.unpack(f"<{WIDTH * HEIGHT * count}{kind}", body)
+    return [values[i:i + count] for i in range(0, len(values), count)]
+
+
+def test_a_pick_agrees_with_the_layers_and_the_camera():
+    with Daemon(REAL) as d:
+        hits = 0
+        for camera in CAMERAS:
+            depth, ranges, normal = (layer(d, camera, name, n) for name, n in
+                                     (("depth", 1), ("range", 1), ("normal", 3)))
+            color, ids = layer(d, camera, "color", 4, "B"), layer(d, camera, "id", 1, "I")
+            for row, column in [(r, c) for r in (3, 31, 60, 88) for c in (10, 47, 80, 121, 159)]:
+                reply = d.ask(f"{PICK}?{camera}&width={WIDTH}&height={HEIGHT}&x={column + 0.5}&y={row + 0.5}")
+                got, at = reply.json(), row * WIDTH + column
+                if math.isnan(depth[at][0]):
+                    assert {got[k] for k in ("depth", "distance", "class", "splat", "color")} == {None}, got
+                    assert got["position"] is None and got["normal"] is None
+                    continue
+                hits += 1
+                used = json.loads(reply.headers["Splatd-Camera"])
+                assert (used["width"], used["height"]) == (WIDTH, HEIGHT)
+                x, y, z = project(used, got["position"])
+                assert abs(x - column - 0.5) < 0.01 and abs(y - row - 0.5) < 0.01, (x, y, got)
+                assert abs(z - got["depth"]) < 1e-6
+                assert abs(got["depth"] - depth[at][0]) < 0.005, (got, depth[at])
+                assert abs(got["distance"] - ranges[at][0]) < 0.005
+                assert abs(math.dist(got["position"], used["eye"]) - got["distance"]) < 0.001
+                assert math.dist(got["normal"], normal[at]) < 0.05 and abs(math.hypot(*got["normal"]) - 1) < 1e-3
+                assert max(abs(a - b) for a, b in zip(got["color"], color[at])) <= 2, (got, color[at])
+                assert got["splat"] == ids[at][0] and got["class"] == 0
+                # the wall is x = 0.2 sin y, splats have a radius of 5 cm
+                assert abs(got["position"][0] - 0.2 * math.sin(got["position"][1])) < 0.05, got
+        assert hits > 25, hits
+
+
+def test_parts_of_pixels_count():
+    with Daemon(REAL) as d:
+        found = [d.ask(f"{PICK}?eye=3,0,1&target=0,0,1&fov=50&width={WIDTH}&height={HEIGHT}&x={80 + i / 8}&y=60").json()
+                 for i in range(9)]
+        across = [row["position"][1] for row in found]
+        assert across == sorted(across) and len(set(across)) == 9, across
+        step = 2 * 3 * math.tan(math.radians(25)) / HEIGHT / 8
+        assert all(abs(b - a - step) < step / 4 for a, b in zip(across, across[1:])), (across, step)
+
+
+def test_picks_are_views_of_one_pixel():
+    with Daemon(REAL) as d:
+        path = f"{PICK}?x=640.5&y=360.5"
+        first = d.ask(path)
+        assert first.status == 200 and first.headers["Content-Type"] == "application/json"
+        assert first.headers["Splatd-Cache"] == "miss" and d.ask(path).headers["Splatd-Cache"] == "hit"
+        assert d.ask(path, headers={"If-None-Match": first.headers["ETag"]}).status == 304
+        head = d.ask(path, "HEAD")
+        assert head.status == 200 and head.headers["ETag"] == first.headers["ETag"]
+        version = d.ask("/v1/datasets/wall").json()["version"]
+        assert "immutable" in d.ask(f"{path}&v={version}").headers["Cache-Control"]
+        assert d.ask(f"{path}&v={'0' * 16}").status == 404
+        assert d.ask(f"{path}&near=0.01").headers["ETag"] != first.headers["ETag"]
+        for other in ("x=640.25&y=360.5", "x=640.5&y=360.25", "x=640.5&y=360.5&width=1281", "x=640.5&y=360.5&far=90"):
+            assert d.ask(f"{PICK}?{other}", "HEAD").headers["ETag"] != first.headers["ETag"], other
+        # a pick and the view of one pixel that it renders are no one reply
+        assert d.ask(VIEW + "?width=1&height=1", "HEAD").headers["ETag"] != d.ask(
+            f"{PICK}?x=0.5&y=0.5&width=1&height=1", "HEAD").headers["ETag"]
+        for x, y in ((0, 0), (1280, 720)):  # edges belong to the image
+            assert d.ask(f"{PICK}?x={x}&y={y}").status == 200
+
+
+def test_bad_picks_are_refused_by_name():
+    with Daemon(REAL) as d:
+        for query, field in [("", "x"), ("x=1", "y"), ("y=1", "x"), ("x=-0.1&y=1", "x"), ("x=1&y=721", "y"), ("x=nan&y=1", "x"),
+                             ("x=1&y=inf", "y"), ("x=1,2&y=1", "x"), ("x=&y=1", "x"), ("x=1&x=1&y=1", "x"),
+                             ("x=1&y=1&width=0", "width"), ("x=65&y=1&width=64", "x"), ("x=1&y=1&format=png", "format"),
+                             ("x=1&y=1&layer=depth", "layer"), ("x=1&y=1&supersample=2", "supersample"),
+                             ("x=1&y=1&budget=5ms", "budget"), ("x=1&y=1&colour=5", "colour"), ("x=1&y=1&v=1", "v"),
+                             ("x=1&y=1&margin=-1", "margin"), ("x=1&y=1&lod=nan", "lod"), ("x=1&y=1&matrix=1", "matrix")]:
+            reply = d.ask(f"{PICK}?{query}")
+            assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
+        assert d.ask(VIEW + "?x=1").json()["field"] == "x"
+        assert d.ask(PICK, "POST").status == 405
+        assert d.status()["counters"]["frames"] == 0
+
+
+def test_every_parameter_of_a_pick():
+    with Daemon(REAL) as d:
+        reply = d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&up=0,0,1&fx=60&fy=60&cx=32&cy=24&width=64&height=48&near=0.1&"
+                      "far=50&method=splat&lod=1&margin=1")
+        assert abs(reply.json()["depth"] - 3) < 0.02, reply.body
+        assert abs(d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&fov=60&width=64&height=48").json()["depth"] - 3) < 0.02
+
+
+run(globals())
