@@ -15,8 +15,8 @@ struct spl_part {
 const char *spl_container_media_type(enum spl_container container); /* not NONE */
 
 /* In multipart each part carries its headers, Content-Disposition with its name, and Content-Length; in a ZIP file
- * (entries stored, no times) they stand in its last entry, index.json: [{"name": …, "headers": {…}}, …]. The caller owns
- * out->bytes. */
+ * (entries stored, no times) they stand in its last entry, index.json: [{"name": …, "headers": {…}}, …]. The caller
+ * owns out->bytes. */
 int spl_bundle(enum spl_container container, const struct spl_part *parts, size_t count, struct spl_encoded *out,
                struct spl_error *err);
 

@@ -39,7 +39,8 @@ static void fill(json_t *json, const struct spl_view_request *request, const str
                  const struct spl_dataset *dataset)
 {
     const struct spl_image *images = frame->images;
-    float depth = *(const float *)images[SPL_LAYER_DEPTH].pixels, range = *(const float *)images[SPL_LAYER_RANGE].pixels;
+    float depth = *(const float *)images[SPL_LAYER_DEPTH].pixels,
+          range = *(const float *)images[SPL_LAYER_RANGE].pixels;
     uint32_t id = *(const uint32_t *)images[SPL_LAYER_ID].pixels;
     const uint8_t *rgba = images[SPL_LAYER_COLOR].pixels;
     bool hit = isfinite(depth), named = hit && id != UINT32_MAX;

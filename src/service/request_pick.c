@@ -1,7 +1,7 @@
 /* A pick: one point of an image instead of the image.
  *
- * The camera that was asked for is cut down to one pixel whose centre is the point: principal point moved, nothing else,
- * so the splats, their sizes and the level of detail are those of the whole image. Pure functions, any thread. */
+ * The camera that was asked for is cut down to one pixel whose centre is the point: principal point moved, nothing
+ * else, so the splats, their sizes and the level of detail are those of the whole image. Pure functions, any thread. */
 #include "service/request.h"
 
 #include "service/values.h"

@@ -108,6 +108,9 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
     snprintf(field, sizeof field, "settings%s%s", why.field[0] ? "." : "", why.field);
     if (rc)
         return spl_fail_field(err, rc, field, "%s", why.message);
+    if (view->container)
+        return spl_fail_field(err, SPL_E_INPUT, "settings.layers",
+                              "a frame of a tour is one image; ask for it with 'layer'");
     if (view->versioned)
         return spl_fail_field(err, SPL_E_INPUT, "settings.v", "a tour stays with the version that it began with");
     if (view->planned)

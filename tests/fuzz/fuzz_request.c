@@ -1,5 +1,5 @@
-/* The request parser: the first byte chooses query or JSON, the rest is the request. Whatever is accepted must be a
- * view that the renderer takes, within the limits. */
+/* The request parser: the first byte chooses query, pick (@) or JSON, the rest is the request. Whatever is accepted
+ * must be a view that the renderer takes, within the limits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -18,18 +18,28 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!size)
         return 0;
     const char *text = (const char *)data + 1;
-    int rc = data[0] == '?' ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
-                            : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);
+    int rc = data[0] == '?'   ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
+             : data[0] == '@' ? spl_pick_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
+                              : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);
     if (rc ? err.code != rc || !err.message[0] : err.code != 0)
         abort();
+    if (!rc && request.picks) {
+        const struct spl_pick *pick = &request.pick;
+        if (spl_camera_check(&pick->camera, &err) || !(pick->x >= 0 && pick->x <= pick->camera.width) ||
+            !(pick->y >= 0 && pick->y <= pick->camera.height) || request.view.camera.width != 1 ||
+            request.view.camera.height != 1 || spl_view_check(&request.view, &err))
+            abort();
+        return 0;
+    }
     const struct spl_demand *demand = &request.demand;
     if (!rc && (demand->budget_ms <= 0 || demand->psnr < 0 ||
                 request.planned != !(isnan(demand->budget_ms) && isnan(demand->psnr))))
         abort();
     const struct spl_camera *camera = &request.view.camera;
-    if (!rc &&
-        (spl_view_check(&request.view, &err) || camera->width > limits.side_px || camera->height > limits.side_px ||
-         (uint64_t)camera->width * camera->height > limits.pixels || request.view.layers != 1u << request.layer))
+    if (!rc && (spl_view_check(&request.view, &err) || camera->width > limits.side_px ||
+                camera->height > limits.side_px || (uint64_t)camera->width * camera->height > limits.pixels ||
+                (request.container ? !(request.view.layers >> request.layer & 1) || request.planned
+                                   : request.view.layers != 1u << request.layer)))
         abort();
     return 0;
 }

@@ -224,7 +224,8 @@ def test_bad_tours_are_refused_by_field():
         ({**body(), "settings": {"quality": 500}}, "settings.quality"),
         ({**body(), "settings": {"camera": {}}}, "settings.camera"), ({**body(), "settings": {"x": 1}}, "settings.x"),
         ({**body(), "settings": {"budget": "5ms"}}, "settings.budget"),
-        ({**body(), "settings": {"psnr": 30}}, "settings.psnr"), ({**body(), "settings": {"v": "0" * 16}}, "settings.v"), ({**body(), "video": 1}, "video"),
+        ({**body(), "settings": {"psnr": 30}}, "settings.psnr"), ({**body(), "settings": {"v": "0" * 16}}, "settings.v"),
+        ({**body(), "settings": {"layers": ["color"]}}, "settings.layers"), ({**body(), "video": 1}, "video"),
         ({**body(), "video": True, "settings": {**SMALL, "layer": "depth", "format": "png"}}, "video"),
     ]
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:

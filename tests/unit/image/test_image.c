@@ -211,8 +211,8 @@ static void jpeg_of_depth_ends_its_map_at_the_robust_range(void **state)
     for (int i = 0; i < N; i++)
         depth[i] = 10 + 20.0f * (float)i / N;
     for (int i = 0; i < 64 * 16; i++)
-        depth[i] = NAN;                /* the upper quarter shows nothing */
-    depth[N - 1] = 1e6f;               /* strays at both ends do not stretch the map */
+        depth[i] = NAN;  /* the upper quarter shows nothing */
+    depth[N - 1] = 1e6f; /* strays at both ends do not stretch the map */
     depth[N - 2] = 1e-3f;
     struct spl_image image = {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 64, 64, depth};
     struct spl_encoded jpeg = ENCODE(&image, SPL_FORMAT_JPEG, .quality = 100);
@@ -394,7 +394,8 @@ static void every_failed_allocation_is_reported(void **state)
                 spl_encoded_finish(&out);
             }
             assert_int_equal(rc, SPL_OK);
-            assert_true(attempt > 2 || format == SPL_FORMAT_WEBP); // colour goes in as it lies; libwebp allocates by itself
+            assert_true(attempt > 2 ||
+                        format == SPL_FORMAT_WEBP); // colour goes in as it lies; libwebp allocates by itself
         }
     spl_image_finish(&color);
 }

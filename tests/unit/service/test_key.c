@@ -20,8 +20,10 @@ static struct spl_key key_of(const char *query)
     struct spl_view_request request;
     struct spl_error err = {0};
     bool json = query[0] == '{';
-    int rc = json ? spl_view_request_from_json(query, strlen(query), &defaults, &limits, &request, &err)
-                  : spl_view_request_from_query(query, strlen(query), &defaults, &limits, &request, &err);
+    bool pick = query[0] == '@';
+    int rc = pick   ? spl_pick_request_from_query(query + 1, strlen(query) - 1, &defaults, &limits, &request, &err)
+             : json ? spl_view_request_from_json(query, strlen(query), &defaults, &limits, &request, &err)
+                    : spl_view_request_from_query(query, strlen(query), &defaults, &limits, &request, &err);
     if (rc)
         fail_msg("%s: %s", query, err.message);
     return spl_key_make(&request, version, renderer);
@@ -35,6 +37,12 @@ static void what_means_the_same_has_one_key(void **state)
         {"", "method=splat&lod=1.0&layer=color&format=jpg&quality=90&margin=1&transparent=false&width=1280&height=720"},
         {"", "eye=10,0,-0&target=0,0,0&up=0,0,2&fov=60&near=0.01&background=%23000000"},
         {"", "v=0123456789abcdef"},
+        {"", "chroma=420"},
+        {"quality=95", "quality=95&chroma=444"},
+        {"format=png", "format=png&chroma=444"},
+        {"layers=depth,color", "{\"layers\":[\"color\",\"depth\"],\"container\":\"multipart\"}"},
+        {"layers=depth,normal", "layers=normal,depth&background=ff0000&quality=3"},
+        {"layers=color,depth", "layers=depth,color&depth_scale=1000&quality=90"},
         {"", "depth_scale=5000"},
         {"layer=depth", "layer=depth&background=ff0000&quality=50&format=png"},
         {"layer=depth&format=npy", "layer=depth&format=npy&depth_scale=5000"},
@@ -92,6 +100,23 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
         "layer=depth&format=jpeg",
         "layer=depth&format=jpeg&quality=91",
         "layer=depth&format=raw",
+        "chroma=444",
+        "layers=color",
+        "layers=color,depth",
+        "layers=color,normal",
+        "layers=color&container=zip",
+        "layers=color,depth&format=png",
+        "layers=color,depth&format=npy",
+        "layers=color,depth&depth_scale=5000",
+        "layers=color,depth&quality=91",
+        "layers=depth",
+        "@x=1&y=1&width=1&height=1",
+        "@x=640&y=360",
+        "@x=640.25&y=360",
+        "@x=640&y=360.25",
+        "@x=640&y=360&lod=2",
+        "@x=640&y=360&method=points",
+        "@x=640&y=360&width=1281",
     };
     enum { count = sizeof queries / sizeof *queries };
     struct spl_key keys[count];
