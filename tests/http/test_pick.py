@@ -3,7 +3,7 @@ import json
 import math
 import struct
 
-from harness import REAL, VIEW, Daemon, run
+from harness import FAKE, REAL, VIEW, Daemon, run
 
 PICK = VIEW.replace("/view", "/pick")
 WIDTH, HEIGHT = 160, 120
@@ -99,6 +99,13 @@ def test_bad_picks_are_refused_by_name():
         assert d.ask(VIEW + "?x=1").json()["field"] == "x"
         assert d.ask(PICK, "POST").status == 405
         assert d.status()["counters"]["frames"] == 0
+
+
+def test_a_pick_waits_in_the_queue_like_a_view():
+    with Daemon(FAKE, SPLATD_INJECT_LOSS_AFTER="1") as d:
+        assert d.ask(f"{PICK}?x=1&y=1").json()["depth"] == d.ask(f"{PICK}?x=1&y=1").json()["depth"] > 100
+        lost = d.ask(f"{PICK}?x=2&y=1")
+        assert lost.status == 503 and lost.json()["type"] == "urn:splatd:error:device-lost"
 
 
 def test_every_parameter_of_a_pick():
