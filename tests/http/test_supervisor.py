@@ -48,7 +48,8 @@ class Supervisor:
 
 def test_ready_status_stopping():
     with Supervisor() as s:
-        with Daemon(FAKE, NOTIFY_SOCKET=s.path, FAKE_OPEN_MS=300, FAKE_FRAME_MS=300, SPLATD_INJECT_LOSS_AFTER="1") as d:
+        with Daemon(FAKE, "--cache", "0", NOTIFY_SOCKET=s.path, FAKE_OPEN_MS=300, FAKE_FRAME_MS=300,
+                    SPLATD_INJECT_LOSS_AFTER="1") as d:
             eventually(lambda: s.said("READY=1") == 1)
             assert s.said("STATUS=rendering on flat colour (software)") == 1, s.lines
             assert [d.ask(f"{SMALL}&lod={lod}").status for lod in (2, 3)] == [200, 503]  # equal ones would come from the cache
