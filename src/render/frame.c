@@ -162,7 +162,7 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     int rc = select_tile(job, tile, err);
     stats->select_ms += since_ms(&clock);
     if (!rc)
-        rc = spl_scratch_upload(&r->scratch, r->gpu, &r->list, err);
+        rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, err);
     stats->upload_ms += since_ms(&clock);
     if (!rc)
         rc = record(tile, err);

@@ -99,9 +99,8 @@ static bool evict_one(struct spl_residency *residency)
     return true;
 }
 
-/* A buffer of `bytes`, evicting as the limit demands. */
-static int make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
-                       struct spl_gpu_buffer **out, struct spl_error *err)
+int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
+                              struct spl_gpu_buffer **out, struct spl_error *err)
 {
     for (;;) {
         struct spl_error why = {0};
@@ -120,7 +119,9 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
         spl_gpu_buffer_destroy(residency->gpu, residency->staging);
         residency->staging = NULL;
     }
-    int rc = residency->staging ? SPL_OK : make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
+    int rc = residency->staging
+                 ? SPL_OK
+                 : spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
     if (rc)
         return rc;
     memcpy(spl_gpu_buffer_map(residency->staging), from, bytes);
@@ -169,8 +170,8 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     size_t bytes;
     const uint32_t *words = spl_dataset_get_page(resident->dataset, page, &bytes);
     bool software = spl_gpu_get_device(residency->gpu)->software;
-    int rc = make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes_of(resident, page),
-                         &slot->buffer, err);
+    int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE,
+                                       bytes_of(resident, page), &slot->buffer, err);
     if (rc)
         return rc;
     if (software)

@@ -49,6 +49,10 @@ uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident);
 /* Starts a frame: what was asked for before may be evicted again. */
 void spl_residency_begin_frame(struct spl_residency *residency);
 
+/* A buffer of `bytes` for the renderer itself, evicting pages that this frame has not asked for as the limit demands. */
+int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
+                              struct spl_gpu_buffer **out, struct spl_error *err);
+
 /* Makes page `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
 int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
                       struct spl_error *err);

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { chunks_at_start = 32768, entries_at_start = 262144 };
+enum { chunks_at_start = 16384, entries_at_start = 262144 };
 
 int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, struct spl_error *err)
 {
@@ -50,9 +50,10 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
     *scratch = (struct spl_scratch){0};
 }
 
-static int upload(struct spl_gpu *gpu, struct spl_gpu_buffer **buffer, const void *from, uint64_t bytes,
+static int upload(struct spl_residency *residency, struct spl_gpu_buffer **buffer, const void *from, uint64_t bytes,
                   struct spl_error *err)
 {
+    struct spl_gpu *gpu = residency->gpu;
     if (spl_gpu_buffer_get_bytes(*buffer) < bytes) {
         uint64_t larger = spl_gpu_buffer_get_bytes(*buffer), most = spl_gpu_get_limits(gpu)->binding_bytes;
         while (larger < bytes)
@@ -60,7 +61,7 @@ static int upload(struct spl_gpu *gpu, struct spl_gpu_buffer **buffer, const voi
         if (larger > most && bytes <= most)
             larger = most;
         struct spl_gpu_buffer *replacement;
-        int rc = spl_gpu_buffer_create(gpu, SPL_GPU_UPLOAD, larger, &replacement, err);
+        int rc = spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, larger, &replacement, err);
         if (rc)
             return rc;
         spl_gpu_buffer_destroy(gpu, *buffer);
@@ -71,11 +72,11 @@ static int upload(struct spl_gpu *gpu, struct spl_gpu_buffer **buffer, const voi
     return SPL_OK;
 }
 
-int spl_scratch_upload(struct spl_scratch *scratch, struct spl_gpu *gpu, const struct spl_draw_list *list,
+int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err)
 {
-    int rc = upload(gpu, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
+    int rc = upload(residency, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
     if (!rc)
-        rc = upload(gpu, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
-    return rc ? rc : upload(gpu, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
+        rc = upload(residency, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
+    return rc ? rc : upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
 }

@@ -6,9 +6,11 @@
  * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes
  * does not extend. A PUT is routed before its body, which change_route.c takes whatever its size. Invariant: a
  * suspended request is in `waiting`, or has a change. Owned by the loop's thread. */
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -37,9 +39,9 @@ static void enter(struct connection *connection, enum phase phase)
     connection->since_ns = spl_now_ns();
 }
 
-void spl_http_enter_upload(struct request *request)
+void spl_http_enter_upload(struct request *request, bool client_sends)
 {
-    enter(request->connection, PHASE_UPLOADING);
+    enter(request->connection, client_sends ? PHASE_UPLOADING : PHASE_WORKING);
 }
 
 static void on_connection(void *context, struct MHD_Connection *handle, void **socket_context,
@@ -210,7 +212,7 @@ static bool announces_more(struct request *request, uint64_t most)
 static bool answer_headers(struct request *request)
 {
     if (!strcmp(request->method, MHD_HTTP_METHOD_PUT)) {
-        spl_http_enter_upload(request);
+        spl_http_enter_upload(request, true);
         spl_route(request, request->method);
         return !request->change && announces_more(request, 0);
     }
@@ -288,6 +290,16 @@ void spl_http_pump(struct spl_service *service)
         uv_timer_stop(&service->http_timer);
 }
 
+/* Has the client of an unfinished upload closed its side? libmicrohttpd 0.9.75 waits for an edge of epoll that does not
+ * come when the end of the stream arrived with the last data, while the connection was suspended. */
+static bool has_ended_early(const struct connection *connection)
+{
+    struct pollfd socket = {.fd = connection->fd, .events = POLLRDHUP};
+    int unread = 1;
+    return connection->phase == PHASE_UPLOADING && poll(&socket, 1, 0) > 0 &&
+           socket.revents & (POLLRDHUP | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
+}
+
 /* Cuts connections whose phase lasts too long; MHD then sees them closed. */
 static void on_slow_timer(uv_timer_t *timer)
 {
@@ -296,6 +308,8 @@ static void on_slow_timer(uv_timer_t *timer)
     struct connection *connection;
     LIST_FOREACH(connection, &service->connections, link)
     {
+        if (has_ended_early(connection))
+            shutdown(connection->fd, SHUT_RDWR);
         if (now - connection->since_ns <= phase_max_ns[connection->phase])
             continue;
         spl_count(&service->counters, slow_closed);

@@ -136,10 +136,11 @@ struct spl_service {
 
 /* http.c: the MHD daemon inside the uv loop. */
 int spl_http_start(struct spl_service *service, struct spl_error *err);
-void spl_http_quiesce(struct spl_service *service);  /* stops accepting; idempotent */
-void spl_http_stop(struct spl_service *service);     /* closes every connection; idempotent */
-void spl_http_enter_upload(struct request *request); /* its time to send the next MiB begins */
-void spl_http_pump(struct spl_service *service);     /* lets MHD work; call after a resume */
+void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
+void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
+/* The time begins for a dataset's client to send the next MiB, or for us to store it. */
+void spl_http_enter_upload(struct request *request, bool client_sends);
+void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
 
 /* flights.c: views on their way. Boards the flight of an equal request or launches one; SPL_E_BUSY when the queue is
  * full. The caller has set ticket->deadline_ns, route and done, and keeps the ticket where it is until then or until it

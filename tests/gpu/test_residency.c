@@ -12,10 +12,10 @@
 
 #include "support/make_dataset.h"
 
-enum { splats = 4000000, width = 96, height = 64 };
+enum { splats = 4000000, splats_beside = 400000, width = 96, height = 64 };
 
 static const char *device;
-static struct spl_dataset *dataset;
+static struct spl_dataset *dataset, *beside;
 
 static double uniform(void)
 {
@@ -100,6 +100,64 @@ static void pages_come_and_go_within_the_limit(void **state)
     spl_renderer_destroy(roomy);
 }
 
+static void a_draw_list_that_grows_takes_the_place_of_others(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_residency_info info;
+    struct spl_renderer *roomy = open_renderer(1ull << 30, &err), *tight;
+    const struct spl_dataset *both[] = {beside, dataset};
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(spl_renderer_add(roomy, both[i], &err) || spl_renderer_preload(roomy, both[i], &err), 0);
+    uint64_t all = spl_renderer_get_memory(roomy);
+    struct spl_view view = looking(0, 0);
+    const double eye[3] = {-5, -6, 4}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, middle, up, NULL), SPL_OK);
+    struct spl_frame exact, frame;
+    assert_int_equal(spl_renderer_render(roomy, dataset, &view, &exact, &err), SPL_OK);
+    assert_true(spl_renderer_get_memory(roomy) > all); // else there is nothing to test
+
+    tight = open_renderer(all, &err);
+    assert_non_null(tight);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(spl_renderer_add(tight, both[i], &err) || spl_renderer_preload(tight, both[i], &err), 0);
+    spl_renderer_get_residency(tight, beside, &info);
+    assert_true(info.bytes > 0 && info.pages_evicted == 0 && info.taken_bytes <= info.limit_bytes);
+    if (spl_renderer_render(tight, dataset, &view, &frame, &err))
+        fail_msg("%s", err.message);
+    assert_true(frame.stats.complete);
+    assert_memory_equal(frame.images[SPL_LAYER_COLOR].pixels, exact.images[SPL_LAYER_COLOR].pixels,
+                        (size_t)width * height * 4);
+    spl_renderer_get_residency(tight, beside, &info);
+    assert_int_equal(info.bytes, 0);
+    assert_true(info.pages_evicted > 0 && info.taken_bytes <= info.limit_bytes);
+    spl_frame_finish(&exact);
+    spl_frame_finish(&frame);
+    spl_renderer_destroy(tight);
+    spl_renderer_destroy(roomy);
+}
+
+static void preloading_leaves_others_where_they_are(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_residency_info info, before;
+    struct spl_renderer *renderer = open_renderer(1ull << 30, &err);
+    assert_int_equal(spl_renderer_add(renderer, beside, &err) || spl_renderer_preload(renderer, beside, &err), 0);
+    spl_renderer_get_residency(renderer, beside, &before);
+    uint64_t room = before.taken_bytes + spl_dataset_get_info(dataset)->page_bytes - (1ull << 20);
+    spl_renderer_destroy(renderer);
+    renderer = open_renderer(room, &err);
+    assert_int_equal(spl_renderer_add(renderer, beside, &err) || spl_renderer_preload(renderer, beside, &err), 0);
+    assert_int_equal(spl_renderer_add(renderer, dataset, &err) || spl_renderer_preload(renderer, dataset, &err), 0);
+    spl_renderer_get_residency(renderer, beside, &info);
+    assert_int_equal(info.bytes, before.bytes);
+    assert_int_equal(info.pages_evicted, 0);
+    spl_renderer_get_residency(renderer, dataset, &info);
+    assert_true(info.bytes > 0 && info.bytes < spl_dataset_get_info(dataset)->page_bytes);
+    spl_renderer_destroy(renderer);
+}
+
 static void a_limit_below_the_scratch_is_refused_with_numbers(void **state)
 {
     (void)state;
@@ -129,12 +187,16 @@ int main(void)
         all[i].radius = 0.01f;
     }
     dataset = make_dataset_levels(all, splats, 2);
+    beside = make_dataset(all, splats_beside);
     free(all);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pages_come_and_go_within_the_limit),
+        cmocka_unit_test(a_draw_list_that_grows_takes_the_place_of_others),
+        cmocka_unit_test(preloading_leaves_others_where_they_are),
         cmocka_unit_test(a_limit_below_the_scratch_is_refused_with_numbers),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_dataset_close(beside);
     spl_dataset_close(dataset);
     return failed;
 }

@@ -174,6 +174,38 @@ def test_many_changes_leave_nothing_behind():
         eventually(lambda: len(os.listdir(f"/proc/{d.process.pid}/fd")) <= descriptors)
 
 
+def test_pages_of_who_was_seen_last_make_room():
+    with folder() as home:
+        put(home, "a", wall())
+        with Daemon(REAL, "--watch", "0", datasets=[home]) as d:
+            small(d, "a")
+            memory = d.status()["memory"]
+            page = listed(d)["a"]["resident_bytes"]
+            assert memory["device_limit_bytes"] >= memory["device_bytes"] > page > 0, memory
+        put(home, "b", other())
+        limit = memory["device_bytes"] + 4096
+        with Daemon(REAL, *WATCH, "--memory-limit", str(limit), datasets=[home]) as d:
+            for turn in range(6):
+                name, rest = ("a", "b") if turn % 2 else ("b", "a")
+                evicted = d.status()["counters"]["pages_evicted"]
+                reply = d.ask(f"/v1/datasets/{name}/view?width=16&height=16&near=0.{turn + 1}")
+                assert reply.status == 200 and reply.headers["Splatd-Complete"] == "true"
+                assert listed(d)[name]["resident_bytes"] > 0 and listed(d)[rest]["resident_bytes"] == 0, listed(d)
+                status = d.status()
+                assert status["memory"]["device_bytes"] <= status["memory"]["device_limit_bytes"] == limit
+                assert turn == 0 or status["counters"]["pages_evicted"] == evicted + 1
+            os.unlink(os.path.join(home, "a.spld"))
+            eventually(lambda: "a" not in listed(d))
+            assert small(d, "b").status == 200
+        too_small = str(memory["device_bytes"] - page + 4096)
+        os.unlink(os.path.join(home, "b.spld"))
+        with Daemon(REAL, *WATCH, "--memory-limit", too_small, datasets=[home]) as d:
+            put(home, "c", wall())
+            eventually(lambda: listed(d).get("c", {}).get("state") == "failed")
+            reply = small(d, "c")
+            assert reply.status == 404 and too_small in reply.json()["detail"], reply.body
+
+
 def test_sigterm_while_datasets_are_opened():
     for _ in range(3):
         with folder() as home:
