@@ -44,6 +44,9 @@ def test_python_views():
         width, height, metres = wall.depth(**POSE, **SMALL)
         assert (width, height, len(metres)) == (65, 49, 65 * 49)
         assert abs(metres[24 * 65 + 32] - 3) < 0.01 and math.isnan(metres[0])
+        found = wall.pick(32.5, 24.5, **POSE, **SMALL)
+        assert math.dist(found["position"], [0, 0, 1]) < 0.01 and abs(found["distance"] - 3) < 0.01, found
+        assert wall.pick(0, 0, **POSE, **SMALL)["position"] is None
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
         assert all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes) and len(set(map(tuple, eyes))) == 4
 
@@ -91,6 +94,8 @@ def test_shell():
         assert pathlib.Path(folder, "a.jpg").read_bytes() == d.view(eye="3,0,1", target="0,0,1", width=64, height=48).body
         shell(d, "view", "wall", "a.png", "layer=depth", "width=64", "height=48", folder=folder)
         assert pathlib.Path(folder, "a.png").read_bytes().startswith(b"\x89PNG")
+        found = json.loads(shell(d, "pick", "wall", "32", "24", "eye=3,0,1", "target=0,0,1", "width=64", "height=48")[0])
+        assert math.dist(found["position"], [0, 0, 1]) < 0.01
         shell(d, "ring", "wall", "views", "3", "2", "1", "target=0,0,1", "width=32", "height=24", folder=folder)
         views = [file.read_bytes() for file in sorted(pathlib.Path(folder, "views").iterdir())]
         assert len(views) == len(set(views)) == 3 and all(view.startswith(JPEG) for view in views)

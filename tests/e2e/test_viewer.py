@@ -179,6 +179,44 @@ def test_the_keyboard_does_all_of_it():
         assert far(moved(tab, start)["eye"], view["eye"]) < 0.01
 
 
+def points(tab):
+    return [[float(x) for x in p.split(",")] for p in tab.run("[...document.querySelectorAll('#points dd')].map(e => e.textContent)")
+            if "," in p]
+
+
+def test_clicks_give_coordinates_and_a_distance():
+    with page() as tab:
+        x, y = middle(tab)
+        tab.click(x + 60, y - 40)
+        tab.until("document.querySelectorAll('#points dd').length === 1")
+        time.sleep(0.4)  # not a double click
+        tab.run("document.querySelector('#stage').focus()")
+        tab.key("Enter")
+        tab.until("document.querySelectorAll('#points dd').length === 3")
+        a, b = points(tab)
+        focal = tab.run("document.querySelector('#stage').clientHeight") / 2 / math.tan(math.radians(25))
+        for (px, py, pz), (u, v) in zip((a, b), ((60, -40), (0, 0))):
+            assert abs(px - 0.2 * math.sin(py)) < 0.03, "not on the wall"
+            assert abs(py - u * (3 - px) / focal) < 0.01 and abs(pz - (1 - v * (3 - px) / focal)) < 0.01, (a, b)
+        said = tab.text("#said")
+        told = float(re.search(r"distance ([\d.]+) mm", said).group(1)) / 1000
+        assert abs(told - far(a, b)) < 0.003, (said, a, b)
+        circle = tab.run("+document.querySelector('.marks circle').getAttribute('cx')")
+        tab.drag((x, y), (x + 50, y))
+        assert tab.run("+document.querySelector('.marks circle').getAttribute('cx')") != circle
+        tab.key("Escape")
+        tab.until("!document.querySelector('.marks').children.length && document.querySelector('#clear').disabled")
+        settled(tab)
+        before = link(tab)
+        tab.click(x + 60, y - 40, times=2)
+        target = moved(tab, before)["target"]
+        assert abs(target[0] - 0.2 * math.sin(target[1])) < 0.03 and not points(tab), "a double click turns there"
+        tab.run("location.hash = 'dataset=wall&eye=3,0,1&target=9,0,1'")
+        next_link(tab, lambda now: now["target"][0] == 9 and "layer" in now)
+        tab.click(x, y)
+        tab.until("document.querySelector('#said').textContent === 'Nothing there'")
+
+
 def test_layers_methods_and_budgets():
     with page() as tab:
         digest = settled(tab)
