@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "synth/footprint.h"
 #include "synth/random.h"
 #include "synth/vector.h"
 
@@ -134,9 +135,15 @@ unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_g
                 break;
         uint64_t return_key = first ? hash64(key ^ hash64(for_return)) ^ first : key;
         const struct spl_hit *hit = &hits[central >= (int)first && central < (int)last ? (unsigned)central : first];
-        struct place place = {.range = hit->t, .color = {hit->color[0], hit->color[1], hit->color[2]}};
+        struct place place = {.range = hit->t};
         if (is_lost(scanner, faults, hit, pulse.direction, return_key))
             continue;
+        if (!returns) {
+            found++;
+            continue;
+        }
+        spl_footprint_color(scene, grid, pass, column, row, hit, place.color);
+        spl_footprint_color(scene, grid, pass, column, row, hit, place.color);
         if (mixing)
             mix(scanner, hits + first, last - first, return_key, &place);
         if (faults->noise > 0)
@@ -149,7 +156,7 @@ unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_g
         r->intensity = (float)(albedo_of(place.color) * (0.5 - 0.5 * dot3(hit->normal, pulse.direction)));
         memcpy(r->color, place.color, sizeof r->color);
     }
-    for (unsigned i = 0; i < found; i++) {
+    for (unsigned i = 0; returns && i < found; i++) {
         returns[i].number = (uint8_t)(i + 1);
         returns[i].of = (uint8_t)found;
     }

@@ -79,6 +79,18 @@ static void sweep(const struct spl_scanner *scanner, const struct spl_station *c
     rotate(corner->rotation, pulse->local, pulse->direction);
 }
 
+void spl_scanner_spacing(const struct spl_scene *scene, const struct spl_scan_grid *grid, size_t pass, uint64_t column,
+                         uint64_t row, double steps[2][3])
+{
+    const struct spl_scanner *scanner = &scene->scanner;
+    double count = (double)grid->columns * (double)grid->rows, growth = scanner->growth;
+    double share = ((double)(column * grid->rows + row) + 0.5) / count;
+    double stretch = growth > 1 ? (growth - 1) / (log(growth) * (1 + share * (growth - 1))) : 1;
+    double side = sqrt(scanner->length * scanner->width * stretch / count);
+    rotate(scene->stations[pass].rotation, (double[3]){side, 0, 0}, steps[0]);
+    rotate(scene->stations[pass].rotation, (double[3]){0, side, 0}, steps[1]);
+}
+
 void spl_scanner_pulse(const struct spl_scene *scene, const struct spl_scan_grid *grid, size_t pass, uint64_t column,
                        uint64_t row, struct spl_pulse *pulse)
 {

@@ -54,12 +54,11 @@ static void count_columns(void *context, size_t begin, size_t end, unsigned work
     for (size_t i = begin; i < end; i++) {
         size_t pass = i / c->grid->columns, column = i % c->grid->columns;
         for (uint64_t row = 0; row < c->grid->rows; row++) {
-            struct spl_return returns[SPL_SCANNER_RETURNS_MAX];
             struct spl_pulse pulse;
             double t = INFINITY;
             uint32_t index;
             if (!rays_only) {
-                hits += spl_scanner_cast(scene, c->grid, c->faults, pass, column, row, returns);
+                hits += spl_scanner_cast(scene, c->grid, c->faults, pass, column, row, NULL);
                 continue;
             }
             spl_scanner_pulse(scene, c->grid, pass, column, row, &pulse);

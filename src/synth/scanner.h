@@ -42,10 +42,16 @@ struct spl_return {
 void spl_scanner_pulse(const struct spl_scene *scene, const struct spl_scan_grid *grid, size_t pass, uint64_t column,
                        uint64_t row, struct spl_pulse *pulse);
 
+/* Of a sweep, whose neighbours in the grid are not neighbours on the surface: steps of a square patch as large as a
+ * pulse's share of the area, along and across the sweep. */
+void spl_scanner_spacing(const struct spl_scene *scene, const struct spl_scan_grid *grid, size_t pass, uint64_t column,
+                         uint64_t row, double steps[2][3]);
+
 /* The measurement of one pulse: the number of returns, nearest first; 0 for sky. Without faults and for scanners of one
  * return the beam is its central ray. Else it is seven rays over the footprint: surfaces more than half a metre apart are
  * separate returns of a scanner that has several; where rays of one return hit two surfaces more than two footprints
- * apart, a share `mixed` of them lies anywhere between, with a colour between. All lie on the central ray. */
+ * apart, a share `mixed` of them lies anywhere between, with a colour between. All lie on the central ray. Colours are
+ * means over the surface between a pulse and the next ones (footprint.h). `returns` may be NULL: they are counted. */
 unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_grid *grid,
                           const struct spl_scan_faults *faults, size_t pass, uint64_t column, uint64_t row,
                           struct spl_return returns[SPL_SCANNER_RETURNS_MAX]);
