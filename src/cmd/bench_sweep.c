@@ -186,6 +186,16 @@ static void print_table(const struct spl_report *r)
         printf("%s %-*s %9.2f %9.2f %8.2f %8.2f %8.4f %9.3f %11.3f %9.3f\n", p->front ? "*" : " ", shown, name, p->ms,
                p->ms_q90, p->psnr, p->psnr_q05, p->ssim, 100 * p->holes, 100 * p->see_through, 100 * p->depth_beyond);
     }
+    struct spl_report_dense first = spl_report_get_dense(r->sweep, 0);
+    for (size_t i = 0; i < r->profile.count && first.share > 0; i++) {
+        char name[64];
+        struct spl_report_dense d = spl_report_get_dense(r->sweep, i);
+        if (!i)
+            printf("\nwhere the scan has a point a pixel or more, %.1f %% of what is seen:\n", 100 * first.share);
+        spl_report_setting_name(&r->profile.points[i].setting, name);
+        printf("  %-25s PSNR %6.2f dB  holes %.3f %%  see-through %.3f %%  depth beyond a radius %.3f %%\n", name,
+               d.psnr, 100 * d.holes, 100 * d.see_through, 100 * d.depth_beyond);
+    }
     printf("\n*: on the front, none is both faster and more accurate; calibrator %.1f ms (quartiles %.1f to %.1f)\n",
            r->calibrator.median, r->calibrator.q1, r->calibrator.q3);
 }

@@ -71,8 +71,9 @@ json_t *spl_record_metrics(const struct spl_metrics *metrics)
 
 json_t *spl_record_accuracy(size_t setting, size_t view, const struct spl_sweep_accuracy *a)
 {
-    return json_pack("{s:I, s:I, s:o, s:f, s:b}", "setting", (json_int_t)setting, "view", (json_int_t)view, "accuracy",
-                     spl_record_metrics(&a->metrics), "splats", a->splats, "complete", a->complete);
+    return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f, s:b}", "setting", (json_int_t)setting, "view", (json_int_t)view,
+                     "accuracy", spl_record_metrics(&a->metrics), "dense", spl_record_metrics(&a->dense), "dense_share",
+                     number(a->dense_share), "splats", a->splats, "complete", a->complete);
 }
 
 json_t *spl_record_time(size_t setting, size_t view, enum spl_sweep_size size, size_t repeat,
@@ -120,7 +121,9 @@ bool spl_record_take(struct spl_sweep *sweep, const json_t *record)
         struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(sweep, setting, view);
         a->complete = json_is_true(json_object_get(record, "complete"));
         a->done = take_number(json_object_get(record, "splats"), &a->splats) &&
-                  take_members(metrics, &a->metrics, measures, MEASURES);
+                  take_number(json_object_get(record, "dense_share"), &a->dense_share) &&
+                  take_members(metrics, &a->metrics, measures, MEASURES) &&
+                  take_members(json_object_get(record, "dense"), &a->dense, measures, MEASURES);
         return a->done;
     }
     if (!take_index(record, "size", SPL_SWEEP_SIZES, &size) || !take_index(record, "repeat", o->repeats, &repeat))

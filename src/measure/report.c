@@ -154,6 +154,30 @@ static double psnr_overall(const struct spl_sweep *sweep, size_t setting)
     return count ? -10 * log10(error / (double)count) : (double)NAN;
 }
 
+struct spl_report_dense spl_report_get_dense(const struct spl_sweep *sweep, size_t setting)
+{
+    double weight = 0, error = 0;
+    struct spl_report_dense d = {0};
+    size_t views = sweep->options->views->count;
+    for (size_t v = 0; v < views; v++) {
+        const struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(sweep, setting, v);
+        if (!(a->dense_share > 0) || isnan(a->dense.psnr))
+            continue;
+        weight += a->dense_share;
+        error += a->dense_share * pow(10, -fmin(a->dense.psnr, SPL_PROFILE_PSNR_MAX) / 10);
+        d.depth_beyond += a->dense_share * a->dense.depth_beyond;
+        d.holes += a->dense_share * a->dense.holes;
+        d.see_through += a->dense_share * a->dense.see_through;
+    }
+    if (!weight)
+        return (struct spl_report_dense){NAN, NAN, NAN, NAN, NAN};
+    return (struct spl_report_dense){.share = weight / (double)views,
+                                     .psnr = -10 * log10(error / weight),
+                                     .depth_beyond = d.depth_beyond / weight,
+                                     .holes = d.holes / weight,
+                                     .see_through = d.see_through / weight};
+}
+
 int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, struct spl_error *err)
 {
     const struct spl_sweep_options *o = sweep->options;
@@ -191,15 +215,22 @@ void spl_report_finish(struct spl_report *report)
 
 /* ------------------------------------------------------------------------------------------------------------- JSON */
 
+/* JSON has no NAN. */
+static json_t *real(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
 static json_t *view_json(const struct spl_sweep *sweep, size_t setting, size_t view)
 {
     struct spl_summary ms = over_repeats(sweep, setting, view, SPL_SWEEP_FULL, pick_ms);
     const struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(sweep, setting, view);
-    return json_pack("{s:s, s:{s:f, s:f, s:f, s:f, s:f}, s:f, s:o, s:f, s:b}", "view",
+    return json_pack("{s:s, s:{s:f, s:f, s:f, s:f, s:f}, s:f, s:o, s:o, s:o, s:f, s:b}", "view",
                      sweep->options->views->views[view].name, "ms", "min", ms.min, "q1", ms.q1, "median", ms.median,
                      "q3", ms.q3, "max", ms.max, "device_ms",
                      over_repeats(sweep, setting, view, SPL_SWEEP_FULL, pick_device).median, "accuracy",
-                     spl_record_metrics(&a->metrics), "splats", a->splats, "complete", a->complete);
+                     spl_record_metrics(&a->metrics), "dense", spl_record_metrics(&a->dense), "dense_share",
+                     real(a->dense_share), "splats", a->splats, "complete", a->complete);
 }
 
 /* What the profile does not have of a setting: the spread, the device's part, the stages and each view. */
@@ -219,7 +250,13 @@ static int add_details(json_t *row, const struct spl_sweep *sweep, size_t settin
     }
     failed |= json_object_set_new(row, "spread", json_real(spl_summarise(values, views).median));
     double overall = psnr_overall(sweep, setting);
-    failed |= json_object_set_new(row, "psnr_overall", isnan(overall) ? json_null() : json_real(overall));
+    failed |= json_object_set_new(row, "psnr_overall", real(overall));
+    struct spl_report_dense d = spl_report_get_dense(sweep, setting);
+    if (!isnan(d.share))
+        failed |= json_object_set_new(row, "dense",
+                                      json_pack("{s:o, s:o, s:o, s:o, s:o}", "share", real(d.share), "psnr",
+                                                real(d.psnr), "depth_beyond", real(d.depth_beyond), "holes",
+                                                real(d.holes), "see_through", real(d.see_through)));
     failed |= json_object_set_new(row, "device_ms", json_real(device));
     failed |= json_object_set_new(row, "stages_ms", passes);
     failed |= json_object_set_new(row, "views", list);
@@ -287,19 +324,22 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
     }
     fputs("method,lod,supersample,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
           "depth_rmse,depth_beyond,"
-          "holes,"
-          "see_through,halo,normal_mean\n",
+          "holes,see_through,halo,normal_mean,dense_share,dense_psnr,dense_depth_beyond,dense_holes,"
+          "dense_see_through\n",
           out);
     for (size_t s = 0; s < report->profile.count; s++) {
         const struct spl_profile_point *p = &report->profile.points[s];
         fprintf(out, "%s,%g,%g,%d", spl_method_name(p->setting.method), p->setting.lod, p->setting.supersample,
                 p->front);
+        struct spl_report_dense d = spl_report_get_dense(sweep, s);
         const double numbers[] = {
             p->ms,          p->ms_q90,       over_views(sweep, s, SPL_SWEEP_FULL, pick_device, values),
             p->splats,      p->psnr,         psnr_overall(sweep, s),
             p->psnr_sd,     p->psnr_q05,     p->ssim,
             p->depth_rmse,  p->depth_beyond, p->holes,
-            p->see_through, p->halo,         p->normal_mean};
+            p->see_through, p->halo,         p->normal_mean,
+            d.share,        d.psnr,          d.depth_beyond,
+            d.holes,        d.see_through};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
             put(out, numbers[i]);
         fputc('\n', out);

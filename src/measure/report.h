@@ -22,6 +22,13 @@ struct spl_report {
 int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, struct spl_error *err);
 void spl_report_finish(struct spl_report *report);
 
+/* Over the pixels of all views where the scan has a point a pixel, each counted once; NAN where the reference has no
+ * exact depth. `share` is of the pixels with a true depth, a mean over the views. */
+struct spl_report_dense {
+    double share, psnr, depth_beyond, holes, see_through;
+};
+struct spl_report_dense spl_report_get_dense(const struct spl_sweep *sweep, size_t setting);
+
 /* The whole of it; a new reference, NULL without memory. */
 json_t *spl_report_to_json(const struct spl_report *report, const struct spl_peers *peers);
 

@@ -4,6 +4,7 @@
 #include "measure/sweep.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,7 @@
 #include "measure/state.h"
 #include "measure/thumbnail.h"
 #include "measure/tolerance.h"
+#include "measure/truth.h"
 
 enum { LOSSES_MAX = 3, COMPARE_SAMPLES = 1 << 20 }; /* of one frame */
 #define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S)       /* of rendering: a calibrator takes about 0.1 s */
@@ -203,19 +205,38 @@ static void advance(struct job *job, const char *stage)
 
 /* -------------------------------------------------------------------------------------------------------- accuracy */
 
-static struct spl_picture picture(const struct spl_image images[SPL_LAYER_COUNT])
+/* Marks where every point, one pixel each, shows the true surface. */
+static int mark_dense(struct job *job, size_t v, struct spl_truth *t, struct spl_error *err)
 {
-    const struct spl_image *layer[SPL_LAYER_COUNT];
-    for (int i = 0; i < SPL_LAYER_COUNT; i++)
-        layer[i] = images[i].pixels ? &images[i] : NULL;
-    return (struct spl_picture){.color = layer[SPL_LAYER_COLOR],
-                                .depth = layer[SPL_LAYER_DEPTH],
-                                .normal = layer[SPL_LAYER_NORMAL],
-                                .coverage = layer[SPL_LAYER_COVERAGE]};
+    struct spl_view view;
+    struct spl_frame frame;
+    double ms;
+    fill_view(job->options, 0, v, SPL_SWEEP_FULL, &view);
+    view.method = SPL_METHOD_POINTS;
+    view.lod = 0;
+    view.supersample = 1;
+    view.layers = 1u << SPL_LAYER_DEPTH;
+    int rc = render(job, &view, &frame, &ms, err);
+    if (rc)
+        return rc;
+    rc = spl_truth_mark_dense(t, &frame.images[SPL_LAYER_DEPTH], err);
+    spl_frame_finish(&frame);
+    return rc;
 }
 
-static int compare(struct job *job, size_t setting, size_t v, const struct spl_image truth[SPL_LAYER_COUNT],
-                   float *tolerance, struct spl_error *err)
+static int get_truth(struct job *job, size_t v, struct spl_truth *t, struct spl_error *err)
+{
+    const struct spl_sweep_options *o = job->options;
+    const struct spl_camera *camera = &o->views->views[v].camera;
+    int rc = spl_truth_init(t, camera->width, camera->height, err);
+    if (!rc)
+        rc = get_reference(job, v, t->images, err);
+    if (!rc && o->reference.kind == SPL_REFERENCE_EXACT && t->images[SPL_LAYER_DEPTH].pixels)
+        rc = mark_dense(job, v, t, err);
+    return rc;
+}
+
+static int compare(struct job *job, size_t setting, size_t v, const struct spl_truth *t, struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
     struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(job->sweep, setting, v);
@@ -230,14 +251,14 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_i
     if (rc)
         return rc;
     spl_tolerance_fill(job->tolerance, &view, &frame.images[SPL_LAYER_ID], &frame.images[SPL_LAYER_DEPTH], 0,
-                       tolerance);
-    struct spl_picture image = picture(frame.images), reference = picture(truth);
-    reference.tolerance_m = tolerance;
-    rc = spl_metrics_compare(&image, &reference, 0, &a->metrics, err);
+                       t->tolerance);
     a->splats = (double)frame.stats.splats_drawn;
     a->complete = frame.stats.complete;
-    if (!rc && has_pictures(o->views->count, v))
-        rc = save_pictures(o, v, setting, &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR], err);
+    a->dense_share = t->dense_share;
+    if (has_pictures(o->views->count, v))
+        rc = save_pictures(o, v, setting, &frame.images[SPL_LAYER_COLOR], &t->images[SPL_LAYER_COLOR], err);
+    if (!rc)
+        rc = spl_truth_compare(t, frame.images, &a->metrics, &a->dense, err);
     spl_frame_finish(&frame);
     if (!rc)
         rc = spl_state_add(job->state, spl_record_accuracy(setting, v, a), err);
@@ -253,21 +274,17 @@ static int compare_view(struct job *job, size_t v, struct spl_error *err)
         missing += !spl_sweep_get_accuracy(job->sweep, s, v)->done;
     if (!missing)
         return SPL_OK;
-    const struct spl_camera *camera = &o->views->views[v].camera;
-    struct spl_image truth[SPL_LAYER_COUNT] = {0};
-    float *tolerance = spl_alloc_raw((size_t)camera->width * camera->height, sizeof *tolerance, err);
-    int rc = tolerance ? get_reference(job, v, truth, err) : SPL_E_NOMEM;
+    struct spl_truth t;
+    int rc = get_truth(job, v, &t, err);
     if (!rc && has_pictures(o->views->count, v))
-        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &truth[SPL_LAYER_COLOR], err);
+        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &t.images[SPL_LAYER_COLOR], err);
     for (size_t s = 0; !rc && s < o->setting_count; s++) {
         if (spl_sweep_get_accuracy(job->sweep, s, v)->done)
             continue;
-        rc = compare(job, s, v, truth, tolerance, err);
+        rc = compare(job, s, v, &t, err);
         advance(job, "accuracy");
     }
-    for (int i = 0; i < SPL_LAYER_COUNT; i++)
-        spl_image_finish(&truth[i]);
-    free(tolerance);
+    spl_truth_finish(&t);
     return rc;
 }
 

@@ -39,6 +39,9 @@ struct spl_sweep_time { /* one frame, colour only */
 
 struct spl_sweep_accuracy {
     struct spl_metrics metrics;
+    struct spl_metrics dense; /* over pixels where the scan has a point a pixel (measure/dense.h); NAN without exact
+                                 depth; never SSIM and halo */
+    double dense_share;       /* of the pixels with a true depth, 0..1; NAN as above */
     double splats; /* drawn */
     bool complete; /* no coarser nodes stood in */
     bool done;
