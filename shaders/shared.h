@@ -65,6 +65,10 @@
  * sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f
 
+/* Seen at a slant, discs of one surface differ in depth by more than seen square on: by up to 1 / cos for the same error of a
+ * normal. The blend margin grows with it, up to this much. */
+#define SPL_MARGIN_SLANT 4.0f
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */

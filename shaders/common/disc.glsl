@@ -63,7 +63,8 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     precise float scale = p.z / s.radius;
     precise float spans = sqrt(max(1.0 - n.z * n.z, 0.0)) / scale;
     precise vec2 scaled_ray = ray * scale, pitch = vec2(frame.inverse_fx * scale, frame.inverse_fy * scale);
-    precise float margin = frame.margin * max(s.radius, frame.low_pass * p.z * frame.inverse_fx);
+    precise float slant = min(max(abs(tilt), 1.0), SPL_MARGIN_SLANT);
+    precise float margin = frame.margin * max(s.radius, frame.low_pass * p.z * frame.inverse_fx) * slant;
     d.slope = slope;
     d.reach = max(spans, SPL_LOW_PASS_REACH * frame.inverse_fx);
     d.ray = scaled_ray;

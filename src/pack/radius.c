@@ -4,9 +4,10 @@
  * Elsewhere it would make blobs or leave gaps, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the
  * normal's PCA) changes it:
  * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
- * - in a volume (foliage) a disc does not stand for the surface between its neighbours: half of it, as spread grows
- * round. A noisy surface looks like one too: the neighbours' neighbours tell, and give the normal where they show a
- * surface;
+ * - in a volume (foliage) a disc does not stand for the surface between its neighbours, most of which are on other
+ * leaves: it takes what its nearest ones say, as spread grows round. A noisy surface looks like a volume too: the
+ * neighbours' neighbours tell, as noise fades in a wider view, and give the normal where they show a surface;
+ * - at a border a disc of full size would stick out: it is as small as the discs behind it allow;
  * - scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all
  * on one side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest
  * point in each direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much
@@ -23,6 +24,9 @@
 static const double linear_below = 0.15;                /* sigma_1 / sigma_2 */
 static const double coplanar = 0.25;                    /* slope within which a far point continues a surface */
 static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
+static const double volume_from = 0.4;                  /* roundness from which all of a radius is that of a volume */
+static const double fades = 0.8, lasts = 1.2; /* growth of sigma_0 / sigma_1 over a wider view: noise, a volume */
+static const double in_volume = 0.6, at_border = 0.6, along_border = 0.8; /* of a radius amid a surface */
 static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
 struct spl_moments spl_moments_of(const struct spl_points *p, size_t i, const struct spl_nearest *near)
@@ -158,6 +162,26 @@ static double roundness(const struct spread *spread)
     return t * t * (3 - 2 * t);
 }
 
+/* Eq. 20 over as few neighbours as two, the least of them all: what points of another leaf or wall do not enlarge. */
+static double least_radius(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count)
+{
+    double ascending[SPL_NEIGHBOURS_MAX], least = INFINITY;
+    unsigned n = 0;
+    for (; n < count && neighbours[n] != UINT32_MAX; n++) {
+        uint32_t j = neighbours[n];
+        double squared = 0;
+        for (int c = 0; c < 3; c++)
+            squared += (p->axis[c][j] - p->axis[c][i]) * (p->axis[c][j] - p->axis[c][i]);
+        unsigned at = n;
+        for (; at && ascending[at - 1] > squared; at--)
+            ascending[at] = ascending[at - 1];
+        ascending[at] = squared;
+    }
+    for (unsigned k = n < 2 ? n : 2; k && k <= n; k++)
+        least = fmin(least, ascending[k - 1] / k);
+    return 2 * sqrt(least);
+}
+
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
 double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach, struct spl_nearest *near,
                            double normal[3], double *round)
@@ -165,7 +189,8 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     const struct spl_points *p = v->points;
     const struct spl_moments *moments = &v->moments[i - v->begin];
     struct spread spread = spread_of(moments);
-    double n = moments->count - 1, radius = 2 * reach / sqrt(n), nearest[8];
+    const uint32_t *list = v->lists + (i - v->begin) * v->k;
+    double volume = 0, n = moments->count - 1, radius = 2 * reach / sqrt(n), nearest[8];
     bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
     memcpy(normal, spread.normal, sizeof spread.normal);
     *round = roundness(&spread);
@@ -173,14 +198,16 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
         struct spl_moments around = widen(v, i);
         struct spread wide = spread_of(&around);
         double wide_round = roundness(&wide);
+        double growth = wide.sigma[0] * spread.sigma[1] / fmax(wide.sigma[1] * spread.sigma[0], 1e-300);
         if (wide_round < *round) {
             memcpy(normal, wide.normal, sizeof wide.normal);
             *round = wide_round;
         }
+        volume = fmin(1, *round / volume_from) * fmin(1, fmax(0, (growth - fades) / (lasts - fades)));
     }
-    double volume = *round * *round; /* squared twice: a rough surface is not to open up */
-    radius *= 1 - 0.5 * volume * volume;
-    eighths(p, i, v->lists + (i - v->begin) * v->k, v->k, normal, 1, nearest);
+    if (volume > 0)
+        radius = fmin(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
+    eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
     if (*round > 0.1 || !(linear || place.on_line || place.one_sided))
         return radius;
@@ -197,5 +224,9 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
-    return fmax(radius * sqrt(fmax(place.filled, 0.25)), fmin(0.75 * place.gap, 3 * radius));
+    radius *= sqrt(fmax(place.filled, 0.25));
+    if (!place.one_sided)
+        return fmax(radius, fmin(0.75 * place.gap, 3 * radius));
+    return fmin(fmax(at_border * radius, fmin(0.5 * place.gap, 3 * radius)),
+                along_border * least_radius(p, i, list, v->k));
 }

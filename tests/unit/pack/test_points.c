@@ -280,6 +280,68 @@ static void test_no_blobs(void **state)
     spl_points_finish(&p);
 }
 
+/* At the grid's border a disc of full size would stick out by 0.65 of the spacing more than the surface does. */
+static void test_borders_stay_where_they_are(void **state)
+{
+    (void)state;
+    size_t count = 10000;
+    double(*position)[3] = shape_points(SHAPE_GRID, count, 1);
+    struct spl_points p = sorted((const double(*)[3])position, count, 2);
+    surface(&p, 2);
+    for (size_t i = 0; i < p.count; i++) {
+        double x = p.axis[0][i];
+        if (x < 0.05 && p.axis[1][i] > 0.35 && p.axis[1][i] < 9.55)
+            assert_true(p.radius[i] > 0.05 && p.radius[i] < 0.09); /* meets the next one, 0.1 away */
+    }
+    free(position);
+    spl_points_finish(&p);
+}
+
+/* Leaves of 3 cm with five points each, turned every way, some 10 cm apart: the neighbours of a point are mostly on
+ * other leaves. All discs together may have six times the area of all leaves (eq. 20: eight times). A wall with as much
+ * noise as it has spacing is rough as well, but stays closed. */
+static void test_leaves_and_noise(void **state)
+{
+    (void)state;
+    enum { leaves = 2000, each = 5, noisy = 10000, count = leaves * each + noisy };
+    double(*position)[3] = malloc(count * sizeof *position), leaf = 0, wall = 0;
+    uint64_t random = 11;
+    for (size_t i = 0; i < leaves; i++) {
+        double center[3], u[3], v[3], uv = 0, uu = 0, vv = 0;
+        for (int c = 0; c < 3; c++) {
+            center[c] = 1.2 * uniform(&random);
+            u[c] = uniform(&random) - 0.5;
+            v[c] = uniform(&random) - 0.5;
+            uv += u[c] * v[c];
+            uu += u[c] * u[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            v[c] -= uv / uu * u[c];
+            vv += v[c] * v[c];
+        }
+        for (size_t k = 0; k < each; k++) {
+            double r = 0.03 * sqrt(uniform(&random)), angle = 2 * M_PI * uniform(&random);
+            for (int c = 0; c < 3; c++)
+                position[i * each + k][c] =
+                    center[c] + r * (cos(angle) * u[c] / sqrt(uu) + sin(angle) * v[c] / sqrt(vv));
+        }
+    }
+    for (size_t i = leaves * each; i < count; i++) {
+        position[i][0] = 5 + uniform(&random);
+        position[i][1] = uniform(&random);
+        position[i][2] = 0.01 * (uniform(&random) + uniform(&random) - 1);
+    }
+    struct spl_points p = sorted((const double(*)[3])position, count, 1);
+    surface(&p, 1);
+    for (size_t i = 0; i < p.count; i++)
+        *(p.color_class[i] < leaves * each ? &leaf : &wall) += M_PI * p.radius[i] * p.radius[i];
+    printf("discs over true area: leaves %.2f, wall %.2f\n", leaf / (leaves * M_PI * 0.03 * 0.03), wall);
+    assert_true(leaf < 6 * leaves * M_PI * 0.03 * 0.03);
+    assert_true(wall > 3);
+    free(position);
+    spl_points_finish(&p);
+}
+
 static void test_degenerate_surfaces(void **state)
 {
     (void)state;
@@ -326,6 +388,8 @@ int main(void)
         cmocka_unit_test(test_given_normals_stay),
         cmocka_unit_test(test_radius_of_a_grid),
         cmocka_unit_test(test_no_blobs),
+        cmocka_unit_test(test_borders_stay_where_they_are),
+        cmocka_unit_test(test_leaves_and_noise),
         cmocka_unit_test(test_degenerate_surfaces),
         cmocka_unit_test(test_threads_do_not_matter),
     };
