@@ -118,7 +118,7 @@ fi
 if build no-vulkan gcc $strict -Dvulkan=disabled -Doptimization=1; then
     suites no-vulkan unit gpu
 fi
-if build no-egl gcc $strict -Degl=disabled -Dsystemd=disabled -Doptimization=1; then
+if build no-egl gcc $strict -Degl=disabled -Dsystemd=disabled -Dvideo=disabled -Doptimization=1; then
     suites no-egl unit gpu
 fi
 if build clang clang $strict; then
