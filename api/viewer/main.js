@@ -64,7 +64,7 @@ async function open() {
     for (const name of ["lod", "supersample", "budget"]) $(name).value = wanted[name] ?? (name === "budget" ? "" : 1);
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
-    $("about").textContent = `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name}`;
+    $("about").textContent = `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);

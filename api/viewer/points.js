@@ -16,7 +16,7 @@ function shape(name, attributes, text = "") {
 
 /** Metres as people read them. */
 export const metres = (x) => (x < 1 ? `${(x * 1000).toFixed(1)} mm` : `${x.toFixed(3)} m`);
-export const coordinates = (p) => p.map((x) => x.toFixed(3)).join(", ");
+export const coordinates = (p) => p.map((x) => (Math.round(x * 1000) / 1000 + 0).toFixed(3)).join(", ");
 
 export class Points extends EventTarget {
   /** Fires "change" when `list` has changed; detail: what was just found, or a text that says why nothing was. */
