@@ -6,8 +6,10 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <glob.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <xxhash.h>
@@ -94,6 +96,31 @@ static int flush_page(struct spl_dataset_writer *writer, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Removes what killed processes left of `path`: part files that nobody holds a lock on. */
+static void sweep(const char *path)
+{
+    char pattern[4096];
+    glob_t found = {0};
+    size_t used = 0;
+    if (strlen(path) > (sizeof pattern - 16) / 2)
+        return;
+    for (const char *c = path; *c; c++) {
+        if (strchr("*?[\\", *c))
+            pattern[used++] = '\\';
+        pattern[used++] = *c;
+    }
+    snprintf(pattern + used, sizeof pattern - used, ".part-[0-9]*");
+    if (!glob(pattern, GLOB_NOSORT, NULL, &found))
+        for (size_t i = 0; i < found.gl_pathc; i++) {
+            int fd = open(found.gl_pathv[i], O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+            if (fd >= 0 && !flock(fd, LOCK_EX | LOCK_NB))
+                unlink(found.gl_pathv[i]);
+            if (fd >= 0)
+                close(fd);
+        }
+    globfree(&found);
+}
+
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err)
 {
     *out = NULL;
@@ -113,12 +140,13 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
         spl_fail(err, rc, "out of memory for the name of %s", path);
         goto failed;
     }
-    /* A part file of this PID is what a killed process left: truncated, not refused. */
+    sweep(path);
     writer->fd = open(writer->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (writer->fd < 0) {
         rc = spl_fail_errno(err, errno, "cannot create %s", writer->part_path);
         goto failed;
     }
+    flock(writer->fd, LOCK_EX | LOCK_NB); /* says that it is in use; file systems without locks are not swept either */
     *out = writer;
     return SPL_OK;
 failed:

@@ -11,7 +11,7 @@
 
 struct spl_dataset_writer;
 
-/* Creates PATH.part-PID beside `path`. */
+/* Creates PATH.part-PID beside `path`, and removes those that killed processes left of it. */
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err);
 
 /* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new

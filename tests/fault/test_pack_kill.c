@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -124,6 +125,26 @@ static void test_terminate(void **state)
     }
 }
 
+/* What a killed pack leaves is gone after the next one; what a living one writes stays. */
+static void test_leftovers_are_swept(void **state)
+{
+    (void)state;
+    char dead[96], living[96], other[96];
+    snprintf(dead, sizeof dead, "%s.part-1", output);
+    snprintf(living, sizeof living, "%s.part-2", output);
+    snprintf(other, sizeof other, "%s/other.spld.part-1", folder);
+    assert_int_equal(close(open(dead, O_CREAT | O_WRONLY, 0600)), 0);
+    assert_int_equal(close(open(other, O_CREAT | O_WRONLY, 0600)), 0);
+    int fd = open(living, O_CREAT | O_WRONLY, 0600);
+    assert_int_equal(flock(fd, LOCK_EX | LOCK_NB), 0);
+    time_pack();
+    assert_int_equal(access(dead, F_OK), -1);
+    assert_int_equal(access(living, F_OK), 0);
+    assert_int_equal(access(other, F_OK), 0);
+    close(fd);
+    parts(true);
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -153,6 +174,7 @@ static int teardown(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kill), cmocka_unit_test(test_terminate)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kill), cmocka_unit_test(test_terminate),
+                                       cmocka_unit_test(test_leftovers_are_swept)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }
