@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/memory.h"
 #include "service/headers.h"
 #include "service/state.h"
 
@@ -69,8 +70,8 @@ static json_t *outside_text(const char *text)
     return json_string(plain);
 }
 
-void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
-                       const char *detail)
+static char *problem_text(const struct request *request, unsigned status, const char *type, const char *field,
+                          const char *detail)
 {
     json_t *json = json_pack("{s:o, s:s, s:i, s:o, s:o}", "type", json_sprintf("urn:splatd:error:%s", type), "title",
                              MHD_get_reason_phrase_for(status), "status", (int)status, "detail", outside_text(detail),
@@ -79,7 +80,25 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
         json_object_set_new(json, "field", outside_text(field));
     char *text = json ? json_dumps(json, JSON_INDENT(1)) : NULL;
     json_decref(json);
-    set_text(request, status, "application/problem+json", text);
+    return text;
+}
+
+/* 413 is about bodies; a parameter beyond a limit is the client's to change, like any other. */
+static unsigned status_of(const struct spl_error *err)
+{
+    bool field = err->code == SPL_E_LIMIT && err->field[0];
+    return field ? MHD_HTTP_BAD_REQUEST : (unsigned)spl_code_get_info(err->code)->http_status;
+}
+
+char *spl_problem_text(const struct request *request, const struct spl_error *err)
+{
+    return problem_text(request, status_of(err), spl_code_get_info(err->code)->name, err->field, err->message);
+}
+
+void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
+                       const char *detail)
+{
+    set_text(request, status, "application/problem+json", problem_text(request, status, type, field, detail));
 }
 
 void spl_reply_error(struct request *request, const struct spl_error *err)
@@ -87,9 +106,7 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
     const struct spl_code_info *info = spl_code_get_info(err->code);
     if (info->http_status >= 500 && !info->retry && spl_access_log_admit(request->service))
         spl_log_error("request %s: %s", request->id, err->message);
-    // 413 is about bodies; a parameter beyond a limit is the client's to change, like any other
-    unsigned status = err->code == SPL_E_LIMIT && err->field[0] ? MHD_HTTP_BAD_REQUEST : (unsigned)info->http_status;
-    spl_reply_problem(request, status, info->name, err->field, err->message);
+    spl_reply_problem(request, status_of(err), info->name, err->field, err->message);
     if (request->response && info->retry)
         header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", spl_pipeline_get_retry_after(request->service->pipeline));
 }
@@ -138,6 +155,41 @@ void spl_reply_rendering(struct request *request, struct spl_rendering *renderin
         header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
     else if (request->validated)
         add_validator(request, &rendering->key);
+}
+
+/* The bytes of a batch on their way to a client. */
+struct outgoing {
+    struct spl_service *service;
+    struct spl_encoded bundle;
+};
+
+static void release_outgoing(void *context)
+{
+    struct outgoing *outgoing = context;
+    outgoing->service->reply_bytes -= outgoing->bundle.length;
+    spl_encoded_finish(&outgoing->bundle);
+    free(outgoing);
+}
+
+void spl_reply_bundle(struct request *request, struct spl_encoded *bundle, size_t failed)
+{
+    struct outgoing *outgoing = spl_alloc(1, sizeof *outgoing, NULL);
+    if (!outgoing)
+        return;
+    request->status = MHD_HTTP_OK;
+    request->response = MHD_create_response_from_buffer_with_free_callback_cls(bundle->length, bundle->bytes,
+                                                                               release_outgoing, outgoing);
+    if (!request->response) {
+        free(outgoing);
+        return;
+    }
+    *outgoing = (struct outgoing){request->service, *bundle};
+    *bundle = (struct spl_encoded){0};
+    request->service->reply_bytes += outgoing->bundle.length;
+    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", outgoing->bundle.media_type);
+    header(request, "Server-Timing", "total;dur=%.3f", (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
+    header(request, "Splatd-Failed", "%zu", failed);
+    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
 }
 
 void spl_reply_not_modified(struct request *request, const struct spl_key *key)

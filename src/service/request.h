@@ -46,6 +46,20 @@ int spl_pick_request_from_query(const char *query, size_t length, const struct s
                                 const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err);
 
+/* POST …/views: many views, in the order that they were listed. */
+enum { SPL_VIEWS_MAX = 256 };
+struct spl_views_request {
+    enum spl_container container; /* not NONE */
+    size_t count;                 /* 1 to SPL_VIEWS_MAX */
+    struct spl_view_request *views;
+};
+
+/* `limits` hold for each view, its pixels for all of them together as well. On success the caller finishes *out. */
+int spl_views_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_views_request *out,
+                                struct spl_error *err);
+void spl_views_request_finish(struct spl_views_request *request);
+
 /* How `layer`, a bit of view.layers, is encoded. */
 struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *request, enum spl_layer layer);
 

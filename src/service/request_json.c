@@ -39,7 +39,7 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
     return spl_value_from_text(value, kind, name, json_string_value(json), err);
 }
 
-static int parse_object(struct values *values, json_t *object, enum spl_value_place place, struct spl_error *err)
+int spl_values_from_object(struct values *values, json_t *object, enum spl_value_place place, struct spl_error *err)
 {
     const char *name;
     json_t *json;
@@ -50,7 +50,7 @@ static int parse_object(struct values *values, json_t *object, enum spl_value_pl
             if (!json_is_object(json))
                 return spl_fail_field(err, SPL_E_INPUT, name, "camera must be an object, not %s",
                                       spl_json_type_name(json));
-            if ((rc = parse_object(values, json, SPL_CAMERA, err)))
+            if ((rc = spl_values_from_object(values, json, SPL_CAMERA, err)))
                 return rc;
             continue;
         }
@@ -80,7 +80,7 @@ int spl_view_request_from_json(const char *body, size_t length, const struct spl
             rc = spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
                                 spl_json_type_name(document));
         else
-            rc = parse_object(&values, document, SPL_BODY, err);
+            rc = spl_values_from_object(&values, document, SPL_BODY, err);
         json_decref(document);
         if (rc)
             return rc;

@@ -71,6 +71,7 @@ struct request {
     bool abandoned; /* the client has left: close without a reply */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     uint64_t deadline_ns;
+    struct batch *batch;           // may be NULL: it waits for one view
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */
@@ -188,6 +189,16 @@ struct spl_call {
 void spl_make_view(struct request *request, const struct spl_call *call);
 void spl_pick(struct request *request, const struct spl_call *call);
 
+/* batch.c: /v1/datasets/{id}/views. */
+void spl_make_views(struct request *request, const struct spl_call *call);
+void spl_batch_go_on(struct batch *batch);   /* asks for the next views where it may; never blocks */
+void spl_batch_abandon(struct batch *batch); /* its request no longer waits for it; NULL-safe */
+
+/* view_route.c: what views and batches of them check alike. */
+int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
+                           struct spl_error *err);
+bool spl_view_has_no_room(const struct spl_service *service, struct spl_error *err); /* too much waits for clients */
+
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
 
@@ -213,6 +224,10 @@ void spl_reply_text(struct request *request, const char *type, char *body); /* 2
 /* The same for views. `origin` is Splatd-Cache's value. */
 void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin);
 void spl_reply_not_modified(struct request *request, const struct spl_key *key);
+/* A batch; takes *bundle. `failed` parts of it are problems. */
+void spl_reply_bundle(struct request *request, struct spl_encoded *bundle, size_t failed);
+/* The body of a problem, malloc'd; NULL without memory. */
+char *spl_problem_text(const struct request *request, const struct spl_error *err);
 /* What HEAD says of a view that nobody has rendered. */
 void spl_reply_view_head(struct request *request, const struct spl_view_request *view, const struct spl_key *key);
 

@@ -59,13 +59,21 @@ static bool answer_at_once(struct request *request, const struct spl_view_reques
 }
 
 /* A URL that names a version means that one, whatever is served by now. */
-static int check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
-                         struct spl_error *err)
+int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
+                           struct spl_error *err)
 {
     if (!view->versioned || view->version == info->version)
         return 0;
     return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
                           (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+}
+
+bool spl_view_has_no_room(const struct spl_service *service, struct spl_error *err)
+{
+    if (service->reply_bytes <= reply_bytes_max)
+        return false;
+    spl_fail(err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
+    return true;
 }
 
 static void make(struct request *request, const struct spl_call *call, parse_fn *parse)
@@ -75,7 +83,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_key key = {0};
-    if (parse_view(request, entry, parse, &view, &err) || check_version(&view, entry->info, &err))
+    if (parse_view(request, entry, parse, &view, &err) || spl_view_check_version(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
         key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->pipeline));
@@ -84,10 +92,8 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
         if (answer_at_once(request, &view, &key))
             return;
     }
-    if (service->reply_bytes > reply_bytes_max) {
-        spl_fail(&err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
+    if (spl_view_has_no_room(service, &err))
         goto refuse;
-    }
     request->ticket.done = answer;
     request->ticket.route = request->route;
     request->ticket.deadline_ns = spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS;

@@ -40,6 +40,7 @@ void spl_waiting_resume(struct request *request)
 static void let_go(struct request *request)
 {
     spl_ticket_drop(&request->ticket);
+    spl_batch_abandon(request->batch);
     spl_waiting_resume(request);
 }
 
@@ -103,6 +104,10 @@ void spl_waiting_sweep(struct spl_service *service)
             give_up(request);
             continue;
         }
+        if (request->batch)
+            spl_batch_go_on(request->batch);
+        if (!request->waits)
+            continue;
         batch[count] = request;
         sockets[count++] = (struct pollfd){.fd = request->connection->fd, .events = POLLRDHUP};
         if (count == sweep_sockets) {

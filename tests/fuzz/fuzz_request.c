@@ -1,5 +1,5 @@
-/* The request parser: the first byte chooses query, pick (@) or JSON, the rest is the request. Whatever is accepted
- * must be a view that the renderer takes, within the limits. */
+/* The request parser: the first byte chooses query, pick (@), batch ([) or JSON, the rest is the request. Whatever is
+ * accepted must be a view that the renderer takes, within the limits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -7,6 +7,27 @@
 #include "service/request.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void check_batch(const char *text, size_t length, const struct spl_camera_defaults *defaults,
+                        const struct spl_camera_limits *limits)
+{
+    struct spl_views_request batch;
+    struct spl_error err = {0};
+    int rc = spl_views_request_from_json(text, length, defaults, limits, &batch, &err);
+    uint64_t pixels = 0;
+    if (rc ? err.code != rc || !err.message[0] || batch.views
+           : !batch.count || batch.count > SPL_VIEWS_MAX || batch.container == SPL_CONTAINER_NONE)
+        abort();
+    for (size_t i = 0; !rc && i < batch.count; i++) {
+        const struct spl_view_request *view = &batch.views[i];
+        if (spl_view_check(&view->view, &err) || view->view.layers != 1u << view->layer || view->container)
+            abort();
+        pixels += (uint64_t)view->view.camera.width * view->view.camera.height;
+    }
+    if (pixels > limits->pixels)
+        abort();
+    spl_views_request_finish(&batch);
+}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
@@ -18,6 +39,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!size)
         return 0;
     const char *text = (const char *)data + 1;
+    if (data[0] == '[') {
+        check_batch(text, size - 1, &defaults, &limits);
+        return 0;
+    }
     int rc = data[0] == '?'   ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
              : data[0] == '@' ? spl_pick_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
                               : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);

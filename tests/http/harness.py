@@ -1,5 +1,6 @@
 """A daemon under test, and the client that talks to it. Every reply of status 400 or more is checked to be an RFC 9457
 problem, every reply to be what api/openapi.yaml promises (openapi.py); every daemon must end the way the test says."""
+import email.parser
 import http.client
 import inspect
 import itertools
@@ -133,6 +134,20 @@ _fresh = itertools.count(1)
 def fresh(path):
     """A view like that of `path` that nobody has asked for before: another near plane in front of everything."""
     return f"{path}{'&' if '?' in path else '?'}near={1e-6 * next(_fresh):.6f}"
+
+
+def parts(reply):
+    """(name, headers, bytes) of each part of a multipart/mixed reply."""
+    kind = reply.headers["Content-Type"]
+    assert kind.startswith("multipart/mixed; boundary="), kind
+    boundary = b"--" + kind.split("=", 1)[1].encode()
+    pieces = reply.body.split(boundary)
+    assert pieces[0] == b"" and pieces[-1] == b"--\r\n" and len(pieces) > 2
+    for piece in pieces[1:-1]:
+        head, _, body = piece[2:].partition(b"\r\n\r\n")
+        headers = email.parser.BytesHeaderParser().parsebytes(head + b"\r\n\r\n")
+        assert len(body) == int(headers["Content-Length"]) + 2 and body[-2:] == b"\r\n"
+        yield headers.get_filename(), headers, body[:-2]
 
 
 def eventually(condition, seconds=30):

@@ -1,5 +1,4 @@
 """Several layers of one frame, as multipart/mixed and as ZIP; WebP, quality and chroma."""
-import email.parser
 import io
 import json
 import os
@@ -8,25 +7,11 @@ import subprocess
 import tempfile
 import zipfile
 
-from harness import REAL, VIEW, Daemon, run
+from harness import REAL, VIEW, Daemon, parts, run
 
 WEBP = os.environ["SPLATD_WEBP"] == "1"
 LOOK = dict(eye="3,0.2,1", target="0,0,1", width=64, height=48)
 LAYERS = ["color", "depth", "range", "normal", "id", "coverage"]
-
-
-def parts(reply):
-    """(name, headers, bytes) of each part."""
-    kind = reply.headers["Content-Type"]
-    assert kind.startswith("multipart/mixed; boundary="), kind
-    boundary = b"--" + kind.split("=", 1)[1].encode()
-    pieces = reply.body.split(boundary)
-    assert pieces[0] == b"" and pieces[-1] == b"--\r\n" and len(pieces) > 2
-    for piece in pieces[1:-1]:
-        head, _, body = piece[2:].partition(b"\r\n\r\n")
-        headers = email.parser.BytesHeaderParser().parsebytes(head + b"\r\n\r\n")
-        assert len(body) == int(headers["Content-Length"]) + 2 and body[-2:] == b"\r\n"
-        yield headers.get_filename(), headers, body[:-2]
 
 
 def test_each_part_is_the_layer_by_itself():
