@@ -94,6 +94,8 @@ struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service);
 json_t *spl_tour_to_json(const struct spl_tour *tour); /* new reference, NULL without memory */
 int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err);
 void spl_tour_free(struct spl_tour *tour);
+const char *spl_tour_format_name(const struct spl_tour *tour); /* of a frame: "jpeg", "zip" */
+const char *spl_tour_media_type(const struct spl_tour *tour);
 void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32]);
 
 /* tour_store.c: files of a tour; any thread, blocks on disk. Each is whole or not there. */

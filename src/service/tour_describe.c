@@ -31,6 +31,15 @@ static void set(json_t *object, const char *name, json_t *value)
     json_object_set_new(object, name, value);
 }
 
+static json_t *layers(uint32_t bits)
+{
+    json_t *names = json_array();
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (bits >> layer & 1)
+            json_array_append_new(names, json_string(spl_layer_name((enum spl_layer)layer)));
+    return names;
+}
+
 static void set_link(json_t *json, const struct spl_tour *tour, const char *name, const char *leaf)
 {
     set(json, name, json_sprintf("/v1/tours/%s/%s", tour->name, leaf));
@@ -54,8 +63,8 @@ json_t *spl_tour_describe(const struct spl_tour *tour)
     set(json, "fps", json_real(spec->fps));
     set(json, "width", json_integer(camera->width));
     set(json, "height", json_integer(camera->height));
-    set(json, "layer", json_string(spl_layer_name(spec->view.layer)));
-    set(json, "format", json_string(spl_format_name(spec->view.encode.format)));
+    set(json, "layers", layers(spec->view.view.layers));
+    set(json, "format", json_string(spl_tour_format_name(tour)));
     set(json, "bytes", json_integer((json_int_t)(tour->bytes - tour->state_bytes)));
     set(json, "created", date(tour->created_s));
     set(json, "ended", date(tour->ended_s));

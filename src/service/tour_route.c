@@ -128,7 +128,7 @@ void spl_show_tour_events(struct request *request, const struct spl_call *call)
 static bool holds_pictures(const struct spl_tour *tour)
 {
     enum spl_format format = tour->spec.view.encode.format;
-    return format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW;
+    return !tour->spec.view.container && format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW;
 }
 
 void spl_show_tour_stream(struct request *request, const struct spl_call *call)
@@ -137,7 +137,7 @@ void spl_show_tour_stream(struct request *request, const struct spl_call *call)
     if (tour && holds_pictures(tour))
         spl_tour_stream_pictures(request, tour);
     else if (tour)
-        refuse_early(request, "a stream is of pictures, jpeg or png; this tour's frames are arrays");
+        refuse_early(request, "a stream is of pictures; this tour's frames are arrays or ZIP files");
 }
 
 /* Frames are never made twice, and names never used twice: a file's bytes stay what they are. */
@@ -165,7 +165,7 @@ void spl_show_tour_frame(struct request *request, const struct spl_call *call)
                      spl_tour_has_ended(tour) ? "the tour ended before this frame" : "this frame is not made yet");
     } else {
         spl_tour_file_name(tour, frame, file);
-        reply_file(request, tour, file, spl_format_media_type(tour->spec.view.encode.format));
+        reply_file(request, tour, file, spl_tour_media_type(tour));
     }
 }
 

@@ -108,9 +108,10 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
     snprintf(field, sizeof field, "settings%s%s", why.field[0] ? "." : "", why.field);
     if (rc)
         return spl_fail_field(err, rc, field, "%s", why.message);
+    if (view->container == SPL_CONTAINER_MULTIPART && json_object_get(settings, "container"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.container", "several layers of a tour's frame come as zip");
     if (view->container)
-        return spl_fail_field(err, SPL_E_INPUT, "settings.layers",
-                              "a frame of a tour is one image; ask for it with 'layer'");
+        view->container = SPL_CONTAINER_ZIP;
     if (view->versioned)
         return spl_fail_field(err, SPL_E_INPUT, "settings.v", "a tour stays with the version that it began with");
     if (view->planned)
@@ -162,7 +163,7 @@ static int check_video(const json_t *body, struct spl_tour_spec *out, struct spl
         return 0;
     bool picture = view->encode.format == SPL_FORMAT_JPEG ||
                    (view->encode.format == SPL_FORMAT_PNG && view->layer == SPL_LAYER_COLOR);
-    if (!picture)
+    if (!picture || view->container)
         return spl_fail_field(err, SPL_E_INPUT, "video", "a video is made of JPEGs, or of PNGs of colour");
     return spl_video_check(out->cameras->width, out->cameras->height, err);
 }

@@ -12,15 +12,29 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "geom/camera_path.h"
+#include "service/bundle.h"
 #include "service/tour.h"
 
 enum { state_bytes_max = 16 << 20, format_version = 1 };
 
 const char *const spl_tour_state_names[] = {"rendering", "video", "done", "failed", NULL};
 
+/* Several layers of a frame come as one ZIP file. */
+const char *spl_tour_format_name(const struct spl_tour *tour)
+{
+    const struct spl_view_request *view = &tour->spec.view;
+    return view->container ? "zip" : spl_format_name(view->encode.format);
+}
+
+const char *spl_tour_media_type(const struct spl_tour *tour)
+{
+    const struct spl_view_request *view = &tour->spec.view;
+    return view->container ? spl_container_media_type(view->container) : spl_format_media_type(view->encode.format);
+}
+
 void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32])
 {
-    snprintf(out, 32, "%06zu.%.8s", frame, spl_format_name(tour->spec.view.encode.format));
+    snprintf(out, 32, "%06zu.%.8s", frame, spl_tour_format_name(tour));
 }
 
 void spl_tour_free(struct spl_tour *tour)
@@ -40,13 +54,12 @@ json_t *spl_tour_to_json(const struct spl_tour *tour)
     json_t *failure = tour->failure.code
                           ? json_pack("{s:i, s:s}", "code", tour->failure.code, "message", tour->failure.message)
                           : json_null();
-    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:s, s:s, s:b, s:o, s:O}", "format_version",
+    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:O}", "format_version",
                      format_version, "dataset", tour->dataset, "version", tour->version, "state",
                      spl_tour_state_names[tour->state], "created", (json_int_t)tour->created_s, "ended",
                      (json_int_t)tour->ended_s, "frames", (json_int_t)spec->frames, "width", (int)camera->width,
-                     "height", (int)camera->height, "fps", spec->fps, "layer", spl_layer_name(spec->view.layer),
-                     "format", spl_format_name(spec->view.encode.format), "video", spec->video, "failure", failure,
-                     "body", tour->body);
+                     "height", (int)camera->height, "fps", spec->fps, "layers", (int)spec->view.view.layers, "format",
+                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", tour->body);
 }
 
 static int read_state(const char *text)
@@ -59,24 +72,25 @@ static int read_state(const char *text)
 
 static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
 {
-    const char *dataset, *version, *state, *layer, *format;
+    const char *dataset, *version, *state, *format;
     json_int_t created, ended, frames;
-    int known, width, height, video;
+    int known, width, height, video, layers;
     json_t *failure;
     const char *message;
     struct spl_tour_spec *spec = &tour->spec;
-    if (json_unpack(json, "{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:F, s:s, s:s, s:b, s:o, s:o}",
+    if (json_unpack(json, "{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:F, s:i, s:s, s:b, s:o, s:o}",
                     "format_version", &known, "dataset", &dataset, "version", &version, "state", &state, "created",
                     &created, "ended", &ended, "frames", &frames, "width", &width, "height", &height, "fps", &spec->fps,
-                    "layer", &layer, "format", &format, "video", &video, "failure", &failure, "body", &tour->body) ||
+                    "layers", &layers, "format", &format, "video", &video, "failure", &failure, "body", &tour->body) ||
         known != format_version)
         return spl_fail(err, SPL_E_CORRUPT, "tour.json is not what this version writes");
     json_incref(tour->body);
-    int layer_number = spl_layer_from_name(layer), format_number = spl_format_from_name(format);
+    bool zip = !strcmp(format, "zip");
+    int format_number = zip ? 0 : spl_format_from_name(format);
     int state_number = read_state(state);
-    if (state_number < 0 || layer_number < 0 || format_number < 0 || frames < 1 || frames > SPL_CAMERA_PATH_MAX ||
-        width < 1 || height < 1 || !(spec->fps > 0) || strlen(dataset) >= sizeof tour->dataset ||
-        strlen(version) >= sizeof tour->version)
+    if (state_number < 0 || layers < 1 || layers >> SPL_LAYER_COUNT || format_number < 0 || frames < 1 ||
+        frames > SPL_CAMERA_PATH_MAX || width < 1 || height < 1 || !(spec->fps > 0) ||
+        strlen(dataset) >= sizeof tour->dataset || strlen(version) >= sizeof tour->version)
         return spl_fail(err, SPL_E_CORRUPT, "tour.json holds values that no tour has");
     strcpy(tour->dataset, dataset);
     strcpy(tour->version, version);
@@ -85,7 +99,8 @@ static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
     tour->ended_s = ended;
     spec->frames = (size_t)frames;
     spec->video = video;
-    spec->view.layer = (enum spl_layer)layer_number;
+    spec->view.view.layers = (uint32_t)layers;
+    spec->view.container = zip ? SPL_CONTAINER_ZIP : SPL_CONTAINER_NONE;
     spec->view.encode.format = (enum spl_format)format_number;
     spec->view.view.camera.width = (uint32_t)width;
     spec->view.view.camera.height = (uint32_t)height;

@@ -86,7 +86,7 @@ static bool make_picture(struct spl_tour_stream *s)
     }
     size_t used =
         (size_t)snprintf(head, sizeof head, "--" BOUNDARY "\r\nContent-Type: %s\r\nContent-Length: %zu\r\n\r\n",
-                         spl_format_media_type(tour->spec.view.encode.format), length);
+                         spl_tour_media_type(tour), length);
     if ((s->chunk = spl_alloc_raw(used + length + 2, 1, NULL))) {
         memcpy(s->chunk, head, used);
         memcpy(s->chunk + used, bytes, length);

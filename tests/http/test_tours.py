@@ -125,6 +125,7 @@ def check_files(d, tour, frames):
     archive = zipfile.ZipFile(io.BytesIO(d.ask(tour["zip"]).body))
     assert archive.testzip() is None and archive.namelist() == [f"{n:06}.jpeg" for n in range(4)]
     assert [archive.read(name) for name in archive.namelist()] == frames
+    assert d.ask(tour["zip"], "HEAD").status == 200  # made, and nobody takes it
 
 
 def check_video(d, tour, frames):
@@ -204,6 +205,11 @@ def test_every_format_and_member_is_taken():
             tour = begin(d, body(2, settings={**SMALL, "layer": layer, "format": kind}))
             ended(d, tour["uri"])
             assert all(frame.startswith(start) for frame in frames_of(d, tour))
+        tour = begin(d, body(2, settings={**SMALL, "layers": ["color", "depth"]}))
+        assert tour["layers"] == ["color", "depth"] and tour["format"] == "zip"
+        ended(d, tour["uri"])
+        for frame in frames_of(d, tour):
+            assert zipfile.ZipFile(io.BytesIO(frame)).namelist() == ["color.jpg", "depth.png", "index.json"]
         assert d.ask(tour["stream"]).status == 409 and d.ask(tour["uri"] + "/video.mp4").status == 404
 
 
@@ -225,7 +231,9 @@ def test_bad_tours_are_refused_by_field():
         ({**body(), "settings": {"camera": {}}}, "settings.camera"), ({**body(), "settings": {"x": 1}}, "settings.x"),
         ({**body(), "settings": {"budget": "5ms"}}, "settings.budget"),
         ({**body(), "settings": {"psnr": 30}}, "settings.psnr"), ({**body(), "settings": {"v": "0" * 16}}, "settings.v"),
-        ({**body(), "settings": {"layers": ["color"]}}, "settings.layers"), ({**body(), "video": 1}, "video"),
+        ({**body(), "settings": {"layers": ["color"], "container": "multipart"}}, "settings.container"),
+        ({**body(), "settings": {"layers": ["color"], "layer": "color"}}, "settings.layers"),
+        ({**body(), "video": True, "settings": {**SMALL, "layers": ["color"]}}, "video"), ({**body(), "video": 1}, "video"),
         ({**body(), "video": True, "settings": {**SMALL, "layer": "depth", "format": "png"}}, "video"),
     ]
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
