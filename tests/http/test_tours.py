@@ -251,7 +251,7 @@ def test_bad_tours_are_refused_by_field():
 
 def test_quotas():
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-frames", "8", "--tour-pixels", "20000",
-                                    "--tour-disk", "60K", "--tour-age", "1") as d:
+                                    "--tour-disk", "60K") as d:
         assert begin(d, body(9), 400)["field"] == "frames"
         assert begin(d, body(7), 400)["field"] == "frames"  # 21,504 pixels
         kept = begin(d, body(6))
@@ -263,9 +263,13 @@ def test_quotas():
         assert d.ask(failed["frame"].replace("{n}", "5")).status == 409
         assert len(zipfile.ZipFile(io.BytesIO(d.ask(failed["zip"]).body)).namelist()) == failed["frames_done"]
         assert d.ask(failed["stream"]).status == 409  # raw
+        for uri in (kept["uri"], failed["uri"]):
+            assert d.ask(uri, "DELETE").status == 204
+        ended(d, begin(d, body(2))["uri"])
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-age", "1") as d:
+        begin(d, body(2))
         eventually(lambda: d.ask("/v1/tours").json()["tours"] == [], 60)  # old
         eventually(lambda: not list(folder.iterdir()))
-        ended(d, begin(d, body(2))["uri"])
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "0") as d:
         assert "0 bytes" in begin(d, body(), 503)["detail"]
 
