@@ -52,14 +52,28 @@ def ended(d, uri, state="done"):
     return tour
 
 
-def read_stream(d, uri):
-    """Reads a stream to its end as a client that takes its time would; the headers and the whole body."""
+def read_stream(d, uri, begun=None):
+    """Reads a stream to its end; `begun` is set once its first byte is there."""
     connection = d.connect(120)
     connection.request("GET", uri)
     answer = connection.getresponse()
-    reply = Reply(answer.status, answer.headers, answer.read())
+    first = answer.read(1)
+    if begun:
+        begun.set()
+    reply = Reply(answer.status, answer.headers, first + answer.read())
     connection.close()
     return reply
+
+
+def watch(d, uris):
+    """Reads streams beside the test, once each has sent something: the threads, and what they read by URI."""
+    replies, threads = {}, []
+    for uri in uris:
+        begun = threading.Event()
+        threads.append(threading.Thread(target=lambda uri=uri, begun=begun: replies.update({uri: read_stream(d, uri, begun)})))
+        threads[-1].start()
+        assert begun.wait(60)
+    return threads, replies
 
 
 def events_of(text):
@@ -279,11 +293,7 @@ def test_cancelling_ends_streams_and_removes_files():
         tour = begin(d, body(5000))
         other = begin(d, body(1))
         assert d.ask(tour["zip"]).status == 409 and d.ask(tour["frame"].replace("{n}", "4999")).status == 409
-        replies = {}
-        threads = [threading.Thread(target=lambda name=name: replies.update({name: read_stream(d, tour[name])}))
-                   for name in ("events", "stream")]
-        for thread in threads:
-            thread.start()
+        threads, replies = watch(d, [tour["events"], tour["stream"]])
         eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > 5)
         status = d.ask(tour["uri"]).json()
         assert status["state"] == "rendering" and status["remaining_s"] > 0 and 0 < status["progress"] < 1
@@ -291,8 +301,8 @@ def test_cancelling_ends_streams_and_removes_files():
         assert d.ask(tour["uri"], "DELETE").status == 204 and d.ask(tour["uri"], "DELETE").status == 404
         for thread in threads:
             thread.join(60)
-        assert events_of(replies["events"].body)[-1][0] == "removed"
-        assert parts_of(replies["stream"])
+        assert events_of(replies[tour["events"]].body)[-1][0] == "removed"
+        assert parts_of(replies[tour["stream"]])
         ended(d, other["uri"])
         eventually(lambda: {p.name for p in folder.iterdir()} == {other["name"]})
         assert d.status()["counters"]["tour_frames"] < 5000
@@ -307,7 +317,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
         with Daemon(FAKE, "--tours", str(plain)) as d:
             wanted = frames_of(d, ended(d, begin(d, depth_tour(60))["uri"]))
         assert len(set(wanted)) > 30  # the fake renderer's depth follows the eye
-        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=10) as d:
+        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=40) as d:
             tour = begin(d, depth_tour(60))
             eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] >= 15)
             d.process.send_signal(signal.SIGKILL)
@@ -317,8 +327,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
         (folder / "0123456789abcdef").mkdir()  # no tour of ours: left alone, and said so
         (folder / ".fedcba9876543210").mkdir()  # half removed
         with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:  # ended by SIGTERM, a stream open
-            stream = threading.Thread(target=read_stream, args=(d, tour["events"]))
-            stream.start()
+            [stream], _ = watch(d, [tour["events"]])
             eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > len(files))
             assert any("0123456789abcdef is left alone" in line for line in d.lines)
             assert d.stop() == 0
