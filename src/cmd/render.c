@@ -12,18 +12,14 @@
 #include <splatd/dataset.h>
 #include <splatd/render.h>
 
+#include "cmd/drawing.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
 
 struct arguments {
-    const char *dataset, *output;
+    const char *dataset;
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
-    uint32_t width, height;
-    int format, layer;                                               /* enum or -1 = not given */
-    bool no_verify;
-    struct spl_view view;                                            /* all but the camera */
-    struct spl_encode_options encode;
-    struct spl_renderer_options renderer;
+    struct spl_cmd_drawing drawing;
 };
 
 static void usage(FILE *out)
@@ -66,20 +62,7 @@ static void usage(FILE *out)
             "  --no-verify              trust the file's checksums\n");
 }
 
-static int parse_name(const char *option, const char *text, int (*from_name)(const char *), int *out,
-                      struct spl_error *err)
-{
-    *out = from_name(text);
-    return *out < 0 ? spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd render --help' lists what it knows",
-                               option, text)
-                    : SPL_OK;
-}
-
-enum option_id {
-    OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_SIZE, OPT_NEAR, OPT_FAR, OPT_METHOD,
-    OPT_LAYER, OPT_LOD, OPT_SUPERSAMPLE, OPT_BACKGROUND, OPT_MARGIN, OPT_FORMAT, OPT_QUALITY, OPT_DEPTH_SCALE,
-    OPT_DEVICE, OPT_REQUIRE_GPU, OPT_MEMORY_LIMIT, OPT_NO_VERIFY,
-};
+enum option_id { OPT_EYE = SPL_CMD_OWN, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_NEAR, OPT_FAR };
 
 static const struct option options[] = {
     {"eye", required_argument, NULL, OPT_EYE},
@@ -90,31 +73,14 @@ static const struct option options[] = {
     {"fy", required_argument, NULL, OPT_FY},
     {"cx", required_argument, NULL, OPT_CX},
     {"cy", required_argument, NULL, OPT_CY},
-    {"size", required_argument, NULL, OPT_SIZE},
     {"near", required_argument, NULL, OPT_NEAR},
     {"far", required_argument, NULL, OPT_FAR},
-    {"method", required_argument, NULL, OPT_METHOD},
-    {"layer", required_argument, NULL, OPT_LAYER},
-    {"lod", required_argument, NULL, OPT_LOD},
-    {"supersample", required_argument, NULL, OPT_SUPERSAMPLE},
-    {"background", required_argument, NULL, OPT_BACKGROUND},
-    {"margin", required_argument, NULL, OPT_MARGIN},
-    {"format", required_argument, NULL, OPT_FORMAT},
-    {"quality", required_argument, NULL, OPT_QUALITY},
-    {"depth-scale", required_argument, NULL, OPT_DEPTH_SCALE},
-    {"device", required_argument, NULL, OPT_DEVICE},
-    {"require-gpu", no_argument, NULL, OPT_REQUIRE_GPU},
-    {"memory-limit", required_argument, NULL, OPT_MEMORY_LIMIT},
-    {"no-verify", no_argument, NULL, OPT_NO_VERIFY},
-    {"output", required_argument, NULL, 'o'},
-    {"help", no_argument, NULL, 'h'},
+    SPL_CMD_DRAWING_OPTIONS,
     {0},
 };
 
 static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
 {
-    int rc = SPL_OK, choice = 0;
-    uint64_t count = 0;
     switch (id) {
     case OPT_EYE:
         return spl_cmd_parse_vector("--eye", text, a->eye, err);
@@ -132,79 +98,43 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
         return spl_cmd_parse_real("--cx", text, -1e9, 1e9, &a->cx, err);
     case OPT_CY:
         return spl_cmd_parse_real("--cy", text, -1e9, 1e9, &a->cy, err);
-    case OPT_SIZE:
-        return spl_cmd_parse_size("--size", text, &a->width, &a->height, err);
     case OPT_NEAR:
         return spl_cmd_parse_real("--near", text, 1e-9, 1e12, &a->near, err);
     case OPT_FAR:
         return spl_cmd_parse_real("--far", text, 1e-9, 1e12, &a->far, err);
-    case OPT_METHOD:
-        rc = parse_name("--method", text, spl_method_from_name, &choice, err);
-        a->view.method = (enum spl_method)choice;
-        return rc;
-    case OPT_LAYER:
-        return parse_name("--layer", text, spl_layer_from_name, &a->layer, err);
-    case OPT_LOD:
-        return spl_cmd_parse_real("--lod", text, 0, 64, &a->view.lod, err);
-    case OPT_SUPERSAMPLE:
-        return spl_cmd_parse_real("--supersample", text, 0.25, 4, &a->view.supersample, err);
-    case OPT_BACKGROUND:
-        return spl_cmd_parse_color("--background", text, a->view.background, err);
-    case OPT_MARGIN:
-        return spl_cmd_parse_real("--margin", text, 0, 16, &a->view.margin, err);
-    case OPT_FORMAT:
-        return parse_name("--format", text, spl_format_from_name, &a->format, err);
-    case OPT_QUALITY:
-        rc = spl_cmd_parse_count("--quality", text, 1, 100, &count, err);
-        a->encode.quality = (int)count;
-        return rc;
-    case OPT_DEPTH_SCALE:
-        return spl_cmd_parse_real("--depth-scale", text, 1e-6, 1e9, &a->encode.depth_scale, err);
-    case OPT_DEVICE:
-        a->renderer.device = text;
-        return SPL_OK;
-    case OPT_REQUIRE_GPU:
-        a->renderer.require_gpu = true;
-        return SPL_OK;
-    case OPT_MEMORY_LIMIT:
-        return spl_cmd_parse_count("--memory-limit", text, 1, UINT64_MAX, &a->renderer.memory_limit, err);
-    case OPT_NO_VERIFY:
-        a->no_verify = true;
-        return SPL_OK;
-    default: /* 'o' */
-        a->output = text;
-        return SPL_OK;
+    default:
+        return spl_cmd_drawing_parse(&a->drawing, "render", id, text, err);
     }
 }
 
 /* --format, else what stands behind the last dot. */
 static int resolve_format(struct arguments *a, struct spl_error *err)
 {
-    if (!a->output)
+    if (!a->drawing.output)
         return spl_fail(err, SPL_E_USAGE, "render needs a file to write to: -o OUT.jpg, .png or .npy");
-    if (a->format < 0) {
-        const char *dot = strrchr(a->output, '.');
-        a->format = dot ? spl_format_from_name(dot + 1) : -1;
+    if (a->drawing.format < 0) {
+        const char *dot = strrchr(a->drawing.output, '.');
+        a->drawing.format = dot ? spl_format_from_name(dot + 1) : -1;
     }
-    if (a->format < 0)
+    if (a->drawing.format < 0)
         return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
-                        a->output);
-    a->encode.format = (enum spl_format)a->format;
+                        a->drawing.output);
+    a->drawing.encode.format = (enum spl_format)a->drawing.format;
     return SPL_OK;
 }
 
 static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    struct spl_camera *camera = &a->view.camera;
-    int rc = spl_dataset_get_default_camera(dataset, a->width, a->height, camera, err);
+    struct spl_camera *camera = &a->drawing.view.camera;
+    int rc = spl_dataset_get_default_camera(dataset, a->drawing.width, a->drawing.height, camera, err);
     if (rc)
         return rc;
     if (!isnan(a->fov) && !isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");
     if (!isnan(a->fy) && isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fy is given without --fx");
-    if (!isnan(a->fov) && (rc = spl_camera_set_fov(camera, a->fov, a->width, a->height, err)))
+    if (!isnan(a->fov) && (rc = spl_camera_set_fov(camera, a->fov, a->drawing.width, a->drawing.height, err)))
         return rc;
     if (!isnan(a->fx))
         camera->fx = camera->fy = a->fx;
@@ -222,7 +152,7 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
         camera->far = a->far;
     else if (camera->far <= camera->near) /* only near was moved, behind the default far */
         camera->far = INFINITY;
-    return spl_view_check(&a->view, err);
+    return spl_view_check(&a->drawing.view, err);
 }
 
 static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats,
@@ -234,7 +164,7 @@ static void report(const struct spl_device_info *device, const struct spl_frame_
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
-    if (encoded->far > 0 && a->layer != SPL_LAYER_COVERAGE)
+    if (encoded->far > 0 && a->drawing.layer != SPL_LAYER_COVERAGE)
         fprintf(stderr, "splatd: colours from %g (light) to %g (dark)\n", (double)encoded->near, (double)encoded->far);
 }
 
@@ -244,19 +174,19 @@ static int render(struct arguments *a, struct spl_error *err)
     struct spl_renderer *renderer = NULL;
     struct spl_frame frame = {0};
     struct spl_encoded encoded = {0};
-    int rc = spl_dataset_open(a->dataset, !a->no_verify, &dataset, err);
+    int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_camera(a, dataset, err);
     if (!rc)
-        rc = spl_renderer_create(&a->renderer, &renderer, err);
+        rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
     if (!rc)
         rc = spl_renderer_add(renderer, dataset, err);
     if (!rc)
-        rc = spl_renderer_render(renderer, dataset, &a->view, &frame, err);
+        rc = spl_renderer_render(renderer, dataset, &a->drawing.view, &frame, err);
     if (!rc)
-        rc = spl_image_encode(&frame.images[a->layer], &a->encode, &encoded, err);
+        rc = spl_image_encode(&frame.images[a->drawing.layer], &a->drawing.encode, &encoded, err);
     if (!rc)
-        rc = spl_cmd_write_output(a->output, encoded.bytes, encoded.length, err);
+        rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
     if (!rc)
         report(spl_renderer_get_device(renderer), &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
@@ -272,9 +202,9 @@ int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
         .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
-        .near = NAN, .far = NAN, .width = 1280, .height = 720, .format = -1, .layer = SPL_LAYER_COLOR,
+        .near = NAN, .far = NAN,
     };
-    spl_view_init(&a.view);
+    spl_cmd_drawing_init(&a.drawing, 1280, 720);
     struct spl_error err = {0};
     for (int id; (id = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
         if (id == 'h') {
@@ -293,7 +223,6 @@ int spl_cmd_render(int argc, char **argv)
         return 2;
     }
     a.dataset = argv[optind];
-    a.view.layers = 1u << a.layer;
     if (resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;

@@ -21,21 +21,19 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "cloud/path.h"
+#include "cmd/drawing.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "image/video.h"
 
 struct arguments {
-    const char *dataset, *path, *output;
+    const char *dataset, *path;
     uint64_t frames;
     double fps, seconds;
-    int positions, rotations, ease, format, layer; /* enum or -1 = not given */
-    bool closed, no_verify, video;
-    uint32_t width, height;
-    struct spl_view view; /* all but the camera */
-    struct spl_encode_options encode;
-    struct spl_renderer_options renderer;
+    int positions, rotations, ease; /* enum */
+    bool closed, video;
+    struct spl_cmd_drawing drawing;
     struct spl_camera *cameras; // owned
     size_t count;
 };
@@ -74,28 +72,14 @@ static void usage(FILE *out)
 }
 
 enum option_id {
-    OPT_PATH = 256,
+    OPT_PATH = SPL_CMD_OWN,
     OPT_FRAMES,
     OPT_SECONDS,
     OPT_FPS,
     OPT_POSITIONS,
     OPT_ROTATIONS,
     OPT_EASE,
-    OPT_CLOSED,
-    OPT_SIZE,
-    OPT_METHOD,
-    OPT_LOD,
-    OPT_SUPERSAMPLE,
-    OPT_BACKGROUND,
-    OPT_MARGIN,
-    OPT_LAYER,
-    OPT_FORMAT,
-    OPT_QUALITY,
-    OPT_DEPTH_SCALE,
-    OPT_DEVICE,
-    OPT_REQUIRE_GPU,
-    OPT_MEMORY_LIMIT,
-    OPT_NO_VERIFY,
+    OPT_CLOSED
 };
 
 static const struct option options[] = {
@@ -107,22 +91,7 @@ static const struct option options[] = {
     {"rotations", required_argument, NULL, OPT_ROTATIONS},
     {"ease", required_argument, NULL, OPT_EASE},
     {"closed", no_argument, NULL, OPT_CLOSED},
-    {"size", required_argument, NULL, OPT_SIZE},
-    {"method", required_argument, NULL, OPT_METHOD},
-    {"lod", required_argument, NULL, OPT_LOD},
-    {"supersample", required_argument, NULL, OPT_SUPERSAMPLE},
-    {"background", required_argument, NULL, OPT_BACKGROUND},
-    {"margin", required_argument, NULL, OPT_MARGIN},
-    {"layer", required_argument, NULL, OPT_LAYER},
-    {"format", required_argument, NULL, OPT_FORMAT},
-    {"quality", required_argument, NULL, OPT_QUALITY},
-    {"depth-scale", required_argument, NULL, OPT_DEPTH_SCALE},
-    {"device", required_argument, NULL, OPT_DEVICE},
-    {"require-gpu", no_argument, NULL, OPT_REQUIRE_GPU},
-    {"memory-limit", required_argument, NULL, OPT_MEMORY_LIMIT},
-    {"no-verify", no_argument, NULL, OPT_NO_VERIFY},
-    {"output", required_argument, NULL, 'o'},
-    {"help", no_argument, NULL, 'h'},
+    SPL_CMD_DRAWING_OPTIONS,
     {0},
 };
 
@@ -134,19 +103,8 @@ static int parse_kind(const char *option, const char *text, const char *const *n
     return spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd tour --help' lists what it knows", option, text);
 }
 
-static int parse_name(const char *option, const char *text, int (*from_name)(const char *), int *out,
-                      struct spl_error *err)
-{
-    *out = from_name(text);
-    return *out < 0 ? spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd tour --help' lists what it knows",
-                               option, text)
-                    : SPL_OK;
-}
-
 static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
 {
-    int rc = SPL_OK, choice = 0;
-    uint64_t count = 0;
     switch (id) {
     case OPT_PATH:
         a->path = text;
@@ -166,56 +124,20 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
     case OPT_CLOSED:
         a->closed = true;
         return SPL_OK;
-    case OPT_SIZE:
-        return spl_cmd_parse_size("--size", text, &a->width, &a->height, err);
-    case OPT_METHOD:
-        rc = parse_name("--method", text, spl_method_from_name, &choice, err);
-        a->view.method = (enum spl_method)choice;
-        return rc;
-    case OPT_LOD:
-        return spl_cmd_parse_real("--lod", text, 0, 64, &a->view.lod, err);
-    case OPT_SUPERSAMPLE:
-        return spl_cmd_parse_real("--supersample", text, 0.25, 4, &a->view.supersample, err);
-    case OPT_BACKGROUND:
-        return spl_cmd_parse_color("--background", text, a->view.background, err);
-    case OPT_MARGIN:
-        return spl_cmd_parse_real("--margin", text, 0, 16, &a->view.margin, err);
-    case OPT_LAYER:
-        return parse_name("--layer", text, spl_layer_from_name, &a->layer, err);
-    case OPT_FORMAT:
-        return parse_name("--format", text, spl_format_from_name, &a->format, err);
-    case OPT_QUALITY:
-        rc = spl_cmd_parse_count("--quality", text, 1, 100, &count, err);
-        a->encode.quality = (int)count;
-        return rc;
-    case OPT_DEPTH_SCALE:
-        return spl_cmd_parse_real("--depth-scale", text, 1e-6, 1e9, &a->encode.depth_scale, err);
-    case OPT_DEVICE:
-        a->renderer.device = text;
-        return SPL_OK;
-    case OPT_REQUIRE_GPU:
-        a->renderer.require_gpu = true;
-        return SPL_OK;
-    case OPT_MEMORY_LIMIT:
-        return spl_cmd_parse_count("--memory-limit", text, 1, UINT64_MAX, &a->renderer.memory_limit, err);
-    case OPT_NO_VERIFY:
-        a->no_verify = true;
-        return SPL_OK;
-    default: /* 'o' */
-        a->output = text;
-        return SPL_OK;
+    default:
+        return spl_cmd_drawing_parse(&a->drawing, "tour", id, text, err);
     }
 }
 
 static int resolve_output(struct arguments *a, struct spl_error *err)
 {
-    const char *dot = a->output ? strrchr(a->output, '.') : NULL;
-    if (!a->path || !a->output)
+    const char *dot = a->drawing.output ? strrchr(a->drawing.output, '.') : NULL;
+    if (!a->path || !a->drawing.output)
         return spl_fail(err, SPL_E_USAGE, "tour needs --path FILE and -o OUT.mp4 or a folder");
     a->video = dot && !strcmp(dot, ".mp4");
-    if (a->video && (a->format >= 0 || a->layer != SPL_LAYER_COLOR))
+    if (a->video && (a->drawing.format >= 0 || a->drawing.layer != SPL_LAYER_COLOR))
         return spl_fail(err, SPL_E_USAGE, "a video is of color and takes no --format; give a folder for images");
-    a->encode.format = a->format < 0 ? SPL_FORMAT_JPEG : (enum spl_format)a->format;
+    a->drawing.encode.format = a->drawing.format < 0 ? SPL_FORMAT_JPEG : (enum spl_format)a->drawing.format;
     return SPL_OK;
 }
 
@@ -225,7 +147,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const struct spl_camera_limits limits = {.side_px = 65535, .pixels = 64 << 20};
     struct spl_camera_defaults defaults = {.fov = info->default_fov};
-    struct spl_path_options path_options = {a->width, a->height, &defaults, &limits};
+    struct spl_path_options path_options = {a->drawing.width, a->drawing.height, &defaults, &limits};
     struct spl_path_motion motion = {a->positions, a->rotations, a->ease};
     struct spl_camera_path path = {0};
     struct spl_camera camera = {0};
@@ -245,8 +167,8 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) && a->video)
         rc = spl_video_check(a->cameras->width, a->cameras->height, err);
     if (!rc) {
-        a->view.camera = a->cameras[0];
-        rc = spl_view_check(&a->view, err);
+        a->drawing.view.camera = a->cameras[0];
+        rc = spl_view_check(&a->drawing.view, err);
     }
 done:
     spl_camera_path_finish(&path);
@@ -257,10 +179,10 @@ static int write_image(const struct arguments *a, size_t frame, const struct spl
 {
     struct spl_encoded encoded = {0};
     char path[4096];
-    if (snprintf(path, sizeof path, "%s/%06zu.%s", a->output, frame, spl_format_name(a->encode.format)) >=
-        (int)sizeof path)
-        return spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", a->output);
-    int rc = spl_image_encode(image, &a->encode, &encoded, err);
+    if (snprintf(path, sizeof path, "%s/%06zu.%s", a->drawing.output, frame,
+                 spl_format_name(a->drawing.encode.format)) >= (int)sizeof path)
+        return spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", a->drawing.output);
+    int rc = spl_image_encode(image, &a->drawing.encode, &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(path, encoded.bytes, encoded.length, err);
     spl_encoded_finish(&encoded);
@@ -276,11 +198,11 @@ static int render_frames(struct arguments *a, const struct spl_dataset *dataset,
     int rc = SPL_OK;
     for (size_t i = 0; !rc && i < a->count; i++) {
         struct spl_frame frame = {0};
-        a->view.camera = a->cameras[i];
-        rc = spl_renderer_render(renderer, dataset, &a->view, &frame, err);
+        a->drawing.view.camera = a->cameras[i];
+        rc = spl_renderer_render(renderer, dataset, &a->drawing.view, &frame, err);
         if (!rc)
-            rc = video ? spl_video_add(video, &frame.images[a->layer], err)
-                       : write_image(a, i, &frame.images[a->layer], err);
+            rc = video ? spl_video_add(video, &frame.images[a->drawing.layer], err)
+                       : write_image(a, i, &frame.images[a->drawing.layer], err);
         spl_frame_finish(&frame);
         progress.done = i + 1;
         progress.rate = (double)progress.done * SPL_NS_PER_S / (double)(spl_now_ns() - began);
@@ -296,14 +218,14 @@ static int make_video(struct arguments *a, const struct spl_dataset *dataset, st
 {
     char part[4096];
     struct spl_video *video = NULL;
-    if (snprintf(part, sizeof part, "%s.part", a->output) >= (int)sizeof part)
-        return spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", a->output);
+    if (snprintf(part, sizeof part, "%s.part", a->drawing.output) >= (int)sizeof part)
+        return spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", a->drawing.output);
     int rc = spl_video_create(part, a->cameras->width, a->cameras->height, a->fps, &video, err);
     if (!rc && !(rc = render_frames(a, dataset, renderer, video, err)))
         rc = spl_video_finish(video, err);
     spl_video_destroy(video);
-    if (!rc && rename(part, a->output))
-        rc = spl_fail_errno(err, errno, "cannot write '%s'", a->output);
+    if (!rc && rename(part, a->drawing.output))
+        rc = spl_fail_errno(err, errno, "cannot write '%s'", a->drawing.output);
     if (rc)
         unlink(part);
     return rc;
@@ -313,13 +235,13 @@ static int run(struct arguments *a, struct spl_error *err)
 {
     struct spl_dataset *dataset = NULL;
     struct spl_renderer *renderer = NULL;
-    int rc = spl_dataset_open(a->dataset, !a->no_verify, &dataset, err);
+    int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_cameras(a, dataset, err);
-    if (!rc && !a->video && mkdir(a->output, 0777) && errno != EEXIST)
-        rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->output);
+    if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
+        rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->drawing.output);
     if (!rc)
-        rc = spl_renderer_create(&a->renderer, &renderer, err);
+        rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
     if (!rc)
         rc = spl_renderer_add(renderer, dataset, err);
     if (!rc)
@@ -334,8 +256,8 @@ static int run(struct arguments *a, struct spl_error *err)
 
 int spl_cmd_tour(int argc, char **argv)
 {
-    struct arguments a = {.fps = NAN, .seconds = NAN, .format = -1, .layer = SPL_LAYER_COLOR};
-    spl_view_init(&a.view);
+    struct arguments a = {.fps = NAN, .seconds = NAN};
+    spl_cmd_drawing_init(&a.drawing, 0, 0);
     struct spl_error err = {0};
     for (int id; (id = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
         if (id == 'h') {
@@ -354,7 +276,6 @@ int spl_cmd_tour(int argc, char **argv)
         return 2;
     }
     a.dataset = argv[optind];
-    a.view.layers = 1u << a.layer;
     if (resolve_output(&a, &err) || run(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
