@@ -65,15 +65,21 @@ done:
     return rc;
 }
 
+static bool is_dataset_name(const char *name)
+{
+    size_t length = strlen(name);
+    return length > 5 && !strcmp(name + length - 5, ".spld");
+}
+
 static int add_directory(struct spl_catalog_files *files, const char *directory, struct spl_error *err)
 {
     DIR *dir = opendir(directory);
     if (!dir)
-        return errno == ENOENT ? 0 : spl_fail_errno(err, errno, "cannot list '%s'", directory);
+        return spl_fail_errno(err, errno, "cannot list '%s'", directory);
     int rc = 0;
     for (struct dirent *item; !rc && (item = readdir(dir));) {
-        size_t length = strlen(item->d_name), ignored;
-        if (length > 5 && !strcmp(item->d_name + length - 5, ".spld") && spl_catalog_id_of(item->d_name, &ignored))
+        size_t ignored;
+        if (is_dataset_name(item->d_name) && spl_catalog_id_of(item->d_name, &ignored))
             rc = add_file(files, directory, item->d_name, err);
     }
     closedir(dir);
@@ -86,7 +92,9 @@ int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_f
     int rc = 0;
     for (size_t i = 0; !rc && i < path_count; i++) {
         struct stat status;
-        bool directory = !stat(paths[i], &status) && S_ISDIR(status.st_mode);
+        bool there = !stat(paths[i], &status), directory = there && S_ISDIR(status.st_mode);
+        if (!there && !is_dataset_name(paths[i]))
+            return spl_fail(err, SPL_E_IO, "cannot list '%s': %s", paths[i], strerror(errno));
         rc = directory ? add_directory(files, paths[i], err) : add_file(files, "", paths[i], err);
     }
     return rc;

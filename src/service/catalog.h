@@ -44,8 +44,9 @@ struct spl_catalog_files {
 };
 
 /* Lists what `paths` stand for now: each a file, or a directory whose *.spld files are meant; names that cannot be an
- * id are left out. Files that are not there are left out too; a path that cannot be examined for any other reason is an
- * error. Any thread; blocks on disk. The caller finishes *files, also after an error. */
+ * id are left out. Files that are not there are left out too; a directory that is not there, say because its disk was
+ * unmounted, is an error, as is a path that cannot be examined. Any thread; blocks on disk. The caller finishes *files,
+ * also after an error. */
 int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_files *files, struct spl_error *err);
 void spl_catalog_files_finish(struct spl_catalog_files *files);
 

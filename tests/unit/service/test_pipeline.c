@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "service/pipeline.h"
+#include "support/make_dataset.h"
 
 static struct spl_counters counters;
 
@@ -177,6 +178,83 @@ static void a_device_that_does_not_open_is_a_failure(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
+/* A version of a small dataset; the caller owns its reference. */
+static struct spl_catalog_entry *open_entry(void)
+{
+    char path[256] = "";
+    struct spl_catalog_entry *entry = NULL;
+    const struct make_splat splat = {.normal = {1, 0, 0}, .radius = 1};
+    make_folder(path);
+    strcat(path, "/one.spld");
+    make_dataset_file(path, &splat, 1, 1);
+    assert_int_equal(spl_catalog_entry_open(path, true, &entry, NULL), 0);
+    unlink(path);
+    *strrchr(path, '/') = '\0';
+    rmdir(path);
+    return entry;
+}
+
+static struct spl_catalog_entry *take_change(struct spl_pipeline *pipeline)
+{
+    struct spl_catalog_entry *entry;
+    while (!(entry = spl_pipeline_take_change(pipeline)))
+        usleep(500);
+    return entry;
+}
+
+static void versions_come_and_go_while_the_device_is_lost(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x3", 1);
+    struct spl_pipeline *pipeline = start(8);
+    for (int i = 0; i < 20; i++) {
+        struct spl_catalog_entry *entry = open_entry();
+        spl_pipeline_add(pipeline, entry);
+        struct spl_job *job = make_job(10000), *back;
+        if (i % 4 == 0 && !spl_pipeline_submit(pipeline, job, NULL))
+            job = NULL;
+        assert_ptr_equal(take_change(pipeline), entry);
+        assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
+        if (!job)
+            spl_job_destroy(take(pipeline));
+        spl_job_destroy(job);
+        job = make_job(10000);
+        job->entry = spl_catalog_entry_ref(entry);
+        job->dataset = entry->dataset;
+        spl_catalog_entry_unref(entry); // the job's reference is the last
+        assert_null(spl_pipeline_take_change(pipeline));
+        if (!spl_pipeline_submit(pipeline, job, NULL)) {
+            back = take(pipeline);
+            assert_ptr_equal(back, job);
+        }
+        spl_job_destroy(job);
+        assert_ptr_equal(take_change(pipeline), entry);
+        assert_int_equal(entry->state, SPL_ENTRY_GONE);
+        spl_catalog_entry_destroy(entry);
+    }
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_pipeline_ends_with_versions_in_every_state(void **state)
+{
+    (void)state;
+    for (int taken = 0; taken < 4; taken++) {
+        struct spl_pipeline *pipeline = start(8);
+        for (int i = 0; i < 4; i++)
+            spl_pipeline_add(pipeline, open_entry());
+        for (int i = 0; i < taken; i++)
+            spl_catalog_entry_unref(take_change(pipeline));
+        spl_pipeline_destroy(pipeline); // leak checkers see what is left
+    }
+    struct spl_catalog_entry *entry = open_entry();
+    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    struct spl_pipeline *pipeline = start(8);
+    spl_pipeline_add(pipeline, entry); // nobody will ever take it up
+    unsetenv("FAKE_OPEN_LIMIT");
+    spl_pipeline_destroy(pipeline);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -185,6 +263,8 @@ int main(void)
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
+        cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
+        cmocka_unit_test(a_pipeline_ends_with_versions_in_every_state),
         cmocka_unit_test(losses_are_bounded),
         cmocka_unit_test(a_device_that_does_not_open_is_a_failure),
     };
