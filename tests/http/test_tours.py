@@ -1,5 +1,4 @@
 """Tours: made to their end, watched, cancelled, killed in the middle and gone on with, refused, out of disk."""
-import http.client
 import io
 import json
 import os
@@ -11,10 +10,10 @@ import signal
 import subprocess
 import tempfile
 import threading
-import time
 import zipfile
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, check_problem, eventually, run, Reply
+import openapi
+from harness import FAKE, REAL, WALL, Daemon, eventually, run, Reply
 
 TOURS = "/v1/datasets/wall/tours"
 SMALL = dict(width=64, height=48)
@@ -62,6 +61,7 @@ def read_stream(d, uri, begun=None):
         begun.set()
     reply = Reply(answer.status, answer.headers, first + answer.read())
     connection.close()
+    openapi.check("GET", uri, {}, None, reply)
     return reply
 
 
