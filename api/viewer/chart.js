@@ -11,14 +11,23 @@ export class Chart {
     this.caption = figure.querySelector("figcaption");
     this.axes = null; // {box: [left, top, right, bottom] as shares, ms: [low, high], psnr: [low, high]}
     this.profile = null;
+    this.last = null; // what show() was called with
   }
 
   async open(dataset) {
-    this.axes = this.profile = null;
+    this.axes = this.profile = this.last = null;
     URL.revokeObjectURL(this.image.src);
     this.image.hidden = this.here.hidden = true;
     this.caption.textContent = "Not measured yet: splatd bench does.";
     if (!dataset.profile) return;
+    try {
+      await this.load(dataset);
+    } catch (problem) {
+      this.caption.textContent = problem.message;
+    }
+  }
+
+  async load(dataset) {
     const [profile, svg] = await Promise.all([askJson(dataset.profile), ask(`${dataset.profile}?format=svg`).then((r) => r.text())]);
     const numbers = (name) => svg.match(new RegExp(`<svg[^>]* ${name}="([^"]*)"`))[1].split(" ").map(Number);
     const [, , width, height] = numbers("viewBox");
@@ -29,10 +38,12 @@ export class Chart {
     this.image.src = URL.createObjectURL(new Blob([svg], {type: "image/svg+xml"}));
     this.image.hidden = false;
     this.caption.textContent = "";
+    if (this.last) this.show(...this.last);
   }
 
   /** `frame` as the stage reports it, `setting` what was asked for. */
   show(frame, setting) {
+    this.last = [frame, setting];
     if (!this.axes || frame.stages.frame === undefined) return;
     const used = frame.chosen ?? {method: "splat", lod: 1, supersample: 1, ...setting};
     const known = this.profile.points.find((p) => p.method === used.method && p.lod === Number(used.lod)

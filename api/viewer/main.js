@@ -5,7 +5,7 @@ import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {notices} from "./notice.js";
 import {Points, coordinates, metres} from "./points.js";
-import {askJson, query, setToken} from "./service.js";
+import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
@@ -32,6 +32,12 @@ function choices(select, names, value) {
 
 const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
+/** Sets a select, to a value that it may not offer yet. */
+function choose(select, value) {
+  if (![...select.options].some((option) => option.value === String(value))) select.append(new Option(value));
+  select.value = value;
+}
+
 /** What the controls say, as parameters of a view; a budget chooses the others. */
 function readSettings() {
   const settings = Object.fromEntries(SETTINGS.map((name) => [name, $(name).value]));
@@ -47,21 +53,27 @@ function writeLink() {
     ...(budget ? {budget} : setting)})}`);
 }
 
-/** Opens what the fragment names, else the first dataset. */
+let opening = 0; // counts calls of open(): the last one wins
+
+/** Opens what the fragment names, else the first dataset that is ready. */
 async function open() {
-  const wanted = parse(location.hash);
+  const wanted = parse(location.hash), turn = ++opening;
   try {
     const [{datasets}, {limits, device, tours}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
     const ids = datasets.map(({id}) => id);
-    const id = wanted.dataset ?? ids[0];
-    choices($("dataset"), ids.includes(id) || !id ? ids : [...ids, id], id);
-    if (!id) return stage.report(Object.assign(new Error("No dataset is served yet"), {kind: "gone"}));
-    const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
+    const id = wanted.dataset ?? (datasets.find(({state}) => state === "ready") ?? datasets[0])?.id;
+    if (!id) throw new Problem("gone", "No dataset is served yet", 5);
+    const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`).catch((problem) => problem);
+    if (turn !== opening) return;
+    choices($("dataset"), ids.includes(id) ? ids : [...ids, id], id);
+    if (dataset instanceof Error) throw dataset;
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
     choices($("method"), dataset.methods, wanted.method ?? "splat");
-    for (const name of ["lod", "supersample", "budget"]) $(name).value = wanted[name] ?? (name === "budget" ? "" : 1);
+    $("lod").value = wanted.lod ?? 1;
+    choose($("supersample"), wanted.supersample ?? 1);
+    choose($("budget"), wanted.budget ?? "");
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent = `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name.replace(/ \(.*/, "")}`;
@@ -72,8 +84,10 @@ async function open() {
     stage.open(dataset, camera);
     points.clear();
     tour.open(id);
-    await chart.open(dataset);
+    chart.open(dataset);
   } catch (problem) {
+    if (turn !== opening) return;
+    stage.close();
     stage.report(problem);
   }
 }

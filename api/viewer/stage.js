@@ -55,14 +55,20 @@ export class Stage extends EventTarget {
   /** Shows another dataset, from `camera` or its default view. */
   open(dataset, camera) {
     const {eye, target, up, fov} = dataset.default_view;
+    if (this.dataset?.id !== dataset.id) this.close();
     this.dataset = dataset;
-    this.shown = null;
-    this.canvas.hidden = true;
     this.home = rounded({eye, target, up, fov});
     this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
     this.camera = {...this.home, ...camera};
     this.dispatchEvent(new Event("camera"));
     this.refresh();
+  }
+
+  /** Shows nothing. */
+  close() {
+    if (this.flight) this.flight.abort.abort();
+    this.dataset = this.shown = null;
+    this.canvas.hidden = true;
   }
 
   /** Puts the camera elsewhere as part of a motion. */

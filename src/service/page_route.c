@@ -67,7 +67,7 @@ static double wish(const char *accept, const char *type)
         if (length != strlen(type) || strncasecmp(item, type, length))
             continue;
         const char *end = item + strcspn(item, ","), *q = item + length;
-        while (q < end && strncasecmp(q, "q=", 2))
+        while (q < end && (strncasecmp(q, "q=", 2) || !strchr("; \t", q[-1])))
             q++;
         return q < end ? strtod(q + 2, NULL) : 1;
     }

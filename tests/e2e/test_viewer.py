@@ -443,6 +443,12 @@ def test_trouble_is_told_and_passes():
         tab.choose("#dataset", "wall")
         settled(tab)
         assert tab.run("document.querySelector('#notice').hidden")
+        tab.run("location.hash = '#dataset=none'")
+        tab.until("document.querySelector('#notice p').textContent.startsWith('Not there') && document.querySelector('canvas').hidden")
+        tab.drag((200, 200), (250, 200))  # nothing to move
+        tab.run("location.hash = '#dataset=wall&budget=77ms'")
+        settled(tab)
+        assert link(tab)["budget"] == "77ms"
         tab.run("location.hash = '#dataset=wall&eye=0,0,1&target=0,0,1'")  # a camera that the service refuses
         tab.until("document.querySelector('#notice p').textContent.startsWith('Refused: ')")
         tab.press_on("#home")

@@ -27,7 +27,7 @@ def test_html_is_for_those_who_ask_for_it():
             ("application/json, text/html", "text/html"), ("application/json;q=0.5,text/html ; q=0.6", "text/html"),
             (None, "application/json"), ("*/*", "application/json"), ("application/json", "application/json"), ("", "application/json"),
             ("text/html;q=0.1, application/json", "application/json"), ("text/html;q=0", "application/json"),
-            ("text/htmlish, text/*", "application/json"), (";;,,q=1", "application/json"),
+            ("text/html;seq=0, application/json;q=0.5", "text/html"), ("text/htmlish, text/*", "application/json"), (";;,,q=1", "application/json"),
         ]:
             reply = d.ask("/", headers={} if accept is None else {"Accept": accept})
             assert reply.status == 200 and reply.headers["Content-Type"].split(";")[0] == kind, (accept, reply.headers)
