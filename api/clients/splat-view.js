@@ -1,15 +1,15 @@
-// <splat-view src="https://splats.example" dataset="hall" eye="4,5,6" target="0,0,1" fov="40" layer="color"></splat-view>
+// <splat-view src="https://splats.example" dataset="hall" eye="4,5,6" target="0,0,1" fov="40"></splat-view>
 //
 // A view of a dataset that people can move in, for any page on any origin:
 //   <script type="module" src="https://splats.example/clients/splat-view.js"></script>
 //
-// src       the service; by default where this file came from
-// dataset   its id; label  what screen readers call the view
-// token     where the service wants one; whoever sees the page sees it, so let it allow no more than view
-// eye, target, up, fov, layer, method, lod, supersample, budget   as parameters of a view; changing one moves the view
+// src       the service; by default where this file came from dataset   its id; label  what screen readers call the
+// view token     where the service wants one; whoever sees the page sees it, so let it allow no more than view eye,
+// target, up, fov, layer, method, lod, supersample, budget   as parameters of a view; changing one moves the view
 //
-// Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last one.
-// It is a frame of /embed/{id}, so no CORS is needed. Size it with CSS; by default it is 16:9 and as wide as it may be.
+// Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last
+// one. It is a frame of /embed/{id}, so no CORS is needed. Size it with CSS; by default it is 16:9 and as wide as it
+// may be.
 
 const HOME = new URL(import.meta.url).origin;
 const SETTINGS = ["eye", "target", "up", "fov", "layer", "method", "lod", "supersample", "budget"];
@@ -32,7 +32,9 @@ class SplatView extends HTMLElement {
   constructor() {
     super();
     const style = document.createElement("style");
-    style.textContent = ":host{display:block;aspect-ratio:16/9}:host([hidden]){display:none}iframe{width:100%;height:100%;border:0;display:block}";
+    style.textContent =
+      ":host{display:block;aspect-ratio:16/9}:host([hidden]){display:none}" +
+      "iframe{width:100%;height:100%;border:0;display:block}";
     this.attachShadow({mode: "open"}).append(style, this.#frame);
   }
 

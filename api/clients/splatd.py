@@ -43,7 +43,8 @@ class Dataset:
         self.center = [(a + b) / 2 for a, b in zip(low, high)]
 
     def view(self, **params):
-        """One view. Parameters as in api/openapi.yaml; vectors are lists. A `camera` (a dict, any convention) is sent as JSON."""
+        """One view. Parameters as in api/openapi.yaml; vectors are lists. A `camera` (a dict, in any convention) is sent
+        as JSON."""
         if "camera" in params:
             return View(*self.service.ask(self.info["view"], json.dumps(params).encode()))
         return View(*self.service.ask(f"{self.info['view']}?{query(params)}"))
@@ -101,6 +102,7 @@ def query(params):
         if isinstance(value, bool):
             return str(value).lower()
         return ",".join(map(text, value)) if isinstance(value, (list, tuple)) else str(value)
+
     return urllib.parse.urlencode({name: text(value) for name, value in params.items() if value is not None}, safe=",:")
 
 

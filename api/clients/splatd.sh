@@ -6,9 +6,10 @@
 #   splatd.sh view hall view.jpg eye=4,5,6 target=0,0,1 fov=50
 #   splatd.sh view hall depth.png eye=4,5,6 target=0,0,1 layer=depth
 #   splatd.sh pick hall 640 360 eye=4,5,6 target=0,0,1
-#   splatd.sh ring hall views 36 6 3 target=0,0,1 fov=50   # views/00.jpg … 35.jpg: 36 views, 6 m round the target, 3 m above it
+#   splatd.sh ring hall views 36 6 3 target=0,0,1 fov=50   # 36 views from 6 m round the target, 3 m above: views/00.jpg …
 #
-# SPLATD_URL names the service (http://127.0.0.1:8080), SPLATD_TOKEN a token. A busy service is asked again when it says.
+# SPLATD_URL names the service (http://127.0.0.1:8080), SPLATD_TOKEN a token. A busy service is asked again when it
+# says.
 set -euo pipefail
 
 base=${SPLATD_URL:-http://127.0.0.1:8080} base=${base%/}
@@ -16,9 +17,10 @@ usage() { sed -n '4,9s/^# \{0,3\}//p' "$0" >&2; exit 2; }
 
 # URL…: prints the reply; a refusal is told on stderr.
 ask() {
-    local body status
+    local body status secret=${SPLATD_TOKEN:+header = \"Authorization: Bearer $SPLATD_TOKEN\"}
     body=$(mktemp)
-    status=$(curl -sS --retry 5 --max-time 120 -K <(printf '%s' "${SPLATD_TOKEN:+header = \"Authorization: Bearer $SPLATD_TOKEN\"}") -o "$body" -w '%{http_code}' "$1") ||
+    # The token goes past the command line, which every user can see.
+    status=$(curl -sS --retry 5 --max-time 120 -K <(printf '%s' "$secret") -o "$body" -w '%{http_code}' "$1") ||
         { rm -f "$body"; return 1; }
     if [ "$status" != 200 ]; then
         echo "splatd.sh: $status: $(sed -n 's/.*"detail": "\(.*\)",\{0,1\}$/\1/p' "$body")" >&2
@@ -36,7 +38,8 @@ query() { local IFS='&'; echo "$*" | sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/+/%
 view() {
     local id=$1 file=$2
     shift 2
-    ask "$base/v1/datasets/$id/view?$(query "$@")" >"$file.part" && mv "$file.part" "$file" || { rm -f "$file.part"; return 1; }
+    ask "$base/v1/datasets/$id/view?$(query "$@")" >"$file.part" && mv "$file.part" "$file" ||
+        { rm -f "$file.part"; return 1; }
 }
 
 # DATASET DIR COUNT RADIUS HEIGHT target=X,Y,Z NAME=VALUE…
@@ -63,7 +66,13 @@ case $command in
 datasets) ask "$base/v1/datasets" | sed -n 's/^ *"id": "\(.*\)",$/\1/p' ;;
 info) [ $# = 1 ] || usage; ask "$base/v1/datasets/$1"; echo ;;
 view) [ $# -ge 2 ] || usage; view "$@" ;;
-pick) [ $# -ge 3 ] || usage; id=$1 x=$2 y=$3; shift 3; ask "$base/v1/datasets/$id/pick?$(query "x=$x" "y=$y" "$@")"; echo ;;
+pick)
+    [ $# -ge 3 ] || usage
+    id=$1 x=$2 y=$3
+    shift 3
+    ask "$base/v1/datasets/$id/pick?$(query "x=$x" "y=$y" "$@")"
+    echo
+    ;;
 ring) [ $# -ge 6 ] || usage; ring "$@" ;;
 *) usage ;;
 esac

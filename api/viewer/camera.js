@@ -1,5 +1,6 @@
-// A look-at camera, as the service takes it: {eye, target, up, fov}, fov vertical in degrees. All functions are pure and
-// return new cameras. The camera frame is x right, y down, z forward, as in api/cameras.md; pixels count from the corner.
+// A look-at camera, as the service takes it: {eye, target, up, fov}, fov vertical in degrees. All functions are pure
+// and return new cameras. The camera frame is x right, y down, z forward, as in api/cameras.md; pixels count from the
+// corner.
 
 export const add = (a, b) => a.map((x, i) => x + b[i]);
 export const sub = (a, b) => a.map((x, i) => x - b[i]);
@@ -75,7 +76,7 @@ export function pan(camera, dx, dy, height) {
   return {...camera, eye: add(camera.eye, step), target: add(camera.target, step)};
 }
 
-/** Comes nearer (factor < 1) to what is under `pixel` at the target's depth; never nearer to the target than `least`. */
+/** Comes nearer (factor < 1) to what is under `pixel` at the target's depth; the target stays `least` away. */
 export function dolly(camera, factor, size, pixel, least) {
   const d = distance(camera);
   const {forward} = axes(camera);
@@ -89,28 +90,44 @@ export const aim = (camera, target) => ({...camera, eye: add(camera.eye, sub(tar
 /** How an image that `from` took has to be bent to stand for what `to` sees, if everything lay in the plane through the
  * target: a CSS matrix3d; "" where part of it falls behind the eye. */
 export function warp(from, to, [width, height]) {
-  const a = axes(from), b = axes(to);
+  const a = axes(from),
+    b = axes(to);
   const [f, g, d] = [focal(from, height), focal(to, height), distance(from)];
   const [cx, cy] = [width / 2, height / 2];
   // Columns: what one pixel to the right, one pixel down, and pixel (0, 0) itself are in the world, from to.eye.
-  const columns = [times(a.right, d / f), times(a.down, d / f),
-    add(sub(from.eye, to.eye), add(times(a.forward, d), add(times(a.right, (-cx * d) / f), times(a.down, (-cy * d) / f))))];
+  const columns = [
+    times(a.right, d / f),
+    times(a.down, d / f),
+    add(
+      sub(from.eye, to.eye),
+      add(times(a.forward, d), add(times(a.right, (-cx * d) / f), times(a.down, (-cy * d) / f))),
+    ),
+  ];
   const h = columns.map((v) => {
     const z = dot(v, b.forward);
     return [g * dot(v, b.right) + cx * z, g * dot(v, b.down) + cy * z, z];
   });
-  const corners = [[0, 0], [width, 0], [0, height], [width, height]];
+  const corners = [
+    [0, 0],
+    [width, 0],
+    [0, height],
+    [width, height],
+  ];
   if (corners.some(([x, y]) => h[0][2] * x + h[1][2] * y + h[2][2] < 0.05 * d)) return "";
-  const m = h.map((column) => column.map((x) => x / h[2][2]));
-  return `matrix3d(${[m[0][0], m[0][1], 0, m[0][2], m[1][0], m[1][1], 0, m[1][2], 0, 0, 1, 0, m[2][0], m[2][1], 0, 1]})`;
+  const [a1, a2, a3] = h.map((column) => column.map((x) => x / h[2][2]));
+  return `matrix3d(${[a1[0], a1[1], 0, a1[2], a2[0], a2[1], 0, a2[2], 0, 0, 1, 0, a3[0], a3[1], 0, 1]})`;
 }
 
 /** Coordinates rounded to what a pixel can tell at this distance. */
 export function rounded(camera) {
   const digits = Math.min(12, Math.max(0, 4 - Math.floor(Math.log10(distance(camera)))));
   const round = (v) => v.map((x) => Number(x.toFixed(digits)) + 0);
-  return {eye: round(camera.eye), target: round(camera.target), up: camera.up.map((x) => Number(x.toFixed(6)) + 0),
-    fov: Number(camera.fov.toFixed(3))};
+  return {
+    eye: round(camera.eye),
+    target: round(camera.target),
+    up: camera.up.map((x) => Number(x.toFixed(6)) + 0),
+    fov: Number(camera.fov.toFixed(3)),
+  };
 }
 
 export const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);

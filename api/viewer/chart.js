@@ -28,13 +28,23 @@ export class Chart {
   }
 
   async load(dataset) {
-    const [profile, svg] = await Promise.all([askJson(dataset.profile), ask(`${dataset.profile}?format=svg`).then((r) => r.text())]);
-    const numbers = (name) => svg.match(new RegExp(`<svg[^>]* ${name}="([^"]*)"`))[1].split(" ").map(Number);
+    const [profile, svg] = await Promise.all([
+      askJson(dataset.profile),
+      ask(`${dataset.profile}?format=svg`).then((r) => r.text()),
+    ]);
+    const numbers = (name) =>
+      svg
+        .match(new RegExp(`<svg[^>]* ${name}="([^"]*)"`))[1]
+        .split(" ")
+        .map(Number);
     const [, , width, height] = numbers("viewBox");
     const [left, top, right, bottom] = numbers("data-plot");
     this.profile = profile;
-    this.axes = {box: [left / width, top / height, right / width, bottom / height], ms: numbers("data-ms"),
-      psnr: numbers("data-psnr")};
+    this.axes = {
+      box: [left / width, top / height, right / width, bottom / height],
+      ms: numbers("data-ms"),
+      psnr: numbers("data-psnr"),
+    };
     this.image.src = URL.createObjectURL(new Blob([svg], {type: "image/svg+xml"}));
     this.image.hidden = false;
     this.caption.textContent = "";
@@ -46,18 +56,25 @@ export class Chart {
     this.last = [frame, setting];
     if (!this.axes || frame.stages.frame === undefined) return;
     const used = frame.chosen ?? {method: "splat", lod: 1, supersample: 1, ...setting};
-    const known = this.profile.points.find((p) => p.method === used.method && p.lod === Number(used.lod)
-      && p.supersample === Number(used.supersample));
-    const psnr = known?.psnr ?? null, ms = frame.stages.frame;
-    const {box, ms: [first, last], psnr: [low, high]} = this.axes;
+    const known = this.profile.points.find(
+      (p) => p.method === used.method && p.lod === Number(used.lod) && p.supersample === Number(used.supersample),
+    );
+    const psnr = known?.psnr ?? null,
+      ms = frame.stages.frame;
+    const {
+      box,
+      ms: [first, last],
+      psnr: [low, high],
+    } = this.axes;
     const share = (x) => Math.min(1, Math.max(0, x));
     const x = share(Math.log(ms / first) / Math.log(last / first));
     const y = psnr === null ? 1 : share((high - psnr) / (high - low));
     this.here.hidden = false;
     this.here.style.left = `${100 * (box[0] + x * (box[2] - box[0]))}%`;
     this.here.style.top = `${100 * (box[1] + y * (box[3] - box[1]))}%`;
-    this.caption.textContent = `This view: ${ms.toFixed(0)} ms, ${frame.width} × ${frame.height}; `
-      + (psnr === null ? "this setting was not measured" : `this setting reaches ${psnr.toFixed(1)} dB`)
-      + ` (measured at ${this.profile.width} × ${this.profile.height}).`;
+    this.caption.textContent =
+      `This view: ${ms.toFixed(0)} ms, ${frame.width} × ${frame.height}; ` +
+      (psnr === null ? "this setting was not measured" : `this setting reaches ${psnr.toFixed(1)} dB`) +
+      ` (measured at ${this.profile.width} × ${this.profile.height}).`;
   }
 }

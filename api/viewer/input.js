@@ -5,18 +5,24 @@
 //   wheel, + and -       nearer, farther
 //   arrows               orbit or look; W A S D Q E  fly; shift: faster; Home: the dataset's view
 //
-// A press that does not move is a "click" event of the stage, two of them a "dblclick"; detail is the pixel. Enter clicks
-// in the middle.
+// A press that does not move is a "click" event of the stage, two of them a "dblclick"; detail is the pixel. Enter
+// clicks in the middle.
 
 import {distance, dolly, look, move, orbit, pan} from "./camera.js";
 
-const DRAG_PX = 4, DOUBLE_MS = 350;
-const TURN = 1.2, FLY = 0.7, NEARER = 0.55; // a second: radians, distances to the target, share of that distance
+const DRAG_PX = 4,
+  DOUBLE_MS = 350;
+const TURN = 1.2,
+  FLY = 0.7,
+  NEARER = 0.55; // a second: radians, distances to the target, share of that distance
 
 export function attach(stage) {
   const element = stage.element;
   const pointers = new Map(); // id -> [x, y]
-  let travel = 0, button = 0, lastClick = null, many = false;
+  let travel = 0,
+    button = 0,
+    lastClick = null,
+    many = false;
   const at = (event) => {
     const box = element.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -39,7 +45,8 @@ export function attach(stage) {
   element.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
     if (!before || !stage.dataset) return;
-    const now = at(event), [dx, dy] = [now[0] - before[0], now[1] - before[1]];
+    const now = at(event),
+      [dx, dy] = [now[0] - before[0], now[1] - before[1]];
     const old = pointers.size === 2 ? spread() : null;
     pointers.set(event.pointerId, now);
     travel += Math.abs(dx) + Math.abs(dy);
@@ -61,31 +68,46 @@ export function attach(stage) {
     if (!pixel) return;
     pointers.delete(event.pointerId);
     if (event.type === "pointercancel" || pointers.size || many || button || travel >= DRAG_PX) return;
-    const twice = lastClick && event.timeStamp - lastClick.time < DOUBLE_MS
-      && Math.hypot(pixel[0] - lastClick.pixel[0], pixel[1] - lastClick.pixel[1]) < 2 * DRAG_PX;
+    const twice =
+      lastClick &&
+      event.timeStamp - lastClick.time < DOUBLE_MS &&
+      Math.hypot(pixel[0] - lastClick.pixel[0], pixel[1] - lastClick.pixel[1]) < 2 * DRAG_PX;
     lastClick = twice ? null : {time: event.timeStamp, pixel};
     stage.dispatchEvent(new CustomEvent(twice ? "dblclick" : "click", {detail: pixel}));
   };
   element.addEventListener("pointerup", release);
   element.addEventListener("pointercancel", release);
   element.addEventListener("contextmenu", (event) => event.preventDefault());
-  element.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    if (!stage.dataset) return;
-    const pixels = event.deltaY * (event.deltaMode === 1 ? 30 : event.deltaMode === 2 ? 300 : 1);
-    near(Math.exp(Math.min(1, Math.max(-1, pixels * 0.0015))), at(event));
-  }, {passive: false});
+  element.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      if (!stage.dataset) return;
+      const pixels = event.deltaY * (event.deltaMode === 1 ? 30 : event.deltaMode === 2 ? 300 : 1);
+      near(Math.exp(Math.min(1, Math.max(-1, pixels * 0.0015))), at(event));
+    },
+    {passive: false},
+  );
 
   // Keys act as long as they are held: by time, not by repeats.
   const actions = {
-    arrowleft: (s) => go(s, 0), arrowright: (s) => go(-s, 0), arrowup: (s) => go(0, s), arrowdown: (s) => go(0, -s),
-    w: (s) => fly(0, 0, s), s: (s) => fly(0, 0, -s), a: (s) => fly(-s, 0, 0), d: (s) => fly(s, 0, 0),
-    e: (s) => fly(0, s, 0), q: (s) => fly(0, -s, 0),
-    "+": (s) => near(NEARER ** s, middle()), "-": (s) => near(NEARER ** -s, middle()),
+    arrowleft: (s) => go(s, 0),
+    arrowright: (s) => go(-s, 0),
+    arrowup: (s) => go(0, s),
+    arrowdown: (s) => go(0, -s),
+    w: (s) => fly(0, 0, s),
+    s: (s) => fly(0, 0, -s),
+    a: (s) => fly(-s, 0, 0),
+    d: (s) => fly(s, 0, 0),
+    e: (s) => fly(0, s, 0),
+    q: (s) => fly(0, -s, 0),
+    "+": (s) => near(NEARER ** s, middle()),
+    "-": (s) => near(NEARER ** -s, middle()),
   };
   actions["="] = actions["+"]; // the same key without shift
   actions._ = actions["-"];
-  const go = (left, up) => { // the camera itself goes, or turns, that way
+  const go = (left, up) => {
+    // the camera itself goes, or turns, that way
     const angle = stage.drag === "look" ? TURN : -TURN;
     turn(left * angle, up * angle);
   };
@@ -95,7 +117,8 @@ export function attach(stage) {
     stage.setCamera(move(stage.camera, x * d, y * d, z * d));
   };
   const held = new Set();
-  let fast = false, last = 0;
+  let fast = false,
+    last = 0;
   const step = (now) => {
     const seconds = Math.min(0.1, (now - last) / 1000) * (fast ? 3 : 1);
     last = now;

@@ -49,15 +49,27 @@ function readSettings() {
 function writeLink() {
   const {eye, target, up, fov} = stage.params();
   const {budget, ...setting} = stage.settings;
-  history.replaceState(null, "", `#${query({dataset: stage.dataset.id, eye, target, up, fov, layer: setting.layer,
-    ...(budget ? {budget} : setting)})}`);
+  history.replaceState(
+    null,
+    "",
+    `#${query({
+      dataset: stage.dataset.id,
+      eye,
+      target,
+      up,
+      fov,
+      layer: setting.layer,
+      ...(budget ? {budget} : setting),
+    })}`,
+  );
 }
 
 let opening = 0; // counts calls of open(): the last one wins
 
 /** Opens what the fragment names, else the first dataset that is ready. */
 async function open() {
-  const wanted = parse(location.hash), turn = ++opening;
+  const wanted = parse(location.hash),
+    turn = ++opening;
   try {
     const [{datasets}, {limits, device, tours}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
     const ids = datasets.map(({id}) => id);
@@ -76,11 +88,14 @@ async function open() {
     choose($("budget"), wanted.budget ?? "");
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
-    $("about").textContent = `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name.replace(/ \(.*/, "")}`;
+    $("about").textContent =
+      `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
-    const camera = Object.fromEntries(["eye", "target", "up", "fov"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]));
+    const camera = Object.fromEntries(
+      ["eye", "target", "up", "fov"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]),
+    );
     stage.open(dataset, camera);
     points.clear();
     tour.open(id);
@@ -96,30 +111,39 @@ function showFrame({detail: frame}) {
   const distances = ["depth", "range"].includes(stage.settings.layer) && frame.near !== null;
   $("legend").hidden = !distances;
   const [near, far] = $("legend").querySelectorAll("span");
-  if (distances) [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} m`);
+  if (distances)
+    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} m`);
   const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
   const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
   $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;
   chart.show(frame, frame.full ? stage.settings : {});
   if (!frame.full) return;
   const {chosen, promised, demand} = frame;
-  $("chosen").textContent = chosen ? `Chosen: ${chosen.method}, level ${chosen.lod}, ${chosen.supersample} samples a side`
-    + `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}` : "";
+  $("chosen").textContent = chosen
+    ? `Chosen: ${chosen.method}, level ${chosen.lod}, ${chosen.supersample} samples a side` +
+      `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
+    : "";
   writeLink();
 }
 
 function showPoints({detail}) {
   const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
   if (points.distance !== null) rows.push(["A – B", metres(points.distance)]);
-  $("points").replaceChildren(...rows.flat().map((text, i) => {
-    const cell = document.createElement(i % 2 ? "dd" : "dt");
-    cell.textContent = text;
-    return cell;
-  }));
+  $("points").replaceChildren(
+    ...rows.flat().map((text, i) => {
+      const cell = document.createElement(i % 2 ? "dd" : "dt");
+      cell.textContent = text;
+      return cell;
+    }),
+  );
   $("clear").disabled = !points.list.length;
   if (typeof detail === "string") say(detail);
-  else say(points.distance === null ? `Point at ${coordinates(detail.position)}`
-    : `Point at ${coordinates(detail.position)}; distance ${metres(points.distance)}`);
+  else
+    say(
+      points.distance === null
+        ? `Point at ${coordinates(detail.position)}`
+        : `Point at ${coordinates(detail.position)}; distance ${metres(points.distance)}`,
+    );
 }
 
 /** Double click: turns towards what is there, which is then what one orbits. */
@@ -128,7 +152,8 @@ async function lookAt({detail: pixel}) {
   const found = await points.find(pixel).catch(() => null);
   if (!found) return say("Nothing there");
   const {eye, target} = stage.camera;
-  const began = performance.now(), span = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : 300; // ms
+  const began = performance.now(),
+    span = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : 300; // ms
   const step = (now) => {
     const t = Math.min(1, Math.max(0, (now - began) / span));
     const s = t * t * (3 - 2 * t);

@@ -1,7 +1,13 @@
 // What stands over the picture when there is none, or none that is new.
 
-const TITLES = {busy: "The service is busy", rebuilding: "The device is being rebuilt", gone: "Not there",
-  refused: "Refused", token: "A token is needed", offline: "No connection"};
+const TITLES = {
+  busy: "The service is busy",
+  rebuilding: "The device is being rebuilt",
+  gone: "Not there",
+  refused: "Refused",
+  token: "A token is needed",
+  offline: "No connection",
+};
 
 /** Shows the stage's state in `box`; its button asks again, by `open` when nothing is open yet. */
 export function notices(stage, box, again, open) {
@@ -13,7 +19,11 @@ export function notices(stage, box, again, open) {
     let seconds = Math.ceil(problem.seconds ?? 0);
     box.querySelector("p").textContent = `${TITLES[problem.kind] ?? "Failed"}: ${problem.message}`;
     const tell = () => {
-      box.querySelector("small").textContent = !problem.seconds ? "" : seconds > 0 ? `Trying again in ${seconds} s` : "Trying again";
+      box.querySelector("small").textContent = !problem.seconds
+        ? ""
+        : seconds > 0
+          ? `Trying again in ${seconds} s`
+          : "Trying again";
       seconds--;
     };
     tell();

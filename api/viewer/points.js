@@ -37,7 +37,10 @@ export class Points extends EventTarget {
 
   /** Where a pixel of the stage lies, or null. */
   async find([x, y]) {
-    const {dataset, size: [width, height]} = this.stage;
+    const {
+      dataset,
+      size: [width, height],
+    } = this.stage;
     const {eye, target, up, fov} = this.stage.params();
     const found = await askJson(`${dataset.uri}/pick?${query({x, y, eye, target, up, fov, width, height})}`);
     return found.position ? found : null;
@@ -86,7 +89,10 @@ export class Points extends EventTarget {
     if (at.length === 2 && at[0] && at[1]) {
       const [[x1, y1], [x2, y2]] = at;
       const [x, y] = [(x1 + x2) / 2, (y1 + y2) / 2 - 8];
-      shapes.push(shape("line", {x1, y1, x2, y2}), shape("text", {x, y, "text-anchor": "middle"}, metres(this.distance)));
+      shapes.push(
+        shape("line", {x1, y1, x2, y2}),
+        shape("text", {x, y, "text-anchor": "middle"}, metres(this.distance)),
+      );
     }
     at.forEach((p, i) => {
       if (!p) return;

@@ -22,8 +22,11 @@ function kindOf(status, problem) {
 /** fetch() that throws Problems; 304s never come here. */
 export async function ask(path, options = {}) {
   const token = sessionStorage.getItem(TOKEN);
-  const headers = {Accept: "application/json, image/*, */*;q=0.5", ...(token && {Authorization: `Bearer ${token}`}),
-    ...options.headers};
+  const headers = {
+    Accept: "application/json, image/*, */*;q=0.5",
+    ...(token && {Authorization: `Bearer ${token}`}),
+    ...options.headers,
+  };
   let reply;
   try {
     reply = await fetch(path, {...options, headers});
@@ -34,13 +37,18 @@ export async function ask(path, options = {}) {
   if (reply.ok) return reply;
   const problem = await reply.json().catch(() => ({}));
   const wait = reply.status >= 500 || reply.status === 429 ? Number(reply.headers.get("Retry-After")) || 2 : 0;
-  throw new Problem(kindOf(reply.status, problem), problem.detail ?? `${reply.status} ${reply.statusText}`, wait,
-    problem.field ?? "");
+  throw new Problem(
+    kindOf(reply.status, problem),
+    problem.detail ?? `${reply.status} ${reply.statusText}`,
+    wait,
+    problem.field ?? "",
+  );
 }
 
 export const askJson = async (path, options) => (await ask(path, options)).json();
 
-/** Saves what lies at `path`, under `name` if the service gives it none. Without a token the browser streams it to disk itself. */
+/** Saves what lies at `path`, under `name` if the service gives it none. Without a token the browser streams it to
+ * disk itself. */
 export async function download(path, name) {
   const link = document.createElement("a");
   link.href = sessionStorage.getItem(TOKEN) ? URL.createObjectURL(await (await ask(path)).blob()) : path;
@@ -51,6 +59,8 @@ export async function download(path, name) {
 
 /** Parameters of a view as a query, vectors joined by commas; what is null or "" is left out. */
 export function query(params) {
-  return Object.entries(params).filter(([, value]) => value != null && value !== "")
-    .map(([name, value]) => `${name}=${[value].flat().map(encodeURIComponent).join(",")}`).join("&");
+  return Object.entries(params)
+    .filter(([, value]) => value != null && value !== "")
+    .map(([name, value]) => `${name}=${[value].flat().map(encodeURIComponent).join(",")}`)
+    .join("&");
 }

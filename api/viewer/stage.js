@@ -1,7 +1,7 @@
 // The picture: asks for frames of the newest camera, one at a time, and shows them.
 //
-// While the camera moves, frames are coarse and the last one is bent to where the camera is by now, so that motion is as
-// smooth as the screen; once it rests, one full frame replaces them. A full frame that is overtaken by motion is
+// While the camera moves, frames are coarse and the last one is bent to where the camera is by now, so that motion is
+// as smooth as the screen; once it rests, one full frame replaces them. A full frame that is overtaken by motion is
 // cancelled, which lets the service drop it. Events: "camera" (it changed), "frame" (detail: what the reply said),
 // "state" (detail: a Problem, or null when all is well).
 
@@ -16,12 +16,18 @@ const PARTIAL_MS = 400; // until a frame with missing parts is asked for again
 function readHeaders(headers) {
   const list = (text) => Object.fromEntries((text ?? "").split(";").map((part) => part.trim().split("=")));
   const stages = {};
-  for (const [, name, ms] of (headers.get("Server-Timing") ?? "").matchAll(/(\w+);dur=([\d.]+)/g)) stages[name] = Number(ms);
+  for (const [, name, ms] of (headers.get("Server-Timing") ?? "").matchAll(/(\w+);dur=([\d.]+)/g))
+    stages[name] = Number(ms);
   const number = (name) => (headers.has(name) ? Number(headers.get(name)) : null);
-  return {stages, chosen: headers.has("Splatd-Chosen") ? list(headers.get("Splatd-Chosen")) : null,
-    promised: list(headers.get("Splatd-Promised")), demand: headers.get("Splatd-Demand"), took: list(headers.get("Splatd-Took")),
-    near: number("Splatd-Depth-Near"), far: number("Splatd-Depth-Far"), device: headers.get("Splatd-Device"),
-    complete: headers.get("Splatd-Complete") !== "false"};
+  return {
+    stages,
+    chosen: headers.has("Splatd-Chosen") ? list(headers.get("Splatd-Chosen")) : null,
+    promised: list(headers.get("Splatd-Promised")),
+    demand: headers.get("Splatd-Demand"),
+    near: number("Splatd-Depth-Near"),
+    far: number("Splatd-Depth-Far"),
+    complete: headers.get("Splatd-Complete") !== "false",
+  };
 }
 
 export class Stage extends EventTarget {
@@ -120,11 +126,19 @@ export class Stage extends EventTarget {
     const ratio = Math.min(devicePixelRatio, 2, Math.sqrt(this.pixels / (width * height)));
     const {layer, budget, ...setting} = this.settings;
     const coarse = COARSE[this.coarse];
-    // In motion the method stays: what changes it from frame to frame flickers.
-    const quality = full ? (budget ? {budget} : setting) : coarse.budget ? {...coarse, method: setting.method} : {...setting, ...coarse};
-    return {...rounded(this.camera), width: Math.max(1, Math.floor(width * ratio)), height: Math.max(1, Math.floor(height * ratio)),
-      layer, ...quality, background: getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
-      format: "jpeg"};
+    // A budget chooses the rest, but for the method in motion: one that changes from frame to frame flickers.
+    let quality = {...setting, ...(full ? {} : coarse)};
+    if (full && budget) quality = {budget};
+    else if (!full && coarse.budget) quality = {...coarse, method: setting.method};
+    return {
+      ...rounded(this.camera),
+      width: Math.max(1, Math.floor(width * ratio)),
+      height: Math.max(1, Math.floor(height * ratio)),
+      layer,
+      ...quality,
+      background: getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
+      format: "jpeg",
+    };
   }
 
   url(full = true, changed = {}) {
@@ -139,10 +153,13 @@ export class Stage extends EventTarget {
     }, ms);
   }
 
-  /** Asks for the frame that is missing, if one is and none is on its way. The element has the class "rest" while the picture
-   * is all that was asked for. */
+  /** Asks for the frame that is missing, if one is and none is on its way. The element has the class "rest" while the
+   * picture is all that was asked for. */
   async pump() {
-    this.element.classList.toggle("rest", !this.moving && Boolean(this.shown?.full) && same(this.shown.camera, rounded(this.camera)));
+    this.element.classList.toggle(
+      "rest",
+      !this.moving && Boolean(this.shown?.full) && same(this.shown.camera, rounded(this.camera)),
+    );
     if (!this.dataset || this.flight || this.blocked || document.hidden) return;
     const full = !this.moving;
     if (!full) this.later(this.restAt - performance.now() + 1);
@@ -152,12 +169,16 @@ export class Stage extends EventTarget {
     try {
       const reply = await ask(this.url(full), {signal: flight.abort.signal});
       const bitmap = await createImageBitmap(await reply.blob());
-      if (dataset === this.dataset) this.show(bitmap, {camera, size, full: full && flight.version === this.version, ...readHeaders(reply.headers)});
+      const current = full && flight.version === this.version;
+      if (dataset === this.dataset) {
+        this.show(bitmap, {camera, size, full: current, ...readHeaders(reply.headers)});
+        this.failures = 0;
+        this.report(null);
+      }
       bitmap.close();
-      this.failures = 0;
-      this.report(null);
     } catch (error) {
-      if (!full && error.kind === "refused" && this.coarse === "auto") this.coarse = "quarter"; // a profile without this method
+      if (!full && error.kind === "refused" && this.coarse === "auto")
+        this.coarse = "quarter"; // a profile without this method
       else if (error.name !== "AbortError") this.fail(error);
     }
     this.flight = null;
@@ -188,7 +209,8 @@ export class Stage extends EventTarget {
   }
 
   fail(error) {
-    const problem = error instanceof Problem ? error : new Problem("refused", `The image cannot be shown: ${error.message}`);
+    const problem =
+      error instanceof Problem ? error : new Problem("refused", `The image cannot be shown: ${error.message}`);
     this.blocked = true;
     if (problem.kind === "offline") problem.seconds = Math.min(15, 2 ** this.failures);
     this.failures++;

@@ -77,12 +77,15 @@ export class Tour extends EventTarget {
   /** The camera `time` seconds into the tour. */
   at(time) {
     const keys = this.keyframes.map((key) => [...key.eye, ...key.target, ...key.up, Math.log(key.fov)]);
-    const n = keys.length, legs = this.legs;
+    const n = keys.length,
+      legs = this.legs;
     let leg = 0;
     while (leg < legs.length - 1 && time > legs[leg]) time -= legs[leg++];
-    const h = legs[leg], t = Math.min(1, Math.max(0, time / h));
+    const h = legs[leg],
+      t = Math.min(1, Math.max(0, time / h));
     const rate = (i, name) => (keys[(i + 1) % n][name] - keys[i][name]) / legs[i];
-    const slope = (i, name) => { // at keyframe i: of the parabola through it and its neighbours
+    const slope = (i, name) => {
+      // at keyframe i: of the parabola through it and its neighbours
       const before = i ? i - 1 : this.closed ? n - 1 : -1;
       if (before < 0) return rate(0, name);
       if (i >= legs.length) return rate(before, name);

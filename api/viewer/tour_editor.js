@@ -13,11 +13,19 @@ function button(label, name, action, disabled = false) {
 }
 
 function row(tour, i, say) {
-  const {length} = tour.keyframes, name = `keyframe ${i + 1}`;
+  const {length} = tour.keyframes,
+    name = `keyframe ${i + 1}`;
   const item = document.createElement("li");
   const seconds = document.createElement("input");
-  Object.assign(seconds, {type: "number", min: 0.1, max: 3600, step: "any", value: tour.keyframes[i].seconds,
-    ariaLabel: `Seconds after ${name}`, disabled: i === length - 1});
+  Object.assign(seconds, {
+    type: "number",
+    min: 0.1,
+    max: 3600,
+    step: "any",
+    value: tour.keyframes[i].seconds,
+    ariaLabel: `Seconds after ${name}`,
+    disabled: i === length - 1,
+  });
   seconds.addEventListener("change", () => seconds.checkValidity() && tour.set(i, {seconds: Number(seconds.value)}));
   const act = (focus, action, text) => () => {
     action();
@@ -27,17 +35,35 @@ function row(tour, i, say) {
   };
   item.append(
     button(`${i + 1}`, `Go to ${name}`, () => tour.go(i)),
-    seconds, document.createTextNode("s"),
-    button("↑", `Move ${name} up`, act(i - 1, () => tour.shift(i, -1), `${name} moved up`), i === 0),
-    button("↓", `Move ${name} down`, act(i + 1, () => tour.shift(i, 1), `${name} moved down`), i === length - 1),
-    button("×", `Remove ${name}`, act(i, () => tour.remove(i), `${name} removed`)));
+    seconds,
+    document.createTextNode("s"),
+    button(
+      "↑",
+      `Move ${name} up`,
+      act(i - 1, () => tour.shift(i, -1), `${name} moved up`),
+      i === 0,
+    ),
+    button(
+      "↓",
+      `Move ${name} down`,
+      act(i + 1, () => tour.shift(i, 1), `${name} moved down`),
+      i === length - 1,
+    ),
+    button(
+      "×",
+      `Remove ${name}`,
+      act(i, () => tour.remove(i), `${name} removed`),
+    ),
+  );
   return item;
 }
 
 export function editTour(tour, say) {
   const show = () => {
     $("keyframes").replaceChildren(...tour.keyframes.map((_, i) => row(tour, i, say)));
-    $("length").textContent = tour.keyframes.length ? `${tour.keyframes.length} keyframes, ${tour.seconds.toFixed(1)} s` : "No keyframes yet.";
+    $("length").textContent = tour.keyframes.length
+      ? `${tour.keyframes.length} keyframes, ${tour.seconds.toFixed(1)} s`
+      : "No keyframes yet.";
     $("closed").checked = tour.closed;
     $("play").disabled = !tour.legs.length;
     $("download").disabled = !tour.keyframes.length;

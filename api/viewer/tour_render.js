@@ -7,8 +7,14 @@ const $ = (id) => document.getElementById(id);
 
 function tell(status) {
   const left = status.remaining_s > 0 ? `, ${Math.ceil(status.remaining_s)} s left` : "";
-  return {rendering: `${status.frames_done} of ${status.frames} frames${left}`, video: "Making the video",
-    done: `${status.frames} frames are ready`, failed: `Failed: ${status.error}`}[status.state] ?? status.state;
+  return (
+    {
+      rendering: `${status.frames_done} of ${status.frames} frames${left}`,
+      video: "Making the video",
+      done: `${status.frames} frames are ready`,
+      failed: `Failed: ${status.error}`,
+    }[status.state] ?? status.state
+  );
 }
 
 export function renderTours(tour, say) {
@@ -22,7 +28,10 @@ export function renderTours(tour, say) {
     $("far").textContent = tell(status);
     $("cancel").textContent = ended ? "Remove" : "Cancel";
     $("result").hidden = status.state !== "done";
-    $("result").onclick = () => download(status.video ?? status.zip, `${status.dataset}-tour.${status.video ? "mp4" : "zip"}`).catch((e) => say(e.message));
+    $("result").onclick = () =>
+      download(status.video ?? status.zip, `${status.dataset}-tour.${status.video ? "mp4" : "zip"}`).catch((e) =>
+        say(e.message),
+      );
     $("result").textContent = status.video ? "Save MP4" : "Save ZIP";
     return ended;
   };
@@ -43,7 +52,11 @@ export function renderTours(tour, say) {
     const settings = {layer, method, lod: Number(lod), supersample: Number(supersample), format: "jpeg"};
     const body = JSON.stringify({path: tour.document(), settings, video: $("video").value === "mp4"});
     try {
-      const reply = await ask(`${tour.stage.dataset.uri}/tours`, {method: "POST", body, headers: {"Content-Type": "application/json"}});
+      const reply = await ask(`${tour.stage.dataset.uri}/tours`, {
+        method: "POST",
+        body,
+        headers: {"Content-Type": "application/json"},
+      });
       const status = await reply.json();
       uri = status.uri;
       show(status);

@@ -14,8 +14,18 @@ import time
 
 BINARY = os.environ.get("CHROMIUM") or shutil.which("chromium")
 PATIENCE = 60  # seconds; a busy machine may be slow, a broken page never gets there
-KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Enter": 13, "Escape": 27, "Home": 36, "Tab": 9,
-        "+": 187, "-": 189}
+KEYS = {
+    "ArrowLeft": 37,
+    "ArrowUp": 38,
+    "ArrowRight": 39,
+    "ArrowDown": 40,
+    "Enter": 13,
+    "Escape": 27,
+    "Home": 36,
+    "Tab": 9,
+    "+": 187,
+    "-": 189,
+}
 
 
 class Browser:
@@ -28,12 +38,31 @@ class Browser:
             a, b = os.dup2(to_browser, 100), os.dup2(from_browser, 101)
             os.dup2(a, 3)
             os.dup2(b, 4)
+
         self.log = open(os.path.join(self.folder, "log"), "w")
         self.process = subprocess.Popen(
-            [BINARY, "--headless=new", "--remote-debugging-pipe", f"--user-data-dir={self.folder}", "--no-sandbox",
-             "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions", "--mute-audio",
-             "--disable-background-networking", "--disable-component-update", "--hide-scrollbars", "about:blank"],
-            stdout=self.log, stderr=self.log, preexec_fn=plumb, close_fds=False, start_new_session=True)
+            [
+                BINARY,
+                "--headless=new",
+                "--remote-debugging-pipe",
+                f"--user-data-dir={self.folder}",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--no-first-run",
+                "--disable-extensions",
+                "--mute-audio",
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--hide-scrollbars",
+                "about:blank",
+            ],
+            stdout=self.log,
+            stderr=self.log,
+            preexec_fn=plumb,
+            close_fds=False,
+            start_new_session=True,
+        )
         os.close(to_browser)
         os.close(from_browser)
         self.numbers, self.replies, self.listeners = itertools.count(1), {}, {}
@@ -79,7 +108,7 @@ class Browser:
 
 
 class Page:
-    """One tab of `size` CSS pixels. `complaints` collects errors of the console, exceptions and violations of policy."""
+    """One tab of `size` CSS pixels. `complaints`: errors of the console, exceptions and violations of policy."""
 
     def __init__(self, browser, url, size=(900, 600), phone=False, dark=False):
         self.browser, self.complaints = browser, []
@@ -89,8 +118,10 @@ class Page:
         for domain in ("Runtime", "Log", "Page"):
             self.send(f"{domain}.enable")
         self.resize(size, phone)
-        self.send("Emulation.setEmulatedMedia",
-                  features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.send(
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+        )
         self.go(url)
 
     def _hear(self, method, params):
@@ -109,8 +140,13 @@ class Page:
         self.send("Page.navigate", url=url)
 
     def resize(self, size, phone=False):
-        self.send("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=2 if phone else 1,
-                  mobile=phone)
+        self.send(
+            "Emulation.setDeviceMetricsOverride",
+            width=size[0],
+            height=size[1],
+            deviceScaleFactor=2 if phone else 1,
+            mobile=phone,
+        )
         self.send("Emulation.setTouchEmulationEnabled", enabled=phone)
 
     def run(self, script):
@@ -145,8 +181,10 @@ class Page:
 
     def press_on(self, selector):
         """A click on an element's middle."""
-        x, y = self.run(f"(e => {{ e.scrollIntoView({{block: 'center'}}); const b = e.getBoundingClientRect(); "
-                        f"return [b.x + b.width / 2, b.y + b.height / 2] }})(document.querySelector({json.dumps(selector)}))")
+        x, y = self.run(
+            f"(e => {{ e.scrollIntoView({{block: 'center'}}); const b = e.getBoundingClientRect(); "
+            f"return [b.x + b.width / 2, b.y + b.height / 2] }})(document.querySelector({json.dumps(selector)}))"
+        )
         self.click(x, y)
 
     def drag(self, a, b, button="left", steps=4, hold="true"):
@@ -161,8 +199,11 @@ class Page:
         """Fingers along `moves`, each a list of points, one a finger."""
         for i, points in enumerate([*moves, []]):
             kind = "touchStart" if i == 0 else "touchMove" if points else "touchEnd"
-            self.send("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y, "id": n} for n, (x, y) in
-                                                                         enumerate(points)])
+            self.send(
+                "Input.dispatchTouchEvent",
+                type=kind,
+                touchPoints=[{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)],
+            )
 
     def key(self, key, hold=0.0, shift=False):
         code = KEYS.get(key) or ord(key.upper())
@@ -173,8 +214,10 @@ class Page:
 
     def choose(self, selector, value):
         """Sets a control as a person would have."""
-        self.run(f"(e => {{ e.value = {json.dumps(value)}; e.dispatchEvent(new Event('change', {{bubbles: true}})) }})"
-                 f"(document.querySelector({json.dumps(selector)}))")
+        self.run(
+            f"(e => {{ e.value = {json.dumps(value)}; e.dispatchEvent(new Event('change', {{bubbles: true}})) }})"
+            f"(document.querySelector({json.dumps(selector)}))"
+        )
 
     def picture(self, file):
         with open(file, "wb") as out:

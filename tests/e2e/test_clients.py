@@ -25,8 +25,13 @@ def url(daemon):
 
 
 def shell(daemon, *arguments, code=0, folder=None, **environment):
-    done = subprocess.run([CLIENTS / "splatd.sh", *arguments], capture_output=True, timeout=120, cwd=folder,
-                          env={**os.environ, "SPLATD_URL": url(daemon) + "/", **environment})
+    done = subprocess.run(
+        [CLIENTS / "splatd.sh", *arguments],
+        capture_output=True,
+        timeout=120,
+        cwd=folder,
+        env={**os.environ, "SPLATD_URL": url(daemon) + "/", **environment},
+    )
     assert done.returncode == code, (arguments, done)
     return done.stdout, done.stderr.decode()
 
@@ -48,16 +53,21 @@ def test_python_views():
         assert math.dist(found["position"], [0, 0, 1]) < 0.01 and abs(found["distance"] - 3) < 0.01, found
         assert wall.pick(0, 0, **POSE, **SMALL)["position"] is None
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
-        assert all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes) and len(set(map(tuple, eyes))) == 4
+        assert (
+            all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes)
+            and len(set(map(tuple, eyes))) == 4
+        )
 
 
 def test_python_refusals():
     with Daemon(REAL) as d:
         service = Splatd(url(d))
-        for status, field, ask in [(400, "lod", lambda: service.dataset("wall").view(lod=-1)),
-                                   (404, "id", lambda: service.dataset("no such/thing")),
-                                   (400, "target", lambda: service.dataset("wall").view(eye=[0, 0, 1], target=[0, 0, 1])),
-                                   (400, "shade", lambda: service.dataset("wall").view(camera=dict(shade=1)))]:
+        for status, field, ask in [
+            (400, "lod", lambda: service.dataset("wall").view(lod=-1)),
+            (404, "id", lambda: service.dataset("no such/thing")),
+            (400, "target", lambda: service.dataset("wall").view(eye=[0, 0, 1], target=[0, 0, 1])),
+            (400, "shade", lambda: service.dataset("wall").view(camera=dict(shade=1))),
+        ]:
             try:
                 ask()
                 raise RuntimeError("nothing was refused")
@@ -67,8 +77,10 @@ def test_python_refusals():
 
 def test_a_busy_service_is_asked_again():
     with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=150) as d:
+
         def views(patience):
             return together(4, lambda i: Splatd(url(d), patience=patience).dataset("wall").view(lod=i, **SMALL))
+
         refused = [view for view in views(0) if isinstance(view, SplatdError)]
         assert refused and all(error.status == 503 for error in refused), refused
         found = views(120)
@@ -79,7 +91,9 @@ def test_a_busy_service_is_asked_again():
 def test_python_on_the_command_line():
     with Daemon(REAL) as d:
         command = [sys.executable, CLIENTS / "splatd.py", url(d), "wall"]
-        done = subprocess.run([*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=60)
+        done = subprocess.run(
+            [*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=60
+        )
         assert done.returncode == 0 and done.stdout.startswith(JPEG), done
         for arguments in (["lod=-1"], ["lod"]):
             done = subprocess.run([*command, *arguments], capture_output=True, timeout=60)
@@ -91,20 +105,28 @@ def test_shell():
         assert shell(d, "datasets")[0] == b"wall\n"
         assert json.loads(shell(d, "info", "wall")[0])["id"] == "wall"
         shell(d, "view", "wall", "a.jpg", "eye=3,0,1", "target=0,0,1", "width=64", "height=48", folder=folder)
-        assert pathlib.Path(folder, "a.jpg").read_bytes() == d.view(eye="3,0,1", target="0,0,1", width=64, height=48).body
+        assert (
+            pathlib.Path(folder, "a.jpg").read_bytes() == d.view(eye="3,0,1", target="0,0,1", width=64, height=48).body
+        )
         shell(d, "view", "wall", "a.png", "layer=depth", "width=64", "height=48", folder=folder)
         assert pathlib.Path(folder, "a.png").read_bytes().startswith(b"\x89PNG")
-        found = json.loads(shell(d, "pick", "wall", "32", "24", "eye=3,0,1", "target=0,0,1", "width=64", "height=48")[0])
+        found = json.loads(
+            shell(d, "pick", "wall", "32", "24", "eye=3,0,1", "target=0,0,1", "width=64", "height=48")[0]
+        )
         assert math.dist(found["position"], [0, 0, 1]) < 0.01
         shell(d, "ring", "wall", "views", "3", "2", "1", "target=0,0,1", "width=32", "height=24", folder=folder)
         views = [file.read_bytes() for file in sorted(pathlib.Path(folder, "views").iterdir())]
         assert len(views) == len(set(views)) == 3 and all(view.startswith(JPEG) for view in views)
-        for arguments, code, said in [((), 2, "splatd.sh view"), (("paint",), 2, "splatd.sh"), (("view", "wall"), 2, "splatd.sh"),
-                                      (("ring", "wall", "x", "3", "2", "1", "eye=0,0,1"), 2, "splatd.sh"),
-                                      (("info", "none"), 1, "404: there is no dataset 'none'"),
-                                      (("view", "wall", "b.jpg", "lod=-1"), 1, "400: "),
-                                      (("view", "wall", "b.jpg", "background=#12&lod=0"), 1, "background"),
-                                      (("ring", "none", "y", "3", "2", "1", "target=0,0,1"), 1, "404")]:
+        for arguments, code, said in [
+            ((), 2, "splatd.sh view"),
+            (("paint",), 2, "splatd.sh"),
+            (("view", "wall"), 2, "splatd.sh"),
+            (("ring", "wall", "x", "3", "2", "1", "eye=0,0,1"), 2, "splatd.sh"),
+            (("info", "none"), 1, "404: there is no dataset 'none'"),
+            (("view", "wall", "b.jpg", "lod=-1"), 1, "400: "),
+            (("view", "wall", "b.jpg", "background=#12&lod=0"), 1, "background"),
+            (("ring", "none", "y", "3", "2", "1", "target=0,0,1"), 1, "404"),
+        ]:
             out, err = shell(d, *arguments, code=code, folder=folder)
             assert not out and said in err, (arguments, err)
         assert not pathlib.Path(folder, "b.jpg").exists() and not list(pathlib.Path(folder).glob("*.part"))
@@ -132,8 +154,19 @@ def test_the_examples_of_the_readme():
     [program] = re.findall(r"```python\n(.*?)```", text, re.S)
     assert program.count("\n") < 15
     with Daemon(REAL) as d, tempfile.TemporaryDirectory() as folder:
-        program = program.replace("http://127.0.0.1:8080", url(d)).replace('"hall"', '"wall"').replace("1280", "64").replace("720", "48")
-        subprocess.run([sys.executable, "-c", program], check=True, cwd=folder, timeout=120, env={**os.environ, "PYTHONPATH": str(CLIENTS)})
+        program = (
+            program.replace("http://127.0.0.1:8080", url(d))
+            .replace('"hall"', '"wall"')
+            .replace("1280", "64")
+            .replace("720", "48")
+        )
+        subprocess.run(
+            [sys.executable, "-c", program],
+            check=True,
+            cwd=folder,
+            timeout=120,
+            env={**os.environ, "PYTHONPATH": str(CLIENTS)},
+        )
         views = {file.read_bytes() for file in pathlib.Path(folder).glob("view*.jpg")}
         assert len(views) == 36 and all(view.startswith(JPEG) for view in views)
         for address in re.findall(r'src="http://127\.0\.0\.1:8080(/[^"#]*)', text):

@@ -7,9 +7,14 @@ import re
 from harness import FAKE, Daemon, run
 
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
-TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
-         ".js": "text/javascript; charset=utf-8", ".py": "text/x-python; charset=utf-8",
-         ".sh": "text/x-shellscript; charset=utf-8"}
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".js": "text/javascript; charset=utf-8",
+    ".py": "text/x-python; charset=utf-8",
+    ".sh": "text/x-shellscript; charset=utf-8",
+}
 BROWSER = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"}
 
 
@@ -23,11 +28,20 @@ def files():
 def test_html_is_for_those_who_ask_for_it():
     with Daemon(FAKE) as d:
         for accept, kind in [
-            (BROWSER["Accept"], "text/html"), ("text/html", "text/html"), ("TEXT/HTML;level=1", "text/html"),
-            ("application/json, text/html", "text/html"), ("application/json;q=0.5,text/html ; q=0.6", "text/html"),
-            (None, "application/json"), ("*/*", "application/json"), ("application/json", "application/json"), ("", "application/json"),
-            ("text/html;q=0.1, application/json", "application/json"), ("text/html;q=0", "application/json"),
-            ("text/html;seq=0, application/json;q=0.5", "text/html"), ("text/htmlish, text/*", "application/json"), (";;,,q=1", "application/json"),
+            (BROWSER["Accept"], "text/html"),
+            ("text/html", "text/html"),
+            ("TEXT/HTML;level=1", "text/html"),
+            ("application/json, text/html", "text/html"),
+            ("application/json;q=0.5,text/html ; q=0.6", "text/html"),
+            (None, "application/json"),
+            ("*/*", "application/json"),
+            ("application/json", "application/json"),
+            ("", "application/json"),
+            ("text/html;q=0.1, application/json", "application/json"),
+            ("text/html;q=0", "application/json"),
+            ("text/html;seq=0, application/json;q=0.5", "text/html"),
+            ("text/htmlish, text/*", "application/json"),
+            (";;,,q=1", "application/json"),
         ]:
             reply = d.ask("/", headers={} if accept is None else {"Accept": accept})
             assert reply.status == 200 and reply.headers["Content-Type"].split(";")[0] == kind, (accept, reply.headers)
@@ -67,9 +81,20 @@ def test_a_file_that_is_held_is_not_sent_again():
 
 def test_no_other_name_reaches_anything():
     with Daemon(FAKE) as d:
-        for name in ["/viewer/", "/viewer/none.js", "/viewer/main.js/", "/viewer/..%2fclients%2fsplatd.py", "/clients/main.js",
-                     "/viewer/%2e%2e%2f%2e%2e%2fREADME.md", "/viewer/main.js%00", "/clients/", "/clients/../viewer/main.js",
-                     "/embed/", "/embed/a/b", "/viewer/viewer/main.js"]:
+        for name in [
+            "/viewer/",
+            "/viewer/none.js",
+            "/viewer/main.js/",
+            "/viewer/..%2fclients%2fsplatd.py",
+            "/clients/main.js",
+            "/viewer/%2e%2e%2f%2e%2e%2fREADME.md",
+            "/viewer/main.js%00",
+            "/clients/",
+            "/clients/../viewer/main.js",
+            "/embed/",
+            "/embed/a/b",
+            "/viewer/viewer/main.js",
+        ]:
             assert 400 <= d.ask(name).status < 500, name
         for name in ("/", "/viewer/main.js", "/embed/wall", "/clients/splatd.py"):
             assert d.ask(name + "?x=1").status == 400 and d.ask(name, "POST", b"").status == 405
@@ -77,7 +102,12 @@ def test_no_other_name_reaches_anything():
 
 def test_what_the_page_may_do():
     with Daemon(FAKE) as d:
-        for name, frames in [("/", "'none'"), ("/embed/wall", "*"), ("/embed/none", "*"), ("/viewer/embed.html", "'none'")]:
+        for name, frames in [
+            ("/", "'none'"),
+            ("/embed/wall", "*"),
+            ("/embed/none", "*"),
+            ("/viewer/embed.html", "'none'"),
+        ]:
             reply = d.ask(name, headers=BROWSER)
             policy = dict(part.strip().split(" ", 1) for part in reply.headers["Content-Security-Policy"].split(";"))
             assert policy["default-src"] == "'none'" and policy["script-src"] == "'self'", policy
@@ -91,7 +121,9 @@ def test_files_name_only_files_that_are_there():
             if file.suffix not in (".html", ".js", ".css"):
                 continue
             text = file.read_text(encoding="utf-8")
-            named = re.findall(r'(?:src|href)="(/[^"]*)"', text) + [f"/viewer/{n}" for n in re.findall(r'from "\./([^"]*)"', text)]
+            named = re.findall(r'(?:src|href)="(/[^"]*)"', text) + [
+                f"/viewer/{n}" for n in re.findall(r'from "\./([^"]*)"', text)
+            ]
             for other in named:
                 assert d.ask(other).status == 200, f"{name} names {other}"
             assert file.suffix == ".js" or "http://" not in text.replace("http://www.w3.org", ""), name
