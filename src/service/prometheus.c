@@ -112,6 +112,11 @@ char *spl_prometheus_print(struct spl_service *service)
     gauge(out, "splatd_connections", "Connections of the main listener.", (double)service->connections_open);
     gauge(out, "splatd_requests_open", "Requests that are being read, worked on or answered.",
           (double)service->requests_open);
+    struct spl_cache_status cache = {0};
+    if (service->cache) // there is none before the datasets are open
+        spl_cache_get_status(service->cache, &cache);
+    gauge(out, "splatd_cache_bytes", "Encoded replies that are kept.", (double)cache.bytes);
+    gauge(out, "splatd_cache_entries", "How many they are.", (double)cache.entries);
     gauge(out, "splatd_reply_memory_bytes", "Images that clients have not read yet.", (double)service->reply_bytes);
     print_pipeline(out, service);
     print_process(out, service);

@@ -1,6 +1,6 @@
 """The figures of RESULTS.md, one subcommand each, on the scan of a vault (11.6 M points) that lies beside the checkout.
 
-usage: measure.py frames|scaling|http|pack|size|planner|tours [FRAMES]
+usage: measure.py frames|scaling|http|views|pack|size|planner|tours [FRAMES]
 
 Prints what was measured and, where a figure has a bound, how it stands to it; exit 1 beyond a bound, 77 without the data.
 Frame times are bounded in units of the calibrator that 'splatd bench' runs beside each frame, so a slow or busy machine
@@ -21,6 +21,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 SPLATD = os.environ["SPLATD_BINARY"]
@@ -174,7 +175,8 @@ def view_query(share):
 def serve():
     dataset, port, count = packed(scan(), "grenoble"), free_port(), 20
     begin = time.monotonic()
-    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", dataset], stderr=subprocess.DEVNULL)
+    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", "", "--cache", "0", dataset],
+                              stderr=subprocess.DEVNULL)
     try:
         while True:
             try:
@@ -203,6 +205,111 @@ def serve():
     print(f"GET to last byte {statistics.median(total):.1f} ms, frame {statistics.median(rendered):.1f} ms; "
           + ", ".join(f"{k} {statistics.median(v):.1f}" for k, v in stages.items()))
     bound("GET above the frame, median", statistics.median(above), 15, "ms")
+
+
+def status_of(port):
+    return json.loads(get(port, "/v1/status")[2])
+
+
+def wrk(port, path, *headers):
+    """Requests a second over 16 connections that stay, median of three times 5 s."""
+    rates = []
+    for _ in range(3):
+        command = ["wrk", "-t", "1", "-c", "16", "-d", "5s", *headers, f"http://127.0.0.1:{port}{path}"]
+        said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+        if "Non-2xx" in said or "Socket errors" in said:
+            sys.exit(f"wrk {path}: {said}")
+        rates.append(float(re.search(r"Requests/sec:\s+([\d.]+)", said)[1]))
+    return statistics.median(rates)
+
+
+def saturate(port, clients, count):
+    """How much of the time the device renders while that many clients wait."""
+    views, frames, lock = iter(range(count)), [], threading.Lock()
+
+    def work():
+        while True:
+            with lock:
+                i = next(views, None)
+            if i is None:
+                return
+            status, headers, _, _ = get(port, f"{view_query(i / count)}&margin=1.000001")
+            if status != 200:
+                sys.exit(f"a view failed with {status}")
+            frames.append(float(re.search(r"frame;dur=([\d.]+)", headers["Server-Timing"])[1]))
+    begin, threads = time.monotonic(), [threading.Thread(target=work) for _ in range(clients)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    seconds = time.monotonic() - begin
+    print(f"{count} views of 1280x720 for {clients} clients in {seconds:.1f} s; frames take {statistics.mean(frames):.0f} ms")
+    bound("the device idles while requests wait", 100 * (1 - sum(frames) / 1e3 / seconds), 5, "%")
+
+
+def overload(port, seconds):
+    """Views that no cache holds at four times the rate that they are made at."""
+    small = view_query(0.3).replace("width=1280&height=720", "width=640&height=360")
+    fresh = (f"{small}&margin={1 + n * 1e-6:.6f}" for n in range(1, 1000000))
+    alone = []
+    for _ in range(20):
+        begin = time.monotonic()
+        if get(port, next(fresh))[0] != 200:
+            sys.exit("a view failed without load")
+        alone.append(time.monotonic() - begin)
+    gap, replies, threads = statistics.median(alone) / 4, [], []
+
+    def ask(path):
+        try:
+            status, headers, _, ms = get(port, path)
+            timing = re.search(r"frame;dur=([\d.]+)", headers.get("Server-Timing", ""))
+            replies.append((status, headers.get("Retry-After"), ms, timing and float(timing[1])))
+        except OSError as fault:
+            replies.append((0, str(fault), 0, None))
+    before, begin, asked = status_of(port)["memory"]["resident_bytes"], time.monotonic(), 0
+    while time.monotonic() - begin < seconds:
+        threads.append(threading.Thread(target=ask, args=(next(fresh),)))
+        threads[-1].start()
+        asked += 1
+        time.sleep(max(0, begin + asked * gap - time.monotonic()))
+    for thread in threads:
+        thread.join()
+    after = status_of(port)
+    good = sorted(ms for status, _, ms, _ in replies if status == 200)
+    other = [r for r in replies if r[0] != 200 and not (r[0] == 503 and r[1])]
+    frame = statistics.mean(ms for *_, ms in replies if ms)  # the queue is as long as its frames together
+    queue = after["queues"]["render"]["capacity"]
+    print(f"{asked} requests in {seconds} s, 4 times what a view alone allows ({1e3 * statistics.median(alone):.0f} ms): "
+          f"{len(good)} times 200, {len(replies) - len(good)} times 503; frame under load {frame:.0f} ms; resident "
+          f"{before >> 20} MiB before, {after['memory']['resident_bytes'] >> 20} after")
+    bound("neither 200 nor 503 with Retry-After", len(other), 0, f"replies {other[:3]}")
+    bound("p99 of the 200s", good[int(0.99 * len(good))] / frame, queue + 2, "frame times")
+    bound("memory grown under overload", (after["memory"]["resident_bytes"] - before) / 2**20, 32, "MiB")
+
+
+def views():
+    """What is not rendered: hits, 304s, and refusals under overload."""
+    dataset, port = packed(scan(), "grenoble"), free_port()
+    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", "", "--quiet", dataset])
+    try:
+        while True:
+            try:
+                status, headers, body, _ = get(port, view_query(0))
+                break
+            except OSError:
+                time.sleep(0.05)
+        small = view_query(0).replace("width=1280&height=720", "width=320&height=180")
+        size = len(get(port, small)[2])
+        print(f"a view of 1280x720 has {len(body)} bytes, one of 320x180 {size}")
+        for what, rate, least in (
+                ("304s", wrk(port, view_query(0), "-H", f"If-None-Match: {headers['ETag']}"), 20000),
+                ("hits of 320x180", wrk(port, small), 15000), ("hits of 1280x720", wrk(port, view_query(0)), 15000)):
+            bound(f"{what}: {rate:.0f}/s, milliseconds a thousand", 1e6 / rate, 1e6 / least, "ms")
+        saturate(port, 4, 60)
+        overload(port, 60)
+    finally:
+        daemon.send_signal(signal.SIGTERM)
+        daemon.wait(60)
 
 
 def pack():
@@ -443,7 +550,7 @@ def tours():
 
 
 if __name__ == "__main__":
-    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner,
+    figures = {"frames": frames, "scaling": scaling, "http": serve, "views": views, "pack": pack, "size": size, "planner": planner,
                "tours": tours}
     if not 2 <= len(sys.argv) <= (3 if sys.argv[1:2] == ["tours"] else 2) or sys.argv[1] not in figures:
         sys.exit(__doc__)

@@ -93,25 +93,25 @@ def test_a_part_that_fails_is_a_problem_in_its_place():
 
 
 def test_others_get_between():
-    with Daemon(FAKE, FAKE_FRAME_MS=60) as d:
+    with Daemon(FAKE, FAKE_FRAME_MS=40) as d:
         done = []
-        batch = threading.Thread(target=lambda: done.append(d.post(views(40), BATCH)))
+        batch = threading.Thread(target=lambda: done.append(d.post(views(25), BATCH)))
         batch.start()
         eventually(lambda: d.status()["counters"]["frames"] >= 1)
-        for _ in range(4):
+        for _ in range(3):
             before = d.status()["counters"]["frames"]
             assert d.ask(fresh(SMALL)).status == 200
             assert d.status()["counters"]["frames"] - before <= 6 or done, "a view waited for the batch"
         batch.join()
-        assert done[0].status == 200 and len(list(parts(done[0]))) == 40
-        assert d.status()["counters"]["frames"] == 44
+        assert done[0].status == 200 and len(list(parts(done[0]))) == 25
+        assert d.status()["counters"]["frames"] == 28
 
 
 def test_a_batch_is_larger_than_the_queue():
     with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=10) as d:
         reply = d.post(views(12), BATCH)
         assert reply.status == 200 and reply.headers["Splatd-Failed"] == "0"
-    with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=1500) as d:
+    with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=1000) as d:
         busy = [threading.Thread(target=lambda: d.ask(fresh(SMALL))) for _ in range(2)]
         busy[0].start()
         eventually(lambda: d.status()["counters"]["cache_misses"] == 1 and not d.status()["queues"]["render"]["length"])
@@ -140,7 +140,7 @@ def test_a_batch_whose_client_left_is_given_up():
 def test_sigterm_finishes_a_batch():
     d = Daemon(FAKE, FAKE_FRAME_MS=100)
     replies = []
-    asking = threading.Thread(target=lambda: replies.append(d.post(views(10), BATCH)))
+    asking = threading.Thread(target=lambda: replies.append(d.post(views(6), BATCH)))
     asking.start()
     eventually(lambda: d.status()["counters"]["frames"] >= 1)
     assert d.stop() == 0

@@ -116,6 +116,9 @@ def test_the_cache_answers_gets_and_posts():
         assert status["counters"]["frames"] == 1 and status["cache"]["entries"] == 1
         assert len(first.body) < status["cache"]["bytes"] < len(first.body) + 4096
         assert status["memory"]["reply_bytes"] == 0
+        metrics = d.ops("/metrics").body.decode()
+        for name, value in (("cache_bytes", status["cache"]["bytes"]), ("cache_entries", 1), ("cache_hits_total", 2)):
+            assert f"\nsplatd_{name} {value}\n" in metrics, name
 
 
 def test_the_cache_keeps_to_its_limit():
@@ -164,7 +167,7 @@ def test_equal_requests_on_their_way_are_one_frame():
 
 
 def test_who_leaves_takes_nobody_along():
-    with Daemon(FAKE, FAKE_FRAME_MS=800) as d:
+    with Daemon(FAKE, FAKE_FRAME_MS=500) as d:
         for leaver in (0, 1):  # the one who asked first, one who joined
             path, replies = fresh(SMALL), []
             frames, left = d.status()["counters"]["frames"], d.status()["counters"]["clients_left"]
