@@ -1,6 +1,9 @@
-/* Opening a packed dataset: the file is mapped read-only, then checked from the outside in (sections.c, meta.c,
+/* Opening a packed dataset: what describes it is read into memory and checked from the outside in (sections.c, meta.c,
  * structure.c) before anyone else sees it. After that nothing changes, so every accessor runs on any thread. What is
- * trusted without a look is only the pages' codes, and any code decodes to finite numbers. */
+ * trusted without a look is only the pages' codes, and any code decodes to finite numbers.
+ *
+ * Pages are read from the file when they are wanted, with their checksum, so that a file which is cut or overwritten in
+ * place while it is served is an error of that page and never a SIGBUS; only spl_dataset_get_page() looks through a map. */
 #include "dataset/dataset.h"
 
 #include <errno.h>
@@ -11,6 +14,8 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include <xxhash.h>
 
 #include "base/memory.h"
 #include "dataset/open.h"
@@ -57,7 +62,7 @@ static int map_file(struct spl_dataset *dataset, struct spl_error *err)
             dataset->info.file_bytes = dataset->map_bytes;
         }
     }
-    close(fd);
+    dataset->fd = fd;
     return rc;
 }
 
@@ -68,6 +73,7 @@ int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, st
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
+    dataset->fd = -1;
     dataset->path = spl_alloc_raw(strlen(path) + 1, 1, err);
     if (!dataset->path)
         goto done;
@@ -95,7 +101,13 @@ void spl_dataset_close(struct spl_dataset *dataset)
         return;
     if (dataset->map)
         munmap((void *)dataset->map, dataset->map_bytes);
+    if (dataset->fd >= 0)
+        close(dataset->fd);
     json_decref(dataset->meta);
+    free(dataset->meta_text);
+    free(dataset->nodes);
+    free(dataset->chunks);
+    free(dataset->sections);
     free(dataset->pages);
     free(dataset->path);
     free(dataset);
@@ -121,6 +133,66 @@ const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
 {
     return dataset->meta;
+}
+
+/* Errors of pages reach clients, whom the path is no business of. */
+static const char *name_of(const struct spl_dataset *dataset)
+{
+    return dataset->info.id[0] ? dataset->info.id : dataset->path;
+}
+
+int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
+{
+    for (char *to = out; bytes;) {
+        ssize_t got = pread(dataset->fd, to, bytes, (off_t)offset);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return spl_fail_errno(err, errno, "cannot read %s", name_of(dataset));
+        if (!got)
+            return spl_fail(err, SPL_E_CORRUPT,
+                            "%s was cut short while in use; put the dataset back under another name and rename it",
+                            name_of(dataset));
+        to += got;
+        offset += (uint64_t)got;
+        bytes -= (size_t)got;
+    }
+    return SPL_OK;
+}
+
+int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
+                             struct spl_error *err)
+{
+    enum { block = 1 << 20 };
+    void *buffer = spl_alloc_raw(block, 1, err);
+    XXH3_state_t *state = buffer ? XXH3_createState() : NULL;
+    int rc = state ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory for checksums");
+    if (state)
+        XXH3_64bits_reset(state);
+    for (uint64_t done = 0; !rc && done < section->bytes;) {
+        size_t bytes = section->bytes - done < block ? (size_t)(section->bytes - done) : block;
+        if ((rc = spl_dataset_read(dataset, section->offset + done, buffer, bytes, err)))
+            break;
+        XXH3_64bits_update(state, buffer, bytes);
+        done += bytes;
+    }
+    if (!rc)
+        *hash = XXH3_64bits_digest(state);
+    XXH3_freeState(state);
+    free(buffer);
+    return rc;
+}
+
+int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err)
+{
+    spl_assert(index < dataset->info.pages);
+    const struct spl_section *page = dataset->pages[index];
+    int rc = spl_dataset_read(dataset, page->offset, out, page->bytes, err);
+    if (!rc && dataset->verified && XXH3_64bits(out, page->bytes) != page->hash)
+        rc = spl_fail(err, SPL_E_CORRUPT,
+                      "%s: page %u was overwritten while in use; put the dataset back under another name and rename it",
+                      name_of(dataset), index);
+    return rc;
 }
 
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes)

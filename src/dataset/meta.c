@@ -104,7 +104,7 @@ int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
     const struct spl_section *section = dataset->meta_section;
     json_error_t where;
     dataset->meta =
-        json_loadb((const char *)dataset->map + section->offset, section->bytes, JSON_REJECT_DUPLICATES, &where);
+        json_loadb(dataset->meta_text, section->bytes, JSON_REJECT_DUPLICATES, &where);
     if (!dataset->meta)
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object: %s at byte %d; pack the dataset again",
                         dataset->path, where.text, where.position);

@@ -13,16 +13,27 @@
 struct spl_dataset {
     struct spl_dataset_info info;
     char *path;
-    const uint8_t *map;              /* the whole file */
+    int fd;             /* -1 = none */
+    const uint8_t *map; /* the whole file; only for spl_dataset_get_page() */
     size_t map_bytes;
-    const struct spl_section *sections; /* in the map */
+    bool verified; /* every page had its checksum when the dataset was opened */
+    struct spl_section *sections;
     uint32_t section_count;
-    const struct spl_section *meta_section;
+    const struct spl_section *meta_section, *node_section, *chunk_section;
+    char *meta_text;
     const struct spl_section **pages; /* by index; info.pages of them */
-    const struct spl_node *nodes;
-    const struct spl_chunk *chunks;
+    struct spl_node *nodes;
+    struct spl_chunk *chunks;
     json_t *meta;
 };
+
+/* Reads bytes of the file; SPL_E_CORRUPT when it has become shorter. Any thread. */
+int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,
+                     struct spl_error *err);
+
+/* XXH3 of a section as it is in the file now, read block by block. Any thread. */
+int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
+                             struct spl_error *err);
 
 /* Header, section table, extents and checksums; fills everything up to `chunks` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);

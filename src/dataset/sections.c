@@ -1,9 +1,10 @@
 /* Opening, first stage: header, section table, where sections lie, and their checksums. Every size and offset is
  * compared with the file's real length before it is used; sums cannot wrap because each term is bounded by it. The
- * small sections' checksums are always checked, the pages' when asked for, on all cores. Pure reading of the map; the
- * opener's thread. */
+ * small sections' checksums are always checked, the pages' when asked for, on all cores. What is checked is the copy in
+ * memory that is used afterwards; pages are read in passing. The opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <xxhash.h>
@@ -36,18 +37,18 @@ static const char *section_name(const struct spl_section *section, char text[40]
 }
 
 /* Files of other kinds are common mistakes; name the kind where the first bytes tell it. */
-static int not_a_dataset(const struct spl_dataset *dataset, struct spl_error *err)
+static int not_a_dataset(const struct spl_dataset *dataset, const char first[8], struct spl_error *err)
 {
     static const struct {
         const char *start, *kind;
     } kinds[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (dataset->map_bytes > strlen(kinds[i].start) &&
-            !memcmp(dataset->map, kinds[i].start, strlen(kinds[i].start)))
+            !memcmp(first, kinds[i].start, strlen(kinds[i].start)))
             return spl_fail(err, SPL_E_INPUT, "%s is %s, not a packed dataset; 'splatd pack %s -o NAME.spld' makes one",
                             dataset->path, kinds[i].kind, dataset->path);
     size_t letters = dataset->map_bytes < 4 ? dataset->map_bytes : 4;
-    if (dataset->map_bytes >= 8 && !memcmp(dataset->map, SPL_FILE_MAGIC, letters))
+    if (dataset->map_bytes >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
     return spl_fail(err, SPL_E_INPUT,
                     "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->path);
@@ -55,13 +56,17 @@ static int not_a_dataset(const struct spl_dataset *dataset, struct spl_error *er
 
 static int read_header(struct spl_dataset *dataset, struct spl_file_header *header, struct spl_error *err)
 {
-    size_t shown = dataset->map_bytes < sizeof header->magic ? dataset->map_bytes : sizeof header->magic;
-    if (memcmp(dataset->map, SPL_FILE_MAGIC, shown))
-        return not_a_dataset(dataset, err);
+    size_t bytes = dataset->map_bytes < sizeof *header ? dataset->map_bytes : sizeof *header;
+    size_t shown = bytes < sizeof header->magic ? bytes : sizeof header->magic;
+    memset(header, 0, sizeof *header);
+    int rc = spl_dataset_read(dataset, 0, header, bytes, err);
+    if (rc)
+        return rc;
+    if (memcmp(header, SPL_FILE_MAGIC, shown))
+        return not_a_dataset(dataset, (const char *)header, err);
     if (dataset->map_bytes < sizeof *header)
         return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %zu of the header's %zu bytes are missing", dataset->path,
                         sizeof *header - dataset->map_bytes, sizeof *header);
-    memcpy(header, dataset->map, sizeof *header);
     if (header->version != SPL_FILE_VERSION)
         return spl_fail(err, SPL_E_UNSUPPORTED,
                         "%s: header says format version %u, this splatd reads version %u; pack the scan again with it",
@@ -86,9 +91,13 @@ static int read_table(struct spl_dataset *dataset, const struct spl_file_header 
     if (offset < sizeof *header || offset % table_alignment || offset > dataset->map_bytes ||
         bytes > dataset->map_bytes - offset)
         return corrupt(dataset, err, "section table", "lies outside the file");
-    if (header->table_hash != XXH3_64bits(dataset->map + offset, bytes))
+    if (!(dataset->sections = spl_alloc_raw(header->section_count, sizeof *dataset->sections, err)))
+        return SPL_E_NOMEM;
+    int rc = spl_dataset_read(dataset, offset, dataset->sections, bytes, err);
+    if (rc)
+        return rc;
+    if (header->table_hash != XXH3_64bits(dataset->sections, bytes))
         return corrupt(dataset, err, "section table", "fails its checksum");
-    dataset->sections = (const struct spl_section *)(const void *)(dataset->map + offset);
     dataset->section_count = header->section_count;
     dataset->info.version = header->table_hash;
     return SPL_OK;
@@ -113,10 +122,21 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
     return SPL_OK;
 }
 
+/* A section as it is in the file, malloc'd; NULL and `err` when it cannot be read. */
+static void *copy_section(const struct spl_dataset *dataset, const struct spl_section *section, struct spl_error *err)
+{
+    void *copy = spl_alloc_raw(section->bytes, 1, err);
+    if (copy && spl_dataset_read(dataset, section->offset, copy, section->bytes, err)) {
+        free(copy);
+        return NULL;
+    }
+    return copy;
+}
+
 /* Notes where each section lies; unknown types are left for later versions. */
 static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const struct spl_section *nodes = NULL, *chunks = NULL;
+    const struct spl_section *nodes, *chunks;
     char name[40];
     dataset->pages = spl_alloc(dataset->section_count, sizeof *dataset->pages, err);
     if (!dataset->pages)
@@ -133,8 +153,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
             continue;
         }
         place = s->type == SPL_SECTION_META     ? &dataset->meta_section
-                : s->type == SPL_SECTION_NODES  ? &nodes
-                : s->type == SPL_SECTION_CHUNKS ? &chunks
+                : s->type == SPL_SECTION_NODES  ? &dataset->node_section
+                : s->type == SPL_SECTION_CHUNKS ? &dataset->chunk_section
                                                 : NULL;
         if (!place)
             continue;
@@ -142,6 +162,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
             return corrupt(dataset, err, section_name(s, name), "occurs twice");
         *place = s;
     }
+    nodes = dataset->node_section;
+    chunks = dataset->chunk_section;
     if (!dataset->meta_section || !nodes || !chunks || !dataset->info.pages)
         return corrupt(dataset, err, "section table",
                        !dataset->meta_section ? "lists no section META"
@@ -155,18 +177,43 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
     if (!chunks->bytes || chunks->bytes % sizeof(struct spl_chunk) ||
         chunks->bytes / sizeof(struct spl_chunk) > UINT32_MAX)
         return corrupt(dataset, err, "section CHNK", "is not a whole number of chunks");
-    dataset->nodes = (const struct spl_node *)(const void *)(dataset->map + nodes->offset);
     dataset->info.nodes = (uint32_t)(nodes->bytes / sizeof(struct spl_node));
-    dataset->chunks = (const struct spl_chunk *)(const void *)(dataset->map + chunks->offset);
     dataset->info.chunks = (uint32_t)(chunks->bytes / sizeof(struct spl_chunk));
     return SPL_OK;
+}
+
+/* Everything but the pages into memory. */
+static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    if ((dataset->meta_text = copy_section(dataset, dataset->meta_section, &why)) &&
+        (dataset->nodes = copy_section(dataset, dataset->node_section, &why)) &&
+        (dataset->chunks = copy_section(dataset, dataset->chunk_section, &why)))
+        return SPL_OK;
+    return spl_fail(err, why.code, "%s", why.message);
 }
 
 struct hashing {
     const struct spl_dataset *dataset;
     bool verify;
     _Atomic uint32_t failed; /* least index of a section whose checksum fails */
+    _Atomic int code;        /* of a section that cannot be read for another reason */
 };
+
+static int check_section(const struct spl_dataset *dataset, const struct spl_section *section, bool verify)
+{
+    const void *copy = section == dataset->meta_section    ? (const void *)dataset->meta_text
+                       : section == dataset->node_section  ? (const void *)dataset->nodes
+                       : section == dataset->chunk_section ? (const void *)dataset->chunks
+                                                           : NULL;
+    uint64_t hash = section->hash;
+    int rc = SPL_OK;
+    if (copy)
+        hash = XXH3_64bits(copy, section->bytes);
+    else if (verify)
+        rc = spl_dataset_hash_section(dataset, section, &hash, NULL);
+    return rc ? rc : hash == section->hash ? SPL_OK : SPL_E_CORRUPT;
+}
 
 static void hash_sections(void *context, size_t begin, size_t end, unsigned worker)
 {
@@ -174,9 +221,11 @@ static void hash_sections(void *context, size_t begin, size_t end, unsigned work
     struct hashing *hashing = context;
     for (size_t i = begin; i < end; i++) {
         const struct spl_section *s = &hashing->dataset->sections[i];
-        bool small = s->type == SPL_SECTION_META || s->type == SPL_SECTION_NODES || s->type == SPL_SECTION_CHUNKS;
-        if ((!small && !hashing->verify) || XXH3_64bits(hashing->dataset->map + s->offset, s->bytes) == s->hash)
+        int rc = check_section(hashing->dataset, s, hashing->verify);
+        if (!rc)
             continue;
+        if (rc != SPL_E_CORRUPT)
+            atomic_store(&hashing->code, rc);
         uint32_t least = atomic_load(&hashing->failed);
         while (i < least && !atomic_compare_exchange_weak(&hashing->failed, &least, (uint32_t)i))
             ;
@@ -193,12 +242,18 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
         rc = check_extents(dataset, &header, err);
     if (!rc)
         rc = find_sections(dataset, err);
+    if (!rc)
+        rc = copy_small_sections(dataset, err);
     if (rc)
         return rc;
     struct hashing hashing = {.dataset = dataset, .verify = verify, .failed = UINT32_MAX};
     spl_parallel_for(verify ? 0 : 1, dataset->section_count, 1, hash_sections, &hashing);
     char name[40];
+    if (hashing.code)
+        return spl_fail(err, hashing.code, "%s cannot be read for its checksums: %s", dataset->path,
+                        spl_code_get_info(hashing.code)->name);
     if (hashing.failed != UINT32_MAX)
         return corrupt(dataset, err, section_name(&dataset->sections[hashing.failed], name), "fails its checksum");
+    dataset->verified = verify;
     return SPL_OK;
 }

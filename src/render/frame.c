@@ -84,15 +84,18 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         .context = job,
     };
     spl_residency_begin_frame(&r->residency);
-    int rc = spl_select(&params, &r->list, err);
+    struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
+    int rc = spl_select(&params, &r->list, &why);
     if (job->page_error.code)
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    if (rc)
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
-    if (!rc && !tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
+    if (!tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
                               "at lod %g up to %llu splats would blend in one pixel; raise lod", job->view->lod,
                               (unsigned long long)r->list.sample_splats);
-    return rc;
+    return SPL_OK;
 }
 
 /* Records every group and layer of the view; the n-th requested layer starts at word n * pixels. */

@@ -1,5 +1,5 @@
 /* Pages on the device; see residency.h. A software device draws from host-visible memory, so its pages are filled by one
- * copy out of the mapped file; a GPU's go through a staging buffer. */
+ * read of the file; a GPU's go through a staging buffer. */
 #include "render/residency.h"
 
 #include <stdlib.h>
@@ -112,8 +112,8 @@ int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buff
     }
 }
 
-static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_buffer *target, const void *from,
-                                size_t bytes, struct spl_error *err)
+static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_buffer *target,
+                                const struct spl_dataset *dataset, uint32_t page, size_t bytes, struct spl_error *err)
 {
     if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) < bytes) {
         spl_gpu_buffer_destroy(residency->gpu, residency->staging);
@@ -124,9 +124,9 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
                  : spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
     if (rc)
         return rc;
-    memcpy(spl_gpu_buffer_map(residency->staging), from, bytes);
     uint64_t ticket;
-    rc = spl_gpu_begin(residency->gpu, err);
+    if (!(rc = spl_dataset_read_page(dataset, page, spl_gpu_buffer_map(residency->staging), err)))
+        rc = spl_gpu_begin(residency->gpu, err);
     if (rc)
         return rc;
     spl_gpu_copy(residency->gpu, residency->staging, 0, target, 0, bytes);
@@ -168,16 +168,16 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     if (slot->buffer)
         return SPL_OK;
     size_t bytes;
-    const uint32_t *words = spl_dataset_get_page(resident->dataset, page, &bytes);
+    spl_dataset_get_page(resident->dataset, page, &bytes);
     bool software = spl_gpu_get_device(residency->gpu)->software;
     int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE,
                                        bytes_of(resident, page), &slot->buffer, err);
     if (rc)
         return rc;
     if (software)
-        memcpy(spl_gpu_buffer_map(slot->buffer), words, bytes);
+        rc = spl_dataset_read_page(resident->dataset, page, spl_gpu_buffer_map(slot->buffer), err);
     else
-        rc = fill_through_staging(residency, slot->buffer, words, bytes, err);
+        rc = fill_through_staging(residency, slot->buffer, resident->dataset, page, bytes, err);
     if (rc)
         drop_page(residency, slot);
     else

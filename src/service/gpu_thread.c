@@ -54,6 +54,18 @@ static void publish_residency(struct gpu *gpu)
     gpu->pages_evicted = info.pages_evicted;
 }
 
+/* A file that was cut or overwritten in place costs its own views only. */
+static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_renderer_preload(gpu->renderer, entry->dataset, &why);
+    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
+        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
+        return 0;
+    }
+    return rc ? spl_fail(err, rc, "%s", why.message) : 0;
+}
+
 static int build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -78,7 +90,7 @@ static int build(struct gpu *gpu, struct spl_error *err)
     {
         if (spl_queue_is_closed(pipeline->render))
             break;
-        if (!entry->loading && (rc = spl_renderer_preload(gpu->renderer, entry->dataset, err)))
+        if (!entry->loading && (rc = preload(gpu, entry, err)))
             return rc;
         spl_pipeline_touch(pipeline);
     }

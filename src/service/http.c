@@ -33,6 +33,8 @@ static const uint64_t phase_max_ns[] = {
     [PHASE_WRITING] = 120 * SPL_NS_PER_S,
 };
 
+static const uint64_t drain_reading_max_ns = 2 * SPL_NS_PER_S; /* half a request holds up no exit */
+
 static void enter(struct connection *connection, enum phase phase)
 {
     connection->phase = phase;
@@ -308,9 +310,10 @@ static void on_slow_timer(uv_timer_t *timer)
     struct connection *connection;
     LIST_FOREACH(connection, &service->connections, link)
     {
+        bool hurry = service->draining && connection->phase == PHASE_READING;
         if (has_ended_early(connection))
             shutdown(connection->fd, SHUT_RDWR);
-        if (now - connection->since_ns <= phase_max_ns[connection->phase])
+        if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
             continue;
         spl_count(&service->counters, slow_closed);
         shutdown(connection->fd, SHUT_RDWR);

@@ -218,6 +218,18 @@ def test_idle_connections_do_not_stop_the_daemon():
             s.close()
 
 
+def test_half_a_request_holds_up_no_exit():
+    with Daemon(FAKE) as d:
+        halves = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(4)]
+        for s in halves:
+            s.sendall(f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nContent-Length: 99\r\n\r\n{{".encode())
+        eventually(lambda: d.status()["counters"]["requests"] >= 4)
+        began = time.monotonic()
+        assert d.stop() == 0 and time.monotonic() - began < 8
+        for s in halves:
+            s.close()
+
+
 def test_equal_requests_get_equal_bytes_under_load():
     with Daemon(REAL, "--queue", "64", "--cache", "0") as d:
         got = together(20, lambda i: [d.ask(VIEW + "?width=160&height=90").body for _ in range(5)])

@@ -271,14 +271,8 @@ static void test_ids(void **state)
     static const struct {
         const char *name, *id;
     } rows[] = {
-        {"a.spld", "a"},
-        {"Wall-2_x.v3.spld", "Wall-2_x.v3"},
-        {"plain", "plain"},
-        {"two words.spld", NULL},
-        {".hidden.spld", NULL},
-        {"caf\xc3\xa9.spld", NULL},
-        {"a?b.spld", NULL},
-        {"..x.spld", NULL},
+        {"a.spld", "a"},           {"Wall-2_x.v3.spld", "Wall-2_x.v3"}, {"plain", "plain"}, {"two words.spld", NULL},
+        {".hidden.spld", NULL},    {"caf\xc3\xa9.spld", NULL},          {"a?b.spld", NULL}, {"..x.spld", NULL},
         {LONG_NAME ".spld", NULL},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -331,6 +325,52 @@ static void test_refused_memory(void **state)
     unlink(path);
 }
 
+/* In place, as nobody should: what is read anew is refused, what is in memory stays. */
+static void test_files_that_change_in_place(void **state)
+{
+    (void)state;
+    enum { count = 3000 };
+    struct make_splat *splats = some_splats(count);
+    const char *path = path_of("place.spld");
+    for (int cut = 0; cut < 2; cut++) {
+        struct spl_dataset *verified, *trusted;
+        make_dataset_file(path, splats, count, 1);
+        assert_int_equal(spl_dataset_open(path, true, &verified, NULL), 0);
+        assert_int_equal(spl_dataset_open(path, false, &trusted, NULL), 0);
+        uint32_t nodes;
+        struct spl_node before = spl_dataset_get_nodes(verified, &nodes)[0];
+        size_t bytes;
+        const uint32_t *mapped = spl_dataset_get_page(verified, 0, &bytes);
+        uint32_t *page = malloc(bytes);
+        assert_int_equal(spl_dataset_read_page(verified, 0, page, NULL), 0);
+        assert_memory_equal(page, mapped, bytes);
+        if (cut) {
+            assert_int_equal(truncate(path, 100), 0);
+        } else {
+            int fd = open(path, O_RDWR);
+            off_t at = (off_t)spl_dataset_get_info(verified)->file_bytes - (off_t)bytes; // the page is last
+            char byte;
+            assert_int_equal(pread(fd, &byte, 1, at), 1);
+            byte ^= 1;
+            assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+            close(fd);
+        }
+        struct spl_error err = {0};
+        assert_int_equal(spl_dataset_read_page(verified, 0, page, &err), SPL_E_CORRUPT);
+        assert_non_null(strstr(err.message, "place"));
+        assert_null(strstr(err.message, folder));
+        assert_non_null(strstr(err.message, cut ? "cut short" : "overwritten"));
+        assert_int_equal(spl_dataset_read_page(trusted, 0, page, NULL), cut ? SPL_E_CORRUPT : 0);
+        assert_true(before.origin[0] == spl_dataset_get_nodes(verified, &nodes)[0].origin[0] &&
+                    before.chunk_count == spl_dataset_get_nodes(verified, &nodes)[0].chunk_count);
+        free(page);
+        spl_dataset_close(trusted);
+        spl_dataset_close(verified);
+        unlink(path);
+    }
+    free(splats);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -341,6 +381,7 @@ int main(void)
         cmocka_unit_test(test_ids),
         cmocka_unit_test(test_version_follows_content),
         cmocka_unit_test(test_refused_memory),
+        cmocka_unit_test(test_files_that_change_in_place),
     };
     make_folder(folder);
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

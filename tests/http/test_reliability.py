@@ -1,0 +1,250 @@
+"""What nothing may take down: random requests, clients that leave in the middle of a reply, a clock that jumps, a dataset
+that is cut while it is served, days of work. deploy/operating.md says what each looks like from outside.
+
+By option, through the environment: SPLATD_RANDOM_REQUESTS=100000 (2000), SPLATD_RANDOM_SEED=N, SPLATD_SOAK_S=1800 (2)."""
+import json
+import os
+import random
+import re
+import shutil
+import socket
+import struct
+import tempfile
+import time
+
+import openapi
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run, together
+
+WALL_2 = os.environ["SPLATD_WALL_2"]
+SMALL = VIEW + "?width=16&height=16"
+HOSTILE = ["", "0", "-1", "1e999", "nan", "inf", "null", "true", "a", "1,2,3", "1,2", "0,0,0", "%00", "%ff", "%zz", "../..",
+           "'\"<>", "9" * 400, "1e-320", "18446744073709551616", "{}", "[]", "x" * 3000, "&", "=", "%25", "é", "splat", "jpeg"]
+
+
+def random_number(r, schema):
+    low = schema.get("minimum", schema.get("exclusiveMinimum", -20))
+    high = min(schema.get("maximum", 60), 60 if schema.get("type") == "integer" else 1e9)
+    value = r.choice([low, high, r.uniform(low, min(high, low + 50))])
+    return int(value) if schema.get("type") == "integer" else value
+
+
+def random_value(r, schema, depth=0):
+    """A value that is allowed by the schema, mostly."""
+    schema = openapi.resolve(schema)
+    if r.random() < 0.06:
+        return r.choice(HOSTILE + [None, -1, 1e300, [], {}, [1, 2, 3], {"a": 1}, True])
+    for way in ("oneOf", "anyOf", "allOf"):
+        if way in schema:
+            return random_value(r, r.choice(schema[way]), depth)
+    if "enum" in schema or "const" in schema:
+        return r.choice(schema.get("enum") or [schema["const"]])
+    kind = schema.get("type", "string")
+    kind = r.choice(kind) if isinstance(kind, list) else kind
+    if kind in ("number", "integer"):
+        return random_number(r, schema)
+    if kind == "boolean":
+        return r.random() < 0.5
+    if kind == "array":
+        count = r.randint(schema.get("minItems", 0), min(schema.get("maxItems", 4), schema.get("minItems", 0) + 3))
+        return [random_value(r, schema.get("items", {}), depth + 1) for _ in range(count)]
+    if kind == "object":
+        share = 0.25 if depth else 0.15
+        return {name: random_value(r, inner, depth + 1) for name, inner in schema.get("properties", {}).items()
+                if name in schema.get("required", []) or r.random() < share}
+    pattern = schema.get("pattern", "")
+    if ",[^,]+" in pattern:
+        return ",".join(str(r.choice([r.randint(-9, 9), r.uniform(-9, 9)])) for _ in range(3))
+    return r.choice(["5ms", "ff0000", "transparent", "wall", "1"])
+
+
+def as_text(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else json.dumps(value) if isinstance(value, (dict, type(None))) else \
+        ",".join(map(str, value)) if isinstance(value, list) else repr(value)
+
+
+def random_request(r):
+    """(method, target, headers, body) that urllib would not let anybody write."""
+    template, method, operation, parameters = r.choice(list(openapi.operations()))
+    if r.random() < 0.5:
+        template, method, operation, parameters = r.choice([o for o in openapi.operations() if o[0].endswith("/view")])
+    path = re.sub(r"\{(\w+)\}", lambda m: r.choice(["wall"] * 8 + ["none", "..", "%2e%2e", "a%2fb", "%ff", "%00", "x" * 300])
+                  if m[1] == "id" else r.choice(["wall", "main.js", "1", "none", "%2f"]), template)
+    chosen = [p for p in parameters if p["in"] == "query" and r.random() < 0.2]
+    pairs = [(r.choice([n for n in openapi.names_of(p) if n]), as_text(random_value(r, p.get("schema", {})))) for p in chosen]
+    if method == "get" and "view" in template and r.random() < 0.9:
+        pairs = [p for p in pairs if p[0] not in ("width", "height")] + [("width", r.choice("1 16 33".split())), ("height", "9")]
+    if r.random() < 0.1:
+        pairs.append((r.choice(HOSTILE), r.choice(HOSTILE)))
+    if r.random() < 0.05:
+        pairs.append(r.choice(pairs or [("width", "5")]))
+    query = "&".join(f"{quote(r, name)}={quote(r, text)}" for name, text in pairs)
+    headers = {p["name"]: r.choice(['*', '"x"', "", "W/" * 50]) for p in parameters if p["in"] == "header" and r.random() < 0.3}
+    schema, body = operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema"), None
+    if schema:
+        document = random_value(r, schema)
+        if isinstance(document, dict) and "view" in template and r.random() < 0.9:
+            document.update(width=16, height=9)
+            if isinstance(document.get("camera"), dict):
+                document["camera"] = {k: v for k, v in document["camera"].items() if k not in ("width", "height")}
+        body = json.dumps(document).encode()
+        headers["Content-Type"] = "application/json"
+        if r.random() < 0.1:
+            spot = r.randrange(len(body) + 1)
+            body = body[:spot] + bytes([r.randrange(256)]) + body[spot + r.randrange(2):]
+    name = r.choice([method.upper()] * 12 + ["HEAD", "POST", "PUT", "DELETE", "PATCH", "BREW"])
+    return name, path + ("?" + query if query else ""), headers, body
+
+
+def quote(r, text):
+    """Percent-encodes what cannot stand in a request line, and now and then nothing else."""
+    bare = r.random() < 0.5
+    return "".join(c if c.isascii() and c.isalnum() or c in "-._~,%" or (bare and c in "'\"<>{}[]&=") else
+                   "".join(f"%{b:02x}" for b in c.encode()) for c in text)
+
+
+def garbage(r, d):
+    """Bytes that are no HTTP, or a part of some; then away."""
+    data = r.choice([lambda: bytes(r.randrange(256) for _ in range(r.randrange(300))),
+                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n".encode()[:r.randrange(60)],
+                     lambda: f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nContent-Length: {r.randrange(999)}\r\n\r\n{{".encode(),
+                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode() * r.randrange(1, 20),
+                     lambda: b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n" + b"zz\r\n" * r.randrange(9)])()
+    try:
+        with socket.create_connection(("127.0.0.1", d.port), 30) as s:
+            if r.random() < 0.3:
+                s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            s.sendall(data)
+            if r.random() < 0.3:
+                s.settimeout(0.05)
+                s.recv(100)
+    except OSError:
+        pass
+
+
+def test_random_requests():
+    count, seed = int(os.environ.get("SPLATD_RANDOM_REQUESTS", 2000)), int(os.environ.get("SPLATD_RANDOM_SEED", 1))
+    r, seen = random.Random(seed), {}
+    with Daemon(FAKE, "--log-rate", "0", FAKE_FRAME_MS=0) as d:
+        connection = d.connect()
+        for i in range(count):
+            if i % 20 == 19:
+                garbage(r, d)
+                continue
+            method, target, headers, body = random_request(r)
+            try:
+                reply = d.ask(target, method, body, headers, connection=connection)
+            except AssertionError as fault:
+                raise AssertionError(f"request {i} of seed {seed}: {method} {target[:500]} {headers} {body}\n{fault}") from None
+            except OSError:  # closed after a reply, which HTTP allows
+                connection.close()
+                continue
+            seen[reply.status] = seen.get(reply.status, 0) + 1
+            assert reply.status < 500 or reply.status in (501, 503), (i, target, reply.status, reply.body)
+        assert d.ask(SMALL).status == 200 and d.ops("/healthz").status == 200
+    print(f"  {count} requests, seed {seed}: {dict(sorted(seen.items()))}")
+    assert sum(seen.values()) > 0.9 * 0.95 * count and seen[200] > 0.03 * count and seen[400] > 0.03 * count, seen
+
+
+def test_clients_that_leave_in_the_middle_of_a_reply():
+    def descriptors():
+        return len(os.listdir(f"/proc/{d.process.pid}/fd"))
+    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+        assert d.ask(SMALL).status == 200
+        before = descriptors()
+
+        def leave(i):
+            s = socket.create_connection(("127.0.0.1", d.port), 60)
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            s.sendall(f"GET {VIEW}?width=1600&height=900&format=raw HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            assert s.recv(1000).startswith(b"HTTP/1.1 200")
+            if i % 2:
+                s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            s.close()
+            return True
+        assert all(result is True for _ in range(4) for result in together(8, leave))
+        assert d.ask(SMALL).status == 200
+        eventually(lambda: d.status()["memory"]["reply_bytes"] == 0)
+        eventually(lambda: descriptors() <= before + 1)
+        assert d.ops("/healthz").status == 200
+
+
+def test_a_clock_that_jumps():
+    preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_CLOCK"]]))
+    with Daemon(FAKE, "--queue", "2", "--deadline", "2000", LD_PRELOAD=preload, FAKE_FRAME_MS=100) as d:
+        assert d.ask(SMALL).status == 200
+        statuses = [reply.status for reply in together(6, lambda i: d.ask(SMALL))]
+        assert set(statuses) <= {200, 503} and 200 in statuses, statuses
+        keep = d.connect()
+        for _ in range(5):  # neither closed as idle nor past any deadline
+            assert d.ask(SMALL, connection=keep).status == 200
+        assert d.ops("/healthz").status == d.ops("/readyz").status == 200
+        status = d.status()
+        assert 0 < status["uptime_s"] < 600 and status["counters"]["deadline_missed"] == 0
+        days = {line[:10] for line in d.lines}
+        assert len(days) > 1, ("the clock did not jump", days)
+
+
+def test_a_dataset_that_is_cut_or_overwritten_while_served():
+    for damage in ("cut", "overwrite"):
+        with tempfile.TemporaryDirectory() as folder:
+            a, b = (os.path.join(folder, name) for name in ("a.spld", "b.spld"))
+            shutil.copy(WALL, a)
+            shutil.copy(WALL_2, b)
+            with Daemon(REAL, "--watch", "0", "--cache", "0", datasets=[a, b], SPLATD_INJECT_LOSS_AFTER="2") as d:
+                def view(name, **kw):
+                    return d.ask(f"/v1/datasets/{name}/view?width=16&height=16", **kw)
+                whole = view("a").body
+                with open(a, "r+b") as file:
+                    if damage == "cut":
+                        file.truncate(300)
+                    else:
+                        file.seek(-4000, os.SEEK_END)
+                        file.write(b"\xff" * 4000)
+                assert view("a").body == whole, "what is on the device is as good as before"
+                assert view("b").status == 503  # the device is lost, so that pages must be read anew
+                eventually(lambda: d.ops("/readyz").status == 200)
+                assert view("b").status == 200
+                for reply in (view("a"), d.ask("/v1/datasets/a/view", "POST", "{}", {"Content-Type": "application/json"})):
+                    assert reply.status == 500 and "rename" in reply.json()["detail"], reply.body
+                    assert folder not in reply.json()["detail"], "a client is told where the file lies"
+                assert view("b").status == 200 and d.ops("/healthz").status == 200
+
+
+def slope(samples):
+    """Least squares through (x, y)."""
+    n, mean_x, mean_y = len(samples), *(sum(column) / len(samples) for column in zip(*samples))
+    spread = sum((x - mean_x) ** 2 for x, _ in samples)
+    return sum((x - mean_x) * (y - mean_y) for x, y in samples) / spread if n > 2 and spread else 0
+
+
+def test_soak():
+    seconds, r = float(os.environ.get("SPLATD_SOAK_S", 2)), random.Random(1)
+    with Daemon(REAL, "--log-rate", "0", "--cache", "1M") as d:
+        connection, memory, descriptors, asked = d.connect(), [], [], 0
+        picture = f"{VIEW}?width=320&height=180&format=png"
+        first = d.ask(picture, connection=connection).body
+        for _ in range(20):
+            d.ask(picture, connection=connection)
+        began = time.monotonic()
+        while (now := time.monotonic() - began) < seconds:
+            for _ in range(20):
+                query = f"eye={r.uniform(2, 5)},{r.uniform(-1, 1)},{r.uniform(0, 2)}&target=0,0,1&width=160&height=90"
+                layer = r.choice(["color", "depth&format=npy", "normal&format=raw", "range&format=png"])
+                assert d.ask(f"{VIEW}?{query}&layer={layer}", connection=connection).status == 200
+                assert d.ask(f"{VIEW}?{query}&lod=-1", connection=connection).status == 400
+                asked += 2
+            d.ask(SMALL)  # a connection of its own
+            memory.append((now, d.status()["memory"]["resident_bytes"]))
+            descriptors.append((now, len(os.listdir(f"/proc/{d.process.pid}/fd"))))
+        assert d.ask(picture, connection=connection).body == first, "the last picture differs from the first"
+        steady = len(memory) // 3  # allocators and drivers settle first
+        grown, opened = slope(memory[steady:]) * 3600, slope(descriptors[steady:]) * 3600
+        print(f"  {asked} requests in {seconds:.0f} s: memory {grown / 1e6:+.2f} MB/h, descriptors {opened:+.2f}/h, "
+              f"resident {memory[-1][1] / 1e6:.1f} MB")
+        if seconds >= 600:
+            assert grown < 2e6 and abs(opened) < 1, (grown, opened)
+
+
+run(globals())
