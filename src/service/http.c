@@ -164,6 +164,10 @@ static enum MHD_Result send_reply(struct request *request)
 {
     if (!request->response)
         return MHD_NO;
+    // libmicrohttpd 0.9.75 ends a HEAD of unknown length with the last chunk of a body that there is not; without
+    // chunks it closes the connection
+    if (request->head && request->unsized)
+        MHD_set_response_options(request->response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
     if (request->service->draining)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);

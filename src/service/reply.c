@@ -218,6 +218,7 @@ void spl_reply_view_head(struct request *request, const struct spl_view_request 
         return;
     request->status = MHD_HTTP_OK; // of unknown length: a GET's Content-Length is known only once it is rendered
     request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 16, read_nothing, NULL, NULL);
+    request->unsized = true;
     if (request->response) {
         add_headers(request, headers.text);
         add_validator(request, key);

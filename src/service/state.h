@@ -68,6 +68,7 @@ struct request {
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     bool started;
     bool head;      /* the method is HEAD */
+    bool unsized;   /* the reply's length is not known when it begins */
     bool abandoned; /* the client has left: close without a reply */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     uint64_t deadline_ns;

@@ -217,4 +217,17 @@ def test_an_error_reaches_all_that_share_it():
         assert again.status == 200 and again.headers["Splatd-Cache"] == "miss"
 
 
+def test_nothing_follows_the_headers_of_a_head():
+    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+        for i in range(300):  # libmicrohttpd has sent the end of a body with some
+            connection = d.connect()
+            connection.connect()
+            connection.sock.sendall(f"HEAD {VIEW}?width={16 + i} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            connection.sock.shutdown(1)
+            got = b"".join(iter(lambda: connection.sock.recv(65536), b""))
+            assert got.startswith(b"HTTP/1.1 200 ") and b"\r\nConnection: close\r\n" in got
+            assert got.endswith(b"\r\n\r\n") and got.count(b"\r\n\r\n") == 1, got[-100:]
+            connection.close()
+
+
 run(globals())
