@@ -120,7 +120,7 @@ function showFrame({detail: frame}) {
   if (!frame.full) return;
   const {chosen, promised, demand} = frame;
   $("chosen").textContent = chosen
-    ? `Chosen: ${chosen.method}, level ${chosen.lod}, ${chosen.supersample} samples a side` +
+    ? `Chosen: ${chosen.method}, level ${chosen.lod}, samples a side ${chosen.supersample}` +
       `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
     : "";
   writeLink();
