@@ -54,11 +54,23 @@ static void end(struct spl_tour *tour, enum spl_tour_state state)
     changed(tour);
 }
 
+/* Clients read why: without the folder that a file lies in. */
+static void hide_folder(const struct spl_tours *tours, char *message)
+{
+    size_t length = strlen(tours->directory);
+    for (char *found; (found = strstr(message, tours->directory)) && found[length] == '/';) {
+        char *file = strchr(found + length + 1, '/'); // behind the tour's name
+        file = file ? file + 1 : found + length + 1;
+        memmove(found, file, strlen(file) + 1);
+    }
+}
+
 void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why)
 {
     if (spl_tour_has_ended(tour) || tour->removed)
         return;
     tour->failure = *why;
+    hide_folder(tour->tours, tour->failure.message);
     end(tour, SPL_TOUR_FAILED);
 }
 
