@@ -12,6 +12,7 @@
 #include "themes.h"
 
 static const double step_px = 1.5;
+enum { CROP = 512, CROP_ABOVE = 2048 }; /* pixels a side */
 
 static void must(int rc, const struct spl_error *err)
 {
@@ -40,6 +41,36 @@ static struct spl_view step_aside(const struct spl_view *view, const struct spl_
     for (int a = 0; a < 3 && count; a++)
         aside.camera.eye[a] += view->camera.rotation[a] * step_px / view->camera.fx * count / near;
     return aside;
+}
+
+/* Of an image that is large both ways only the middle is held against the truth, which takes seconds a megapixel. */
+static struct spl_view crop_view(const struct spl_view *view)
+{
+    struct spl_view crop = *view;
+    struct spl_camera *c = &crop.camera;
+    if (c->width <= CROP_ABOVE || c->height <= CROP_ABOVE)
+        return crop;
+    c->cx -= (c->width - CROP) / 2;
+    c->cy -= (c->height - CROP) / 2;
+    c->width = c->height = CROP;
+    return crop;
+}
+
+static void crop_frame(struct spl_frame *frame, const struct spl_camera *to)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        struct spl_image *image = &frame->images[layer];
+        if (!image->pixels || (image->width == to->width && image->height == to->height))
+            continue;
+        size_t bytes = spl_pixel_bytes(image->type), x = (image->width - to->width) / 2;
+        size_t y = (image->height - to->height) / 2;
+        uint8_t *pixels = image->pixels;
+        for (size_t row = 0; row < to->height; row++)
+            memmove(pixels + row * to->width * bytes, pixels + ((y + row) * image->width + x) * bytes,
+                    to->width * bytes);
+        image->width = to->width;
+        image->height = to->height;
+    }
 }
 
 /* Image and truth side by side, over grey, as DIRECTORY/CONDITION-VALUE-METHOD.png. */
@@ -89,10 +120,12 @@ static bool measure(struct conditions *c, const struct world *world, const struc
         rendered = world_render(c->suite, world, &place, &views[i], &frame);
         if (!rendered)
             break;
-        must(spl_motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truths[i][SPL_LAYER_COLOR], 0, &err), &err);
         check_kinds(c->suite, world, &views[i], &frame, place);
+        const struct spl_view crop = crop_view(&views[i]);
+        crop_frame(&frame, &crop.camera);
+        must(spl_motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truths[i][SPL_LAYER_COLOR], 0, &err), &err);
         if (i == 0) {
-            struct spl_metrics m = measure_frame(world, &views[0], &frame, truths[0]);
+            struct spl_metrics m = measure_frame(world, &crop, &frame, truths[0]);
             const double figures[FIGURE_COUNT] = {
                 [FIGURE_PSNR] = m.psnr,
                 [FIGURE_SSIM] = m.ssim,
@@ -119,9 +152,11 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
     if (!conditions_wants(c, condition) || (whole_only && !c->suite->whole))
         return;
     struct spl_image truths[2][SPL_LAYER_COUNT];
-    truth_render(world, &view->camera, truths[0]);
+    struct spl_view crop = crop_view(view);
+    truth_render(world, &crop.camera, truths[0]);
     struct spl_view views[2] = {*view, step_aside(view, &truths[0][SPL_LAYER_DEPTH])};
-    truth_render(world, &views[1].camera, truths[1]);
+    crop = crop_view(&views[1]);
+    truth_render(world, &crop.camera, truths[1]);
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         struct row row = {condition, value, spl_method_name((enum spl_method)method), whole_only, {0}};
         views[0].method = views[1].method = (enum spl_method)method;

@@ -50,7 +50,7 @@ static const struct {
     bool whole_only;
 } faults[] = {
     {"range noise", "0", "living-room", {"interior", 100000, 0, 0, 0, 0}, false},
-    {"range noise", "3 mm", "living-room", {"interior", 100000, 0.003, 0, 0, 0}, false},
+    {"range noise", "3 mm", "living-room", {"interior", 100000, 0.003, 0, 0, 0}, true},
     {"range noise", "10 mm", "living-room", {"interior", 100000, 0.01, 0, 0, 0}, false},
     {"range noise", "30 mm", "living-room", {"interior", 100000, 0.03, 0, 0, 0}, false},
     {"range noise", "100 mm", "living-room", {"interior", 100000, 0.1, 0, 0, 0}, false},

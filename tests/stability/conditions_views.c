@@ -77,7 +77,7 @@ static void sizes(struct conditions *c, const struct world *yard)
         if ((side[2] && !c->suite->whole) || !conditions_wants(c, "image size"))
             continue;
         struct spl_view view = world_look(yard, overview, middle, 70, side[0], side[1]);
-        if (side[0] > 2048 && side[1] > 2048)
+        if (side[0] == 8192 && side[1] == 8192) /* a frame of all layers is 2 GB */
             view.layers &= ~(1u << SPL_LAYER_NORMAL | 1u << SPL_LAYER_RANGE);
         if (side[0] == 8192 && side[1] == 2) /* 70 degrees across, not 170 */
             view.camera.fx = view.camera.fy = 8192 / (2 * tan(35 * M_PI / 180));

@@ -1,0 +1,72 @@
+"""The stability table for people: what table.json holds, as Markdown between two marks in tests/bench/RESULTS.md.
+
+usage: table.py --update STABILITY [--whole]   measures anew with that program, then writes both files
+       table.py --write                        writes RESULTS.md from table.json as it is
+       table.py --check                        exit 1 where RESULTS.md does not hold what table.json does
+"""
+import json
+import pathlib
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+TABLE = HERE / "table.json"
+RESULTS = HERE.parent / "bench" / "RESULTS.md"
+BEGIN, END = "<!-- table.py: begin -->\n", "<!-- table.py: end -->\n"
+# figure, heading, factor, decimals
+SPLAT = [("psnr", "PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
+         ("depth_beyond", "beyond", 100, 1), ("halo", "halo", 100, 1), ("normal_median", "normal", 1, 1),
+         ("flicker", "flicker", 1, 1)]
+POINTS = [("psnr", "points: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
+          ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
+
+
+def cell(row, figure, factor, decimals):
+    value = row and row[figure]
+    if value is None:
+        return "–"
+    if figure == "psnr" and value >= 99:
+        return "equal"
+    return f"{value * factor:.{decimals}f}"
+
+
+def markdown():
+    rows = json.loads(TABLE.read_text(encoding="utf-8"))["rows"]
+    by_name = {}
+    for row in rows:
+        by_name.setdefault((row["condition"], row["value"]), {})[row["method"]] = row
+    headings = ["condition", ""] + [column[1] for column in SPLAT + POINTS]
+    lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
+    last = None
+    order = list(dict.fromkeys(condition for condition, _ in by_name))
+    for (condition, value), methods in sorted(by_name.items(), key=lambda item: order.index(item[0][0])):
+        cells = [condition if condition != last else "", value]
+        cells += [cell(methods.get("splat"), f, factor, d) for f, _, factor, d in SPLAT]
+        cells += [cell(methods.get("points"), f, factor, d) for f, _, factor, d in POINTS]
+        lines.append("| " + " | ".join(cells) + " |")
+        last = condition
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments):
+    if arguments[:1] == ["--update"] and len(arguments) > 1:
+        code = subprocess.run([arguments[1], "conditions", "--update", *arguments[2:]], check=False).returncode
+        if code:
+            return code
+    elif arguments not in (["--write"], ["--check"]):
+        sys.exit(__doc__)
+    text = RESULTS.read_text(encoding="utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        sys.exit(f"{RESULTS}: the marks {BEGIN.strip()} and {END.strip()} must be there once each")
+    head, rest = text.split(BEGIN)
+    new = head + BEGIN + markdown() + END + rest.split(END)[1]
+    if arguments == ["--check"]:
+        if new != text:
+            print(f"{RESULTS} is not what {TABLE.name} says: run tests/stability/table.py --write")
+        return int(new != text)
+    RESULTS.write_text(new, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
