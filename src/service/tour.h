@@ -12,9 +12,10 @@
 #include "service/tour_spec.h"
 
 enum {
-    SPL_TOUR_NAME = 16,    /* hex digits, random: a name cannot be guessed and is no path */
-    SPL_TOURS_MAX = 1000,  /* kept at a time */
-    SPL_TOUR_IN_FLIGHT = 3 /* frames in the pipeline: one rendered, one waiting, one encoded; <= SPL_QUEUE_BEHIND */
+    SPL_TOUR_NAME = 16,        /* hex digits, random: a name cannot be guessed and is no path */
+    SPL_TOURS_MAX = 1000,      /* kept at a time */
+    SPL_TOURS_UNFINISHED = 32, /* of them; each holds its path in memory */
+    SPL_TOUR_IN_FLIGHT = 3     /* frames in the pipeline: one rendered, one waiting, one encoded; <= SPL_QUEUE_BEHIND */
 };
 
 enum spl_tour_state { SPL_TOUR_RENDERING, SPL_TOUR_VIDEO, SPL_TOUR_DONE, SPL_TOUR_FAILED };
@@ -28,7 +29,7 @@ struct spl_tour {
     TAILQ_ENTRY(spl_tour) link; // spl_tours.all, oldest first
     struct spl_tours *tours;
     char name[SPL_TOUR_NAME + 1], dataset[256], version[17];
-    json_t *body;              /* as it was accepted */
+    json_t *body;              /* as it was accepted; null once it has ended */
     struct spl_tour_spec spec; /* cameras NULL once it has ended */
     enum spl_tour_state state;
     struct spl_error failure;
@@ -52,7 +53,7 @@ struct spl_tours {
     TAILQ_HEAD(spl_tour_list, spl_tour) all;
     size_t count, in_flight, writing;
     uint64_t bytes, writing_bytes;
-    bool stopping;
+    bool stopping, making_video;
     uv_timer_t sweep_timer, stream_timer;
     LIST_HEAD(, spl_tour_stream) streams;
     size_t stream_count;

@@ -48,6 +48,8 @@ static void end(struct spl_tour *tour, enum spl_tour_state state)
     tour->age_s = 0;
     free(tour->spec.cameras);
     tour->spec.cameras = NULL;
+    json_decref(tour->body); // may be large, and nothing is made of it any more
+    tour->body = json_null();
     spl_log_info("tour %s: %s after %zu of %zu frames%s%s", tour->name, spl_tour_state_names[state], tour->frames_done,
                  tour->spec.frames, tour->failure.code ? ": " : "", tour->failure.message);
     spl_tour_work_state(tour);
@@ -83,6 +85,9 @@ static void advance(struct spl_tour *tour)
         end(tour, SPL_TOUR_DONE);
         return;
     }
+    if (tour->tours->making_video) // one at a time: the thread pool has others to serve
+        return;
+    tour->tours->making_video = true;
     tour->state = SPL_TOUR_VIDEO;
     spl_tour_work_video(tour);
     changed(tour);
@@ -148,6 +153,7 @@ void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, c
 
 void spl_tour_video_made(struct spl_tour *tour, uint64_t bytes, const struct spl_error *err)
 {
+    tour->tours->making_video = false;
     if (tour->removed || tour->tours->stopping)
         return; // made again after the restart
     if (err->code) {
@@ -217,6 +223,8 @@ void spl_tours_pump(struct spl_tours *tours)
     struct spl_tour *tour, *next;
     for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
         next = TAILQ_NEXT(tour, link);
+        if (!tour->state_bytes)
+            continue; // frames without a tour.json would be nobody's after a crash
         advance(tour);
         while (tour->state == SPL_TOUR_RENDERING && tour->first_open < tour->spec.frames) {
             if (tours->in_flight == SPL_TOUR_IN_FLIGHT || tours->in_flight + tours->writing >= writing_max)
@@ -258,6 +266,12 @@ int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry
                   struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err)
 {
     uint64_t disk = tours->service->options->tour_disk_max;
+    struct spl_tour *other;
+    size_t unfinished = 0;
+    TAILQ_FOREACH(other, &tours->all, link)
+    unfinished += !spl_tour_has_ended(other);
+    if (unfinished >= SPL_TOURS_UNFINISHED)
+        return spl_fail(err, SPL_E_BUSY, "%zu tours are still to be made; come back later", unfinished);
     if (tours->count >= SPL_TOURS_MAX)
         return spl_fail(err, SPL_E_BUSY, "%zu tours are kept; remove some", tours->count);
     if (tours->bytes >= disk)

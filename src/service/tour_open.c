@@ -59,7 +59,12 @@ static void load(struct spl_tours *tours, const char *name)
 {
     struct spl_tour *tour, *after;
     struct spl_error err = {0};
-    if (spl_tour_load(tours, name, &tour, &err)) {
+    int rc = spl_tour_load(tours, name, &tour, &err);
+    if (rc == SPL_E_NOT_FOUND) { // a crash while it began: it has no frames yet
+        spl_tour_store_remove(tours->directory, name);
+        return;
+    }
+    if (rc) {
         spl_log_warn("%s/%s is left alone: %s", tours->directory, name, err.message);
         return;
     }

@@ -91,8 +91,10 @@ void spl_tour_work_state(struct spl_tour *tour)
     json_decref(json);
     struct work *work = text ? begin(tour, &err) : NULL;
     if (!work) {
-        spl_log_error("tour %s: out of memory for its state", tour->name);
         free(text);
+        spl_log_error("tour %s: out of memory for its state", tour->name);
+        spl_fail(&err, SPL_E_NOMEM, "out of memory for the tour's state");
+        spl_tour_fail(tour, &err); // nothing where it has ended
         return;
     }
     work->bytes = text;

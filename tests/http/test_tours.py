@@ -286,6 +286,10 @@ def test_quotas():
         eventually(lambda: not list(folder.iterdir()))
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "0") as d:
         assert "0 bytes" in begin(d, body(), 503)["detail"]
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=100) as d:
+        for _ in range(32):
+            begin(d, body(5000))
+        assert "32 tours are still to be made" in begin(d, body(), 503)["detail"]
 
 
 def test_cancelling_ends_streams_and_removes_files():
@@ -324,7 +328,9 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             d.wait_exit()
         files = {f.name: f.stat().st_ino for f in (folder / tour["name"]).iterdir() if f.name[0] != "."}
         assert 15 <= len(files) - 1 < 60, files
-        (folder / "0123456789abcdef").mkdir()  # no tour of ours: left alone, and said so
+        (folder / "0123456789abcdef").mkdir()  # not understood: left alone, and said so
+        (folder / "0123456789abcdef" / "tour.json").write_text("{}")
+        (folder / "00000000000000aa").mkdir()  # a crash while it began
         (folder / ".fedcba9876543210").mkdir()  # half removed
         with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:  # ended by SIGTERM, a stream open
             [stream], _ = watch(d, [tour["events"]])
@@ -338,7 +344,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             after = {f.name: f.stat().st_ino for f in (folder / tour["name"]).iterdir()}
             assert {n: i for n, i in after.items() if n in files and n != "tour.json"} == \
                 {n: i for n, i in files.items() if n != "tour.json"}  # not made again
-            assert not (folder / ".fedcba9876543210").exists()
+            assert not (folder / ".fedcba9876543210").exists() and not (folder / "00000000000000aa").exists()
         with Daemon(FAKE, "--tours", str(folder)) as d:  # done is done
             assert d.ask(tour["uri"]).json() == tour and frames_of(d, tour)[:2] == wanted[:2]
             shutil.rmtree(folder / "0123456789abcdef")
