@@ -38,13 +38,14 @@ def changed(text, *pairs):
 
 
 def configuration(port, daemons):
-    """The shipped one: other addresses, checks that do not take seconds."""
+    """The shipped one: other addresses, checks that do not take seconds, no overflow to other daemons at a load of one."""
     text = (SHIPPED / "haproxy.cfg").read_text()
     for address, d in zip(("10.0.0.11", "10.0.0.12", "10.0.0.13"), daemons):
         text = changed(text, (rf"^( +server \w+) {re.escape(address)}:8080$",
                               rf"\1 127.0.0.1:{d.port} port {d.ops_port}"))
     return changed(text, (r"bind 0\.0\.0\.0:80$", f"bind 127.0.0.1:{port}"), (r"slowstart 10s", "slowstart 1s"),
-                   (r"inter 1s fall 2 rise 2 port 8081", "inter 100ms fall 2 rise 2"), (r"gt 2000", "gt 1000000"))
+                   (r"inter 1s fall 2 rise 2 port 8081", "inter 100ms fall 2 rise 2"), (r"gt 2000", "gt 1000000"),
+                   (r"^ +hash-balance-factor 150\n", ""))
 
 
 @contextlib.contextmanager
