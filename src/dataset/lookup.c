@@ -1,8 +1,10 @@
 /* One splat by its id: which chunk and node hold it. Chunks continue each other's ids, which opening has checked, so a
- * binary search finds the chunk; nodes are looked through. Any thread. */
+ * binary search finds the chunk; nodes are looked through. The chunk's words are read from the file, not through a map,
+ * so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
 #include "dataset/chunk.h"
+#include "dataset/open.h"
 
 static const struct spl_node *node_of(const struct spl_dataset *dataset, uint32_t chunk)
 {
@@ -14,24 +16,36 @@ static const struct spl_node *node_of(const struct spl_dataset *dataset, uint32_
     return NULL;
 }
 
-bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, struct spl_splat *splat)
+static const struct spl_chunk *chunk_of(const struct spl_dataset *dataset, uint32_t id, uint32_t *index)
 {
     uint32_t count = 0, low = 0;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &count);
     for (uint32_t high = count; low < high;) {
-        uint32_t middle = low + (high - low) / 2;
-        if (id - chunks[middle].first_id < chunks[middle].count) {
-            const struct spl_node *node = node_of(dataset, middle);
-            size_t bytes;
-            if (node)
-                spl_chunk_decode(&chunks[middle], spl_dataset_get_page(dataset, node->page, &bytes),
-                                 id - chunks[middle].first_id, splat);
-            return node != NULL;
-        }
+        uint32_t middle = *index = low + (high - low) / 2;
+        if (id - chunks[middle].first_id < chunks[middle].count)
+            return &chunks[middle];
         if (id < chunks[middle].first_id)
             high = middle;
         else
             low = middle + 1;
     }
-    return false;
+    return NULL;
+}
+
+bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, struct spl_splat *splat)
+{
+    uint32_t words[SPL_CHUNK_WORDS_MAX + SPL_PAGE_TAIL_WORDS], index = 0;
+    const struct spl_chunk *found = chunk_of(dataset, id, &index);
+    const struct spl_node *node = found ? node_of(dataset, index) : NULL;
+    if (!node)
+        return false;
+    uint32_t count = spl_chunk_words(found) + SPL_PAGE_TAIL_WORDS; // opening has checked that the page has them
+    spl_assert(count <= sizeof words / sizeof *words);
+    uint64_t offset = dataset->pages[node->page]->offset + (uint64_t)found->geometry_word * sizeof *words;
+    if (spl_dataset_read(dataset, offset, words, count * sizeof *words, NULL))
+        return false;
+    struct spl_chunk chunk = *found;
+    chunk.geometry_word = 0;
+    spl_chunk_decode(&chunk, words, id - chunk.first_id, splat);
+    return true;
 }

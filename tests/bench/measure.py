@@ -175,8 +175,8 @@ def view_query(share):
 def serve():
     dataset, port, count = packed(scan(), "grenoble"), free_port(), 20
     begin = time.monotonic()
-    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", "", "--cache", "0", dataset],
-                              stderr=subprocess.DEVNULL)
+    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", "", "--cache", "0",
+                               dataset], stderr=subprocess.DEVNULL)
     try:
         while True:
             try:
@@ -230,7 +230,8 @@ def wrk(port, pid, path, *headers):
 def rendering_s(ops):
     """Seconds that the gpu thread has spent on views since start."""
     name = 'splatd_frame_duration_seconds_sum{route="/v1/datasets/{id}/view"} '
-    return float(next(line for line in get(ops, "/metrics")[2].decode().splitlines() if line.startswith(name))[len(name):])
+    lines = get(ops, "/metrics")[2].decode().splitlines()
+    return float(next(line for line in lines if line.startswith(name))[len(name):])
 
 
 def saturate(port, ops, clients, count):
@@ -289,8 +290,9 @@ def overload(port, seconds):
     other = [r for r in replies if r[0] != 200 and not (r[0] == 503 and r[1])]
     frame = statistics.mean(ms for *_, ms in replies if ms)  # the queue is as long as its frames together
     queue = after["queues"]["render"]["capacity"]
-    print(f"{asked} requests in {seconds} s, 4 times what a view alone allows ({1e3 * statistics.median(alone):.0f} ms): "
-          f"{len(good)} times 200, {len(replies) - len(good)} times 503; frame under load {frame:.0f} ms; resident "
+    print(f"{asked} requests in {seconds} s, 4 times what a view alone allows "
+          f"({1e3 * statistics.median(alone):.0f} ms): {len(good)} times 200, {len(replies) - len(good)} "
+          f"times 503; frame under load {frame:.0f} ms; resident "
           f"{before >> 20} MiB before, {after['memory']['resident_bytes'] >> 20} after")
     bound("neither 200 nor 503 with Retry-After", len(other), 0, f"replies {other[:3]}")
     bound("p99 of the 200s", good[int(0.99 * len(good))] / frame, queue + 2, "frame times")

@@ -1,5 +1,5 @@
-"""Batches: many views in one request, in order, each as it would be by itself; what fails is said in its place; others get
-between; who leaves costs nothing more."""
+"""Batches: many views in one request, in order, each as it would be by itself; what fails is said in its place; others
+get between; who leaves costs nothing more."""
 import io
 import json
 import socket
@@ -38,7 +38,8 @@ def test_each_part_is_the_view_by_itself():
                              "camera": {**batch["camera"], **view["camera"]}})
             assert single.headers["Splatd-Cache"] == "hit" and body == single.body == zipped.read(name), name
             assert row["name"] == name
-            for header in ("Content-Type", "Splatd-Camera", "Splatd-Depth-Unit", "Splatd-Depth-Scale", "Splatd-Complete"):
+            for header in ("Content-Type", "Splatd-Camera", "Splatd-Depth-Unit", "Splatd-Depth-Scale",
+                           "Splatd-Complete"):
                 assert headers[header] == single.headers[header] == row["headers"].get(header), (name, header)
         assert d.status()["counters"]["frames"] == frames, "what is in the cache is not rendered again"
 
@@ -56,16 +57,19 @@ def test_bad_batches_are_refused_by_name():
     with Daemon(FAKE, "--max-pixels", "10000") as d:
         one = {"width": 16, "height": 16}
         for body, field in [
-            ("", "body"), ("[]", "body"), ("{", "body"), ("{}", "views"), ({"views": []}, "views"), ({"views": {}}, "views"),
+            ("", "body"), ("[]", "body"), ("{", "body"), ("{}", "views"), ({"views": []}, "views"),
+            ({"views": {}}, "views"),
             ({"views": [one] * 257}, "views"), ({"views": [5]}, "views[0]"), ({"views": [one, []]}, "views[1]"),
-            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].fov"), ({"views": [{**one, "a": 1}]}, "views[0].a"),
+            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].fov"),
+            ({"views": [{**one, "a": 1}]}, "views[0].a"),
             ({"views": [{**one, "layers": ["color"]}]}, "views[0].layers"), ({"views": [one], "layers": "color"},
                                                                              "views[0].layers"),
             ({"views": [one], "container": "tar"}, "container"), ({"views": [{**one, "container": "zip"}]},
                                                                   "views[0].container"),
             ({"views": [one], "colour": 1}, "colour"), ({"views": [one], "quality": 0}, "views[0].quality"),
             ({"views": [one], "camera": 5}, "camera"), ('{"views":[{}],"views":[{}]}', "body"),
-            ({"views": [one], "camera": {"fx": 5}, "x": 1}, "x"), ({"views": [{"lod": 1, "width": 0}]}, "views[0].width"),
+            ({"views": [one], "camera": {"fx": 5}, "x": 1}, "x"),
+            ({"views": [{"lod": 1, "width": 0}]}, "views[0].width"),
             ({"views": [{"width": 50, "height": 50}] * 5}, "views"), ({"views": [{"views": []}]}, "views[0].views"),
             ('{"views":[{"lod":NaN}]}', "body"), ({"views": [{**one, "eye": [1, 2, 3]}]}, "views[0].eye"),
         ]:

@@ -1,5 +1,5 @@
-"""What is not rendered twice: validators, 304, HEAD, URLs with a version, the cache and its limit, equal requests that are on
-their way at the same time."""
+"""What is not rendered twice: validators, 304, HEAD, URLs with a version, the cache and its limit, equal requests that are
+on their way at the same time."""
 import re
 import socket
 import threading
@@ -47,7 +47,8 @@ def test_requests_that_mean_the_same_share_an_etag():
                      "height=48&method=splat&lod=1&layer=color&format=jpg&quality=90&margin=1&transparent=false&"
                      "background=%23000000&depth_scale=77"]:
             assert tag(same) == plain, same
-        for other in ["lod=2", "quality=91", "format=png", "method=points", "background=000001", "layer=depth", "near=0.5",
+        for other in ["lod=2", "quality=91", "format=png", "method=points", "background=000001", "layer=depth",
+                      "near=0.5",
                       "up=0,1,0", "cx=32.5", "supersample=2", "margin=1.5", "transparent=true"]:
             assert tag("eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&" + other) != plain, other
         assert d.status()["counters"]["frames"] == 0
@@ -109,7 +110,8 @@ def test_the_cache_answers_gets_and_posts():
         assert first.headers["Splatd-Cache"] == "miss"
         for reply in [d.ask(SMALL), d.post({"width": 16, "height": 16})]:
             assert reply.body == first.body and reply.headers["Splatd-Cache"] == "hit"
-            for name in set(first.headers) - {"Date", "Server-Timing", "Splatd-Cache", "ETag", "Cache-Control", "X-Request-Id"}:
+            for name in set(first.headers) - {"Date", "Server-Timing", "Splatd-Cache", "ETag", "Cache-Control",
+                                             "X-Request-Id"}:
                 assert reply.headers[name] == first.headers[name], name
         status = d.status()
         assert (status["counters"]["cache_hits"], status["counters"]["cache_misses"]) == (2, 1), status

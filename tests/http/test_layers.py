@@ -46,7 +46,8 @@ def containers_are_cached_like_any_view(d):
     assert d.post({"camera": {"eye": [3, 0.2, 1], "target": [0, 0, 1]}, "width": 64, "height": 48, "chroma": 420,
                    "layers": "color,depth", "container": "zip"}).headers["Content-Type"] == "application/zip"
     tags = {d.view(**LOOK, **more).headers["ETag"] for more in
-            ({"layers": "color,depth"}, {"layers": "color"}, {"layer": "color"}, {"layers": "color", "container": "zip"},
+            ({"layers": "color,depth"}, {"layers": "color"}, {"layer": "color"},
+             {"layers": "color", "container": "zip"},
              {"layers": "color,depth", "format": "png"}, {"layers": "color,normal"})}
     assert len(tags) == 6
     again = d.ask(VIEW + "?layers=color,depth&eye=3,0.2,1&target=0,0,1&width=64&height=48",
@@ -65,9 +66,11 @@ def test_bad_lists_are_refused_by_name():
                              ("format=webp&chroma=444", "chroma" if WEBP else "format")]:
             reply = d.ask(f"{VIEW}?{query}")
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
-        for body, field in [({"layers": []}, "layers"), ({"layers": [1]}, "layers"), ({"layers": ["color", "color"]}, "layers"),
+        for body, field in [({"layers": []}, "layers"), ({"layers": [1]}, "layers"),
+                            ({"layers": ["color", "color"]}, "layers"),
                             ({"layers": {"color": 1}}, "layers"), ({"layers": ["color"], "container": 1}, "container"),
-                            ({"camera": {"layers": ["color"]}}, "layers"), ({"chroma": "444"}, "chroma"), ({"x": 1}, "x")]:
+                            ({"camera": {"layers": ["color"]}}, "layers"), ({"chroma": "444"}, "chroma"),
+                            ({"x": 1}, "x")]:
             reply = d.post(body)
             assert reply.status == 400 and reply.json()["field"] == field, (body, reply.body)
         assert d.status()["counters"]["frames"] == 0
@@ -82,7 +85,8 @@ def sampling(jpeg):
 
 
 def quality_and_chroma_of_jpeg(d):
-    for quality, chroma, wanted in [(90, None, 0x22), (95, None, 0x11), (90, 444, 0x11), (95, 420, 0x22), (20, 420, 0x22)]:
+    for quality, chroma, wanted in [(90, None, 0x22), (95, None, 0x11), (90, 444, 0x11), (95, 420, 0x22),
+                                    (20, 420, 0x22)]:
         more = {"chroma": chroma} if chroma else {}
         assert sampling(d.view(**LOOK, quality=quality, **more).body) == wanted, (quality, chroma)
     assert len(d.view(**LOOK, quality=20).body) < len(d.view(**LOOK, quality=90).body)

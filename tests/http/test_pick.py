@@ -7,7 +7,8 @@ from harness import FAKE, REAL, VIEW, Daemon, run
 
 PICK = VIEW.replace("/view", "/pick")
 WIDTH, HEIGHT = 160, 120
-CAMERAS = ["eye=3,0.2,1&target=0,0,1&fov=50", "eye=2,-1.5,2.5&target=0,0.3,0.8&fx=140&fy=150&cx=70.25&cy=66.5&method=points",
+CAMERAS = ["eye=3,0.2,1&target=0,0,1&fov=50",
+           "eye=2,-1.5,2.5&target=0,0.3,0.8&fx=140&fy=150&cx=70.25&cy=66.5&method=points",
            "eye=1.5,0.4,1&target=0,0,1&up=0,1,0.2&lod=0&margin=0.5"]
 
 
@@ -85,12 +86,14 @@ def picks_are_views_of_one_pixel(d):
 
 def test_bad_picks_are_refused_by_name():
     with Daemon(FAKE) as d:
-        for query, field in [("", "x"), ("x=1", "y"), ("y=1", "x"), ("x=-0.1&y=1", "x"), ("x=1&y=721", "y"), ("x=nan&y=1", "x"),
+        for query, field in [("", "x"), ("x=1", "y"), ("y=1", "x"), ("x=-0.1&y=1", "x"), ("x=1&y=721", "y"),
+                             ("x=nan&y=1", "x"),
                              ("x=1&y=inf", "y"), ("x=1,2&y=1", "x"), ("x=&y=1", "x"), ("x=1&x=1&y=1", "x"),
                              ("x=1&y=1&width=0", "width"), ("x=65&y=1&width=64", "x"), ("x=1&y=1&format=png", "format"),
                              ("x=1&y=1&layer=depth", "layer"), ("x=1&y=1&supersample=2", "supersample"),
                              ("x=1&y=1&budget=5ms", "budget"), ("x=1&y=1&colour=5", "colour"), ("x=1&y=1&v=1", "v"),
-                             ("x=1&y=1&margin=-1", "margin"), ("x=1&y=1&lod=nan", "lod"), ("x=1&y=1&matrix=1", "matrix")]:
+                             ("x=1&y=1&margin=-1", "margin"), ("x=1&y=1&lod=nan", "lod"),
+                             ("x=1&y=1&matrix=1", "matrix")]:
             reply = d.ask(f"{PICK}?{query}")
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
         assert d.ask(VIEW + "?x=1").json()["field"] == "x"
@@ -106,8 +109,8 @@ def test_a_pick_waits_in_the_queue_like_a_view():
 
 
 def every_parameter_of_a_pick(d):
-    reply = d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&up=0,0,1&fx=60&fy=60&cx=32&cy=24&width=64&height=48&near=0.1&"
-                  "far=50&method=splat&lod=1&margin=1")
+    reply = d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&up=0,0,1&fx=60&fy=60&cx=32&cy=24&width=64&height=48&"
+                  "near=0.1&far=50&method=splat&lod=1&margin=1")
     assert abs(reply.json()["depth"] - 3) < 0.02, reply.body
     assert abs(d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&fov=60&width=64&height=48").json()["depth"] - 3) < 0.02
 

@@ -371,6 +371,34 @@ static void test_files_that_change_in_place(void **state)
     free(splats);
 }
 
+static void test_splats_by_id(void **state)
+{
+    (void)state;
+    enum { count = 1000 };
+    struct make_splat *splats = some_splats(count);
+    struct spl_dataset *dataset = make_dataset_levels(splats, count, 1); // ids are indices
+    struct spl_splat splat;
+    for (uint32_t id = 0; id < count; id++) {
+        assert_true(spl_dataset_find_splat(dataset, id, &splat));
+        assert_int_equal(splat.classification, id % 3);
+        assert_int_equal(splat.color[1], 100);
+        assert_true(fabsf(splat.radius - splats[id].radius) < 0.1f * splats[id].radius);
+    }
+    splat.classification = 77;
+    assert_false(spl_dataset_find_splat(dataset, count, &splat));
+    assert_false(spl_dataset_find_splat(dataset, UINT32_MAX, &splat));
+    assert_int_equal(splat.classification, 77);
+    spl_dataset_close(dataset);
+
+    dataset = make_dataset_levels(splats, count, 2); // several nodes: each id is some splat, none beyond the last is
+    uint32_t all = (uint32_t)spl_dataset_get_info(dataset)->splats;
+    for (uint32_t id = 0; id < all; id++)
+        assert_true(spl_dataset_find_splat(dataset, id, &splat) && splat.classification < 3);
+    assert_false(spl_dataset_find_splat(dataset, all, &splat));
+    spl_dataset_close(dataset);
+    free(splats);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -379,6 +407,7 @@ int main(void)
         cmocka_unit_test(test_every_truncation),
         cmocka_unit_test(test_other_files),
         cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_splats_by_id),
         cmocka_unit_test(test_version_follows_content),
         cmocka_unit_test(test_refused_memory),
         cmocka_unit_test(test_files_that_change_in_place),
