@@ -19,7 +19,7 @@ static const struct known {
     {"finer-is-better", NULL, NULL, "points", -1, ALIASING},
     {"finer-is-better", "density", NULL, "splat", -1, BLUR},
     {"finer-is-better", "powerline", "from-above", "splat", -1.2, BLUR},
-    {"finer-is-better", "thin-walls", "wedge", "splat", -0.3, BLUR},
+    {"finer-is-better", "thin-walls", "wedge", "splat", -1.5, BLUR},
 };
 enum { known_count = sizeof known / sizeof *known };
 
