@@ -80,6 +80,7 @@ def test_not_ready_while_loading():
         assert reply.status == 503 and b"loaded" in reply.body, reply.body
         assert metrics(d)["splatd_ready"] == 0
         eventually(lambda: d.ops("/readyz").status == 200)
+        eventually(lambda: d.port)  # said on stderr, which a thread of the harness reads
         assert d.ask(fresh(SMALL)).status == 200
 
 
