@@ -193,7 +193,8 @@ static void print_table(const struct spl_report *r)
         if (!i)
             printf("\nwhere the scan has a point a pixel or more, %.1f %% of what is seen:\n", 100 * first.share);
         spl_report_setting_name(&r->profile.points[i].setting, name);
-        printf("  %-25s PSNR %6.2f dB  holes %.3f %%  see-through %.3f %%  depth beyond a radius %.3f %%\n", name,
+        int shown = r->profile.points[i].setting.supersample == 1 ? 25 : 26;
+        printf("  %-*s PSNR %6.2f dB  holes %.3f %%  see-through %.3f %%  depth beyond a radius %.3f %%\n", shown, name,
                d.psnr, 100 * d.holes, 100 * d.see_through, 100 * d.depth_beyond);
     }
     printf("\n*: on the front, none is both faster and more accurate; calibrator %.1f ms (quartiles %.1f to %.1f)\n",
