@@ -53,7 +53,7 @@ static struct tally compare(const struct spl_frame *a, const struct spl_frame *b
         } else if (!isnan(da[i])) {
             double relative = fabs((double)da[i] - db[i]) / db[i];
             t.depth_worst = fmax(t.depth_worst, relative);
-            t.depth_differs += relative > 2e-6; /* half of a step of the sums of depth */
+            t.depth_differs += relative > 1e-6;
         }
         int worst = 0;
         for (int c = 0; c < 4; c++)

@@ -33,7 +33,7 @@ static void check_place(struct suite *suite, const struct scan *scan)
                 continue;
             measure_shift(&frame, truth, shift);
             report_at_most(&suite->report, "lies-on-the-truth", &place, hypot(shift[0], shift[1]),
-                           method == SPL_METHOD_SPLAT ? 0.15 : 0.25,
+                           method == SPL_METHOD_SPLAT ? 0.1 : 0.25,
                            "pixels; blur has no direction, the nearer of two points on a slant is 1/6 off");
             spl_frame_finish(&frame);
         }

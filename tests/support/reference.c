@@ -119,8 +119,8 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     float center[2], z;
     footprint(s, d, first, last, center);
     float pixel = SPL_LOW_PASS * d->p[2] / (float)s->camera.fx;
-    float facing = d->n[0] * (d->p[0] / d->p[2]) + d->n[1] * (d->p[1] / d->p[2]) + d->n[2];
-    float slant = 1 / fmaxf(fabsf(facing), 1e-6f);
+    float inverse = 1.0f / d->p[2], rx = d->p[0] * inverse, ry = d->p[1] * inverse;
+    float facing = d->n[0] * rx + d->n[1] * ry + d->n[2], slant = 1.0f / fmaxf(fabsf(facing), 1e-6f);
     slant = slant < 1 ? 1 : slant > SPL_MARGIN_SLANT ? SPL_MARGIN_SLANT : slant;
     float margin = s->margin * (d->radius > pixel ? d->radius : pixel) * slant;
     for (int y = first[1]; y <= last[1]; y++) {
