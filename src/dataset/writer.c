@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <xxhash.h>
@@ -141,12 +142,18 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
         goto failed;
     }
     sweep(path);
-    writer->fd = open(writer->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (writer->fd < 0) {
-        rc = spl_fail_errno(err, errno, "cannot create %s", writer->part_path);
-        goto failed;
+    for (;;) { /* again where another's sweep came before our lock */
+        struct stat st;
+        writer->fd = open(writer->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+        if (writer->fd < 0) {
+            rc = spl_fail_errno(err, errno, "cannot create %s", writer->part_path);
+            goto failed;
+        }
+        flock(writer->fd, LOCK_EX | LOCK_NB); /* in use; file systems without locks are not swept either */
+        if (fstat(writer->fd, &st) || st.st_nlink)
+            break;
+        close(writer->fd);
     }
-    flock(writer->fd, LOCK_EX | LOCK_NB); /* says that it is in use; file systems without locks are not swept either */
     *out = writer;
     return SPL_OK;
 failed:
