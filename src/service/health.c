@@ -59,7 +59,8 @@ static void say_status(struct spl_service *service)
         [SPL_PIPELINE_REBUILDING] = "the device was lost and is being reopened",
         [SPL_PIPELINE_FAILED] = "the device is gone",
     };
-    enum spl_pipeline_state state = spl_pipeline_get_state(service->pipeline);
+    enum spl_pipeline_state state =
+        service->pipeline ? spl_pipeline_get_state(service->pipeline) : SPL_PIPELINE_STARTING;
     if (state != service->said_state && !service->leaving)
         spl_supervisor_say_status(lines[state]);
     service->said_state = state;

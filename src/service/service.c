@@ -1,4 +1,4 @@
-/* The loop's life: open datasets, bind, start the pipeline, serve once it is ready, drain on a signal.
+/* The loop's life: bind, open datasets, start the pipeline, serve once it is ready, drain on a signal.
  *
  * SIGTERM or SIGINT: no new connections, what runs is finished and answered with "Connection: close", then 0. A second
  * signal ends the process at once. SIGHUP reads tokens and keys again. A pipeline that failed for good is drained the
@@ -69,6 +69,8 @@ static void on_signal(uv_signal_t *handle, int number)
     spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
                  service->requests_open);
     spl_supervisor_say_stopping("finishing what runs");
+    if (service->loading)
+        _exit(0); // loading.c
     if (service->options->drain_delay_ms && service->daemon)
         uv_timer_start(&service->drain_timer, on_leave, service->options->drain_delay_ms, 0);
     else
@@ -227,6 +229,15 @@ static int open_sockets(struct spl_service *service, struct spl_error *err)
     return 0;
 }
 
+int spl_service_go_on(struct spl_service *service, struct spl_error *err)
+{
+    const struct spl_service_options *options = service->options;
+    int rc = spl_cache_create(options->cache_bytes, &service->cache, err);
+    if (!rc && *options->tours)
+        rc = spl_tours_open(service, options->tours, err);
+    return rc ? rc : start_pipeline(service, err);
+}
+
 int spl_service_run(const struct spl_service_options *options, struct spl_error *err)
 {
     struct spl_service *service = spl_alloc(1, sizeof *service, err);
@@ -240,10 +251,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     if (rc)
         goto free_service;
     if ((rc = open_sockets(service, err)) || (rc = spl_access_init(service, err)) ||
-        (rc = spl_catalog_open(&service->catalog, options->datasets.items, options->datasets.count, options->verify,
-                               err)) ||
-        (rc = spl_cache_create(options->cache_bytes, &service->cache, err)) ||
-        (*options->tours && (rc = spl_tours_open(service, options->tours, err))) || (rc = start_pipeline(service, err)))
+        (rc = spl_loading_start(service, err)))
         goto done;
     spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);

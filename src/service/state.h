@@ -130,6 +130,7 @@ struct spl_service {
     struct spl_cache *cache;
     size_t waiting_count, requests_open, connections_open;
     size_t reply_bytes; /* of views that clients have not read yet and that are not in the cache */
+    bool loading;       /* the datasets at start are being opened; there is no pipeline yet */
     bool leaving;       /* asked to stop: /readyz says no */
     bool draining;      /* nothing more is accepted */
     uint64_t drain_began_ns;
@@ -157,6 +158,12 @@ void spl_waiting_resume(struct request *request);                    /* its resp
 void spl_waiting_complete(struct spl_service *service);              /* hands out every job that is done */
 void spl_waiting_sweep(struct spl_service *service);                 /* deadlines and departures */
 void spl_waiting_refuse_all(struct spl_service *service);
+
+/* loading.c: opens the datasets at start beside the loop, then calls spl_service_go_on() or stops the loop. */
+int spl_loading_start(struct spl_service *service, struct spl_error *err);
+
+/* service.c: cache, tours and pipeline, once the datasets are open. */
+int spl_service_go_on(struct spl_service *service, struct spl_error *err);
 
 /* library.c: datasets that come, change and go while the service runs. */
 void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */

@@ -1,9 +1,12 @@
 """The second listener: what probes and Prometheus are told when all is well, when the device is lost or hangs, when the
 queue is full, when the main listener has no connection left, and on the way out."""
+import os
+import pathlib
 import re
 import signal
 import socket
 import subprocess
+import tempfile
 import threading
 import time
 
@@ -82,6 +85,37 @@ def test_not_ready_while_loading():
         eventually(lambda: d.ops("/readyz").status == 200)
         eventually(lambda: d.port)  # said on stderr, which a thread of the harness reads
         assert d.ask(fresh(SMALL)).status == 200
+
+
+def test_probes_are_answered_while_datasets_are_opened():
+    with tempfile.TemporaryDirectory() as folder:
+        preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_SLOW_DISK"]]))
+        for gate, waits in ((os.path.join(folder, "a"), True), (os.path.join(folder, "b"), False)):
+            with Daemon(FAKE, wait_for="health and metrics", LD_PRELOAD=preload, SLOW_DISK_GATE=gate) as d:
+                for _ in range(5):
+                    assert d.ops("/healthz").status == 200
+                    reply = d.ops("/readyz")
+                    assert reply.status == 503 and b"loaded" in reply.body, reply.body
+                    got = metrics(d)
+                    assert got["splatd_ready"] == got["splatd_datasets"] == 0
+                assert d.process.poll() is None and not any("dataset wall" in line for line in d.lines), d.lines
+                if not waits:
+                    continue  # SIGTERM does not wait for the disk either
+                pathlib.Path(gate).touch()
+                eventually(lambda: d.ops("/readyz").status == 200)
+                eventually(lambda: d.port)
+                assert d.ask(fresh(SMALL)).status == 200
+
+
+def test_a_dataset_that_cannot_be_opened_ends_the_start():
+    with tempfile.TemporaryDirectory() as folder:
+        broken = pathlib.Path(folder, "broken.spld")
+        broken.write_bytes(pathlib.Path(WALL).read_bytes()[:-100])
+        try:
+            Daemon(FAKE, datasets=[WALL, broken])
+            raise SystemExit("it started")
+        except AssertionError as error:
+            assert re.search(r"exit code [12] before ready", str(error)) and "broken.spld" in str(error), error
 
 
 def test_not_ready_while_the_queue_is_full():

@@ -1,0 +1,54 @@
+/* The datasets at start. A thread of libuv opens and verifies them, which takes as long as reading them, while the loop
+ * runs: probes are answered and signals taken from the first moment on. Then the pipeline starts.
+ *
+ * Invariant: service->loading is set while the thread has *loading, and service->catalog is empty until then. A thread
+ * in the middle of a file cannot be stopped, so a signal ends the process (service.c): nothing has been served or
+ * written yet. Owned by the loop's thread, but for run(). */
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "service/state.h"
+
+struct loading {
+    uv_work_t work;
+    struct spl_service *service;
+    struct spl_catalog catalog;
+    struct spl_error err;
+};
+
+static void run(uv_work_t *work)
+{
+    struct loading *loading = work->data;
+    const struct spl_service_options *options = loading->service->options;
+    spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
+                     &loading->err);
+}
+
+static void after(uv_work_t *work, int status)
+{
+    struct loading *loading = work->data;
+    struct spl_service *service = loading->service;
+    (void)status;
+    service->loading = false;
+    service->catalog = loading->catalog;
+    service->failure = loading->err;
+    free(loading);
+    if (service->failure.code || spl_service_go_on(service, &service->failure))
+        uv_stop(&service->loop);
+}
+
+int spl_loading_start(struct spl_service *service, struct spl_error *err)
+{
+    struct loading *loading = spl_alloc(1, sizeof *loading, err);
+    if (!loading)
+        return SPL_E_NOMEM;
+    loading->work.data = loading;
+    loading->service = service;
+    int rc = uv_queue_work(&service->loop, &loading->work, run, after);
+    if (rc) {
+        free(loading);
+        return spl_fail(err, SPL_E_IO, "cannot load datasets: %s", uv_strerror(rc));
+    }
+    service->loading = true;
+    return 0;
+}
