@@ -10,11 +10,11 @@ import sys
 import tempfile
 
 # A room includes itself, rooms of lower floors, and public headers.
-FLOOR = {"base": 0, "geom": 1, "cloud": 2, "dataset": 3, "gpu": 3, "image": 3, "render": 4,
+FLOOR = {"base": 0, "geom": 1, "cloud": 2, "sparse": 2, "dataset": 3, "gpu": 3, "image": 3, "render": 4,
          "measure": 5, "pack": 5, "synth": 5, "service": 6, "cmd": 7, "main.c": 8}
 # The only room that sees these outside headers.
 OUTSIDE = [(re.compile(r"^(vulkan|GL|GLES\d?|EGL|KHR)/"), "gpu"), (re.compile(r"^(microhttpd|uv)\.h$"), "service"),
-           (re.compile(r"^(libav\w+|libswscale)/"), "image")]
+           (re.compile(r"^(libav\w+|libswscale)/"), "image"), (re.compile(r"^cblas\.h$"), "sparse")]
 # A public header includes public headers and these.
 PLAIN_C = {"stdbool.h", "stddef.h", "stdint.h", "stdio.h", "math.h"}
 LONGEST = 800
@@ -72,6 +72,7 @@ PLANTED = {  # file: (content, the start of what must be said; None = nothing)
     "src/render/api.c": ("#include <vulkan/vulkan.h>\n", "vulkan/vulkan.h outside src/gpu"),
     "src/render/gl.c": ("# include <GL/glcorearb.h>\n", "GL/glcorearb.h outside src/gpu"),
     "src/cmd/video.c": ("#include <libavcodec/avcodec.h>\n", "libavcodec/avcodec.h outside src/image"),
+    "src/pack/blas.c": ("#include <cblas.h>\n", "cblas.h outside src/sparse"),
     "src/cmd/loop.c": ("#include <uv.h>\n", "uv.h outside src/service"),
     "src/measure/side.c": ('#include "pack/pack.h"\n', "measure includes pack/pack.h"),
     "src/attic/new.c": ('#include "base/error.h"\n', "unknown room attic"),
