@@ -20,6 +20,19 @@ static const struct {
     [SPL_LATENCY_ENCODE] = {"encode_duration", "How long images took to encode."},
 };
 
+static const struct {
+    const char *name;
+    size_t offset; /* in struct spl_frame_stats */
+} stages[SPL_LATENCY_STAGES] = {
+    {"select", offsetof(struct spl_frame_stats, select_ms)},
+    {"upload", offsetof(struct spl_frame_stats, upload_ms)},
+    {"clear", offsetof(struct spl_frame_stats, clear_ms)},
+    {"depth", offsetof(struct spl_frame_stats, depth_ms)},
+    {"shade", offsetof(struct spl_frame_stats, shade_ms)},
+    {"resolve", offsetof(struct spl_frame_stats, resolve_ms)},
+    {"readback", offsetof(struct spl_frame_stats, readback_ms)},
+};
+
 static struct spl_route_latency *find(struct spl_latencies *latencies, const char *route)
 {
     size_t i = 0;
@@ -42,6 +55,12 @@ void spl_latency_observe(struct spl_latencies *latencies, const char *route, enu
         i++;
     histogram->buckets[i]++;
     histogram->sum_s += seconds;
+}
+
+void spl_latency_add_stages(struct spl_latencies *latencies, const struct spl_frame_stats *stats)
+{
+    for (int i = 0; i < SPL_LATENCY_STAGES; i++)
+        latencies->stage_ms[i] += *(const double *)((const char *)stats + stages[i].offset);
 }
 
 void spl_print_label(FILE *out, const char *text)
@@ -87,4 +106,8 @@ void spl_latency_print(const struct spl_latencies *latencies, FILE *out)
             if (is_used(&latencies->routes[i].of[m]))
                 print_histogram(out, table[m].name, latencies->routes[i].route, &latencies->routes[i].of[m]);
     }
+    fprintf(out, "# HELP splatd_stage_seconds_total Time that stages of frames have taken.\n"
+                 "# TYPE splatd_stage_seconds_total counter\n");
+    for (int i = 0; i < SPL_LATENCY_STAGES; i++)
+        fprintf(out, "splatd_stage_seconds_total{stage=\"%s\"} %.9g\n", stages[i].name, latencies->stage_ms[i] / 1000);
 }

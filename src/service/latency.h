@@ -6,7 +6,9 @@
 #include <stdint.h>
 #include <stdio.h>
 
-enum { SPL_HISTOGRAM_BUCKETS = 17, SPL_LATENCY_ROUTES = 64 };
+#include <splatd/render.h>
+
+enum { SPL_HISTOGRAM_BUCKETS = 17, SPL_LATENCY_ROUTES = 64, SPL_LATENCY_STAGES = 7 };
 
 /* What is measured of a request: the whole until its reply is handed to the client's connection, and of those that are
  * rendered the wait in the queue, the frame and its encoding. */
@@ -23,12 +25,16 @@ struct spl_latencies {
         struct spl_histogram of[SPL_LATENCY_COUNT];
     } routes[SPL_LATENCY_ROUTES];
     size_t count;
+    double stage_ms[SPL_LATENCY_STAGES]; /* of all frames together */
 };
 
 /* Adds one observation. `route` is a string that stays, or NULL for requests of no route. */
 void spl_latency_observe(struct spl_latencies *latencies, const char *route, enum spl_latency which, double seconds);
 
-/* The histograms in Prometheus' text format 0.0.4. */
+/* Adds what the stages of one frame took. */
+void spl_latency_add_stages(struct spl_latencies *latencies, const struct spl_frame_stats *stats);
+
+/* The histograms and the sums of stages in Prometheus' text format 0.0.4. */
 void spl_latency_print(const struct spl_latencies *latencies, FILE *out);
 
 /* `text` as the inside of a label's quotes. */

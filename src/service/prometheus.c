@@ -14,6 +14,7 @@
 #include "service/health.h"
 #include "service/latency.h"
 #include "service/state.h"
+#include "service/tour.h"
 
 static void print(FILE *out, const char *name, const char *type, const char *help, double value)
 {
@@ -57,6 +58,8 @@ static void print_pipeline(FILE *out, struct spl_service *service)
     gauge(out, "splatd_encode_queue_length", "Frames that wait for an encoder.", (double)status.encode_length);
     gauge(out, "splatd_encode_queue_capacity", "Frames that may wait.", (double)status.encode_capacity);
     gauge(out, "splatd_device_memory_bytes", "Device memory that the renderer holds.", (double)status.device_bytes);
+    gauge(out, "splatd_device_memory_limit_bytes", "Device memory that it may hold.",
+          (double)status.device_limit_bytes);
     gauge(out, "splatd_frame_mean_seconds", "Moving mean of the time a frame takes.", status.frame_ms / 1000);
     gauge(out, "splatd_standstill_seconds", "For how long nothing has moved although there is work; 0 when idle.",
           (double)spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_S);
@@ -89,12 +92,37 @@ static void print_process(FILE *out, struct spl_service *service)
           (double)time(NULL) - (double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S);
 }
 
-static double served(const struct spl_catalog *catalog)
+/* One series a dataset: as many as the operator has put there, never what a client asks for. */
+static void print_datasets(FILE *out, const struct spl_catalog *catalog)
 {
-    double count = 0;
-    for (size_t i = 0; i < catalog->count; i++)
-        count += catalog->slots[i].current != NULL;
-    return count;
+    double served = 0, refused = 0;
+    fprintf(out, "# HELP splatd_dataset_resident_bytes Device memory that a dataset's pages hold.\n"
+                 "# TYPE splatd_dataset_resident_bytes gauge\n");
+    for (size_t i = 0; i < catalog->count; i++) {
+        const struct spl_catalog_slot *slot = &catalog->slots[i];
+        served += slot->current != NULL;
+        refused += slot->reason[0] != '\0';
+        if (slot->current) // an id has no character that a label would have to escape
+            fprintf(out, "splatd_dataset_resident_bytes{dataset=\"%s\"} %llu\n", slot->id,
+                    (unsigned long long)atomic_load(&slot->current->resident_bytes));
+    }
+    gauge(out, "splatd_datasets", "Datasets that are served.", served);
+    gauge(out, "splatd_datasets_refused", "Datasets whose newest file is not served; /v1/datasets says why.", refused);
+}
+
+static void print_tours(FILE *out, const struct spl_tours *tours)
+{
+    unsigned count[SPL_TOUR_FAILED + 1] = {0};
+    const struct spl_tour *tour;
+    if (tours) {
+        TAILQ_FOREACH(tour, &tours->all, link) {
+            count[tour->state]++;
+        }
+    }
+    fprintf(out, "# HELP splatd_tours Tours that are kept.\n# TYPE splatd_tours gauge\n");
+    for (int i = 0; i <= SPL_TOUR_FAILED; i++)
+        fprintf(out, "splatd_tours{state=\"%s\"} %u\n", spl_tour_state_names[i], count[i]);
+    gauge(out, "splatd_tours_bytes", "Disk that they fill.", tours ? (double)tours->bytes : 0);
 }
 
 char *spl_prometheus_print(struct spl_service *service)
@@ -108,7 +136,8 @@ char *spl_prometheus_print(struct spl_service *service)
                  "splatd_build_info{version=\"" SPLATD_VERSION "\"} 1\n");
     gauge(out, "splatd_ready", "1 when /readyz says ok.", spl_health_is_ready(service, why));
     gauge(out, "splatd_alive", "1 when /healthz says ok.", spl_health_is_alive(service, why));
-    gauge(out, "splatd_datasets", "Datasets that are served.", served(&service->catalog));
+    print_datasets(out, &service->catalog);
+    print_tours(out, service->tours);
     gauge(out, "splatd_connections", "Connections of the main listener.", (double)service->connections_open);
     gauge(out, "splatd_requests_open", "Requests that are being read, worked on or answered.",
           (double)service->requests_open);

@@ -53,6 +53,7 @@ static void observe(struct spl_service *service, const struct spl_job *job)
     spl_latency_observe(&service->latencies, route, SPL_LATENCY_QUEUE, job->queue_ms / 1000);
     spl_latency_observe(&service->latencies, route, SPL_LATENCY_FRAME,
                         (double)(job->rendered_ns - job->began_ns) / SPL_NS_PER_S);
+    spl_latency_add_stages(&service->latencies, &job->stats);
     if (!job->err.code)
         spl_latency_observe(&service->latencies, route, SPL_LATENCY_ENCODE, job->encode_ms / 1000);
 }

@@ -3,6 +3,7 @@ queue is full, when the main listener has no connection left, and on the way out
 import os
 import pathlib
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -74,6 +75,34 @@ def test_metrics_count_what_happens():
             assert len(buckets) == 18 and buckets == sorted(buckets) and buckets[-1] == count, (which, buckets)
             assert got[f"{name}_count{{{route}}}"] == count and got[f"{name}_sum{{{route}}}"] > 0
         assert got['splatd_request_duration_seconds_count{route="none"}'] == 1
+
+
+def test_metrics_of_datasets_stages_and_tours():
+    with tempfile.TemporaryDirectory() as top:
+        home = pathlib.Path(top, "home")
+        home.mkdir()
+        shutil.copy(WALL, home / "a.spld")
+        (home / "broken.spld").write_bytes(b"no dataset")
+        with Daemon(REAL, "--tours", str(pathlib.Path(top, "tours")), "--watch", "50", datasets=[str(home)]) as d:
+            got = metrics(d)
+            assert (got["splatd_datasets"], got["splatd_datasets_refused"]) == (1, 1), got
+            assert 'splatd_dataset_resident_bytes{dataset="broken"}' not in got
+            stages = [name for name in got if name.startswith("splatd_stage_seconds_total{")]
+            assert len(stages) == 7 and not any(got[name] for name in stages), got
+            path = {"keyframes": [{"camera": {"eye": [x, 0, 1], "target": [0, 0, 1], "fov": 60}} for x in (3, 4)]}
+            reply = d.post({"path": path, "frames": 3, "settings": {"width": 32, "height": 32}}, "/v1/datasets/a/tours")
+            assert reply.status == 202, reply.body
+            eventually(lambda: metrics(d)['splatd_tours{state="done"}'] == 1)
+            got = metrics(d)
+            assert not any(got[f'splatd_tours{{state="{state}"}}'] for state in ("rendering", "video", "failed"))
+            assert got["splatd_tour_frames_total"] == 3 and got["splatd_tours_bytes"] > 0
+            assert got['splatd_stage_seconds_total{stage="shade"}'] > 0
+            one = d.ask("/v1/datasets/a").json()["resident_bytes"]
+            assert got['splatd_dataset_resident_bytes{dataset="a"}'] == one > 0
+            assert one <= got["splatd_device_memory_bytes"] <= got["splatd_device_memory_limit_bytes"]
+            (home / "a.spld").unlink()
+            eventually(lambda: metrics(d)["splatd_datasets"] == 0)
+            assert 'splatd_dataset_resident_bytes{dataset="a"}' not in metrics(d)
 
 
 def test_not_ready_while_loading():
