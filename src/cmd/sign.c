@@ -19,7 +19,7 @@ static void usage(FILE *out)
         "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
         "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
         "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
-        "dataset, its profile and its views can be signed.\n\n"
+        "dataset, its profile, its views and picks can be signed.\n\n"
         "Make a key, once:\n"
         "  openssl rand -hex 32 >url.key; chmod 600 url.key\n"
         "A picture for a dashboard, for a day:\n"

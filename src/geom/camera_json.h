@@ -23,7 +23,7 @@ enum spl_value_kind {
     SPL_KIND_END, /* the service's own kinds go on from here */
 };
 
-enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8 };
+enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16 };
 
 enum spl_camera_param {
 #define PARAM(name, alias, kind, places, help) SPL_CAMERA_##name,

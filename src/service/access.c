@@ -131,6 +131,8 @@ static void fill_key(struct request *request, uint8_t key[SPL_BUCKET_KEY])
     }
 }
 
+static const uint8_t everybody[SPL_BUCKET_KEY];
+
 static bool is_within_rates(struct request *request)
 {
     struct spl_access *access = request->service->access;
@@ -142,8 +144,7 @@ static bool is_within_rates(struct request *request)
         wait_s = spl_buckets_take(access->addresses, key, spl_now_ns());
     }
     if (!wait_s && access->all) {
-        memset(key, 0, sizeof key);
-        wait_s = spl_buckets_take(access->all, key, spl_now_ns());
+        wait_s = spl_buckets_take(access->all, everybody, spl_now_ns());
         whose = "all clients together ask";
     }
     if (!wait_s)
@@ -156,6 +157,18 @@ static bool is_within_rates(struct request *request)
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
     return false;
+}
+
+void spl_access_charge(struct request *request, unsigned count)
+{
+    struct spl_access *access = request->service->access;
+    uint8_t key[SPL_BUCKET_KEY];
+    if (access && access->addresses) {
+        fill_key(request, key);
+        spl_buckets_charge(access->addresses, key, count);
+    }
+    if (access && access->all)
+        spl_buckets_charge(access->all, everybody, count);
 }
 
 /* The request's Origin where its pages may read replies; NULL otherwise. */

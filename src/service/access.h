@@ -23,6 +23,9 @@ void spl_access_reload(struct spl_service *service);
 bool spl_access_admit(struct request *request, const char *method);
 bool spl_access_check(struct request *request, enum spl_scope scope, const struct spl_call *call);
 
+/* Counts an admitted request as `count` more of its address, for what it wants costs as much. */
+void spl_access_charge(struct request *request, unsigned count);
+
 /* May listings that answer `request` show dataset `id`? */
 bool spl_access_may_see(struct request *request, const char *id);
 

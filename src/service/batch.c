@@ -249,6 +249,7 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         spl_fail(&err, SPL_E_BUSY, "the queue of views is full; come back later");
         goto refuse;
     }
+    spl_access_charge(request, (unsigned)batch->views.count - 1);
     request->batch = batch;
     spl_waiting_add(request, spl_now_ns() + (batch->views.count + 1) * service->options->deadline_ms * SPL_NS_PER_MS);
     spl_batch_go_on(batch);

@@ -75,3 +75,10 @@ unsigned spl_buckets_take(struct spl_buckets *buckets, const uint8_t key[SPL_BUC
     }
     return 1 + (unsigned)((1 - bucket->left) / buckets->per_second);
 }
+
+void spl_buckets_charge(struct spl_buckets *buckets, const uint8_t key[SPL_BUCKET_KEY], unsigned count)
+{
+    struct bucket *bucket = find(buckets, key);
+    if (bucket->at_ns) // else another address has its place
+        bucket->left -= count;
+}

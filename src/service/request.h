@@ -46,6 +46,11 @@ int spl_pick_request_from_query(const char *query, size_t length, const struct s
                                 const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err);
 
+/* POST …/pick: the same from a body, its camera in any form that a view's takes. */
+int spl_pick_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                               const struct spl_camera_limits *limits, struct spl_view_request *out,
+                               struct spl_error *err);
+
 /* POST …/views: many views, in the order that they were listed. */
 enum { SPL_VIEWS_MAX = 256 };
 struct spl_views_request {

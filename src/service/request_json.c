@@ -46,7 +46,7 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
     json_object_foreach(object, name, json)
     {
         int rc;
-        if (place == SPL_BODY && !strcmp(name, "camera")) {
+        if (place & (SPL_BODY | SPL_PICK_BODY) && !strcmp(name, "camera")) {
             if (!json_is_object(json))
                 return spl_fail_field(err, SPL_E_INPUT, name, "camera must be an object, not %s",
                                       spl_json_type_name(json));
@@ -64,26 +64,31 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
     return 0;
 }
 
+int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
+                         struct spl_error *err)
+{
+    json_error_t where;
+    if (!length)
+        return 0;
+    json_t *document = json_loadb(body, length, JSON_REJECT_DUPLICATES, &where);
+    int rc;
+    if (!document)
+        rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
+                            where.text);
+    else if (!json_is_object(document))
+        rc = spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
+                            spl_json_type_name(document));
+    else
+        rc = spl_values_from_object(values, document, place, err);
+    json_decref(document);
+    return rc;
+}
+
 int spl_view_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err)
 {
     struct values values = {0};
-    if (length) {
-        json_error_t where;
-        json_t *document = json_loadb(body, length, JSON_REJECT_DUPLICATES, &where);
-        int rc;
-        if (!document)
-            rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line,
-                                where.column, where.text);
-        else if (!json_is_object(document))
-            rc = spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
-                                spl_json_type_name(document));
-        else
-            rc = spl_values_from_object(&values, document, SPL_BODY, err);
-        json_decref(document);
-        if (rc)
-            return rc;
-    }
-    return spl_values_resolve(&values, defaults, limits, out, err);
+    int rc = spl_values_from_body(&values, body, length, SPL_BODY, err);
+    return rc ? rc : spl_values_resolve(&values, defaults, limits, out, err);
 }

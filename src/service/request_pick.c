@@ -17,26 +17,41 @@ static int resolve_point(const struct values *values, enum param param, const ch
     return 0;
 }
 
-int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
-                                const struct spl_camera_limits *limits, struct spl_view_request *out,
-                                struct spl_error *err)
+static int resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+                   const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
-    struct values values = {0};
     *out = (struct spl_view_request){.picks = true};
     spl_view_init(&out->view);
     struct spl_camera *camera = &out->pick.camera;
     int rc;
-    if ((rc = spl_values_from_query(&values, query, length, SPL_PICK, err)) ||
-        (rc = spl_camera_from_values(values.v, defaults, limits, camera, err)) ||
-        (rc = resolve_point(&values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
-        (rc = resolve_point(&values, PARAM_y, "y", camera->height, &out->pick.y, err)) ||
-        (rc = spl_values_resolve_splats(&values, &out->view, err)))
+    if ((rc = spl_camera_from_values(values->v, defaults, limits, camera, err)) ||
+        (rc = resolve_point(values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
+        (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)) ||
+        (rc = spl_values_resolve_splats(values, &out->view, err)))
         return rc;
-    spl_values_resolve_version(&values, out);
+    spl_values_resolve_version(values, out);
     out->view.layers = (1u << SPL_LAYER_COUNT) - 1;
     out->view.camera = *camera;
     out->view.camera.cx += 0.5 - out->pick.x;
     out->view.camera.cy += 0.5 - out->pick.y;
     out->view.camera.width = out->view.camera.height = 1;
     return spl_view_check(&out->view, err);
+}
+
+int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
+                                struct spl_error *err)
+{
+    struct values values = {0};
+    int rc = spl_values_from_query(&values, query, length, SPL_PICK, err);
+    return rc ? rc : resolve(&values, defaults, limits, out, err);
+}
+
+int spl_pick_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                               const struct spl_camera_limits *limits, struct spl_view_request *out,
+                               struct spl_error *err)
+{
+    struct values values = {0};
+    int rc = spl_values_from_body(&values, body, length, SPL_PICK_BODY, err);
+    return rc ? rc : resolve(&values, defaults, limits, out, err);
 }

@@ -92,7 +92,7 @@ static const struct route {
     {"/v1/tours/{name}/frames.zip", GET, SPL_SCOPE_TOUR, false, spl_show_tour_zip},
     {"/v1/tours/{name}/video.mp4", GET, SPL_SCOPE_TOUR, false, spl_show_tour_video},
     {"/v1/datasets/{id}/views", POST, SPL_SCOPE_VIEW, false, spl_make_views},
-    {"/v1/datasets/{id}/pick", GET, SPL_SCOPE_VIEW, true, spl_pick},
+    {"/v1/datasets/{id}/pick", GET | POST, SPL_SCOPE_VIEW, true, spl_pick},
 };
 
 /* What a path has in the holes of a pattern, still encoded. */

@@ -22,14 +22,19 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
         bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
         if (strcmp(name, info->name) && !alias)
             continue;
-        bool camera = place == SPL_PICK && i < (int)SPL_CAMERA_PARAMS && info->places & SPL_QUERY;
-        if (info->places & place || camera)
+        unsigned places = info->places;
+        if (i < (int)SPL_CAMERA_PARAMS)
+            places |= (places & SPL_QUERY ? SPL_PICK : 0) | (places & SPL_BODY ? SPL_PICK_BODY : 0);
+        else
+            places |= places & SPL_PICK ? SPL_PICK_BODY : 0;
+        if (places & place)
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
-                       place == SPL_PICK           ? "a pick takes x, y, a camera, method, lod, margin and v"
-                       : info->places == SPL_PICK  ? "it is a parameter of a pick"
-                       : info->places & SPL_CAMERA ? "give it in the \"camera\" object of a POST"
-                                                   : "give it beside \"camera\"");
+                       place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
+                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, lod, margin and v"
+                       : info->places == SPL_PICK           ? "it is a parameter of a pick"
+                       : info->places & SPL_CAMERA          ? "give it in the \"camera\" object of a POST"
+                                                            : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
     spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; api/openapi.yaml lists those of a view", name);

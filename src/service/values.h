@@ -63,6 +63,10 @@ int spl_values_from_query(struct values *values, const char *query, size_t lengt
 /* A JSON object's parameters, those of `place`; borrows it. */
 int spl_values_from_object(struct values *values, json_t *object, enum spl_value_place place, struct spl_error *err);
 
+/* A body's parameters, those of `place`; none for an empty one. */
+int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
+                         struct spl_error *err);
+
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);

@@ -8,14 +8,15 @@
 typedef int parse_fn(const char *text, size_t length, const struct spl_camera_defaults *defaults,
                      const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
 
-static int parse_view(struct request *request, const struct spl_catalog_entry *entry, parse_fn *parse,
+/* From the body of a POST, from the query of anything else. */
+static int parse_view(struct request *request, const struct spl_call *call, parse_fn *parse,
                       struct spl_view_request *view, struct spl_error *err)
 {
     struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX,
                                        .pixels = request->service->options->pixels_max};
-    bool json = parse == spl_view_request_from_json;
-    const char *text = json ? request->body : request->query;
-    int rc = parse(text, json ? request->body_length : strlen(text), &entry->defaults, &limits, view, err);
+    bool posted = call->method == SPL_POST;
+    const char *text = posted ? request->body : request->query;
+    int rc = parse(text, posted ? request->body_length : strlen(text), &call->entry->defaults, &limits, view, err);
     if (rc && rc != SPL_E_NOMEM)
         err->code = SPL_E_INPUT; // whatever is wrong with a view is the client's to change
     return rc;
@@ -83,7 +84,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_key key = {0};
-    if (parse_view(request, entry, parse, &view, &err) || spl_view_check_version(&view, entry->info, &err))
+    if (parse_view(request, call, parse, &view, &err) || spl_view_check_version(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
         key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->pipeline));
@@ -113,5 +114,5 @@ void spl_make_view(struct request *request, const struct spl_call *call)
 
 void spl_pick(struct request *request, const struct spl_call *call)
 {
-    make(request, call, spl_pick_request_from_query);
+    make(request, call, call->method == SPL_POST ? spl_pick_request_from_json : spl_pick_request_from_query);
 }

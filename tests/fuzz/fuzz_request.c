@@ -1,5 +1,5 @@
-/* The request parser: the first byte chooses query, pick (@), batch ([) or JSON, the rest is the request. Whatever is
- * accepted must be a view that the renderer takes, within the limits. */
+/* The request parser: the first byte chooses query, pick (@, its JSON if a { follows), batch ([) or JSON, the rest is
+ * the request. Whatever is accepted must be a view that the renderer takes, within the limits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -43,7 +43,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         check_batch(text, size - 1, &defaults, &limits);
         return 0;
     }
-    int rc = data[0] == '?'   ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
+    int rc = data[0] == '?' ? spl_view_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
+             : data[0] == '@' && size > 1 && text[0] == '{'
+                 ? spl_pick_request_from_json(text, size - 1, &defaults, &limits, &request, &err)
              : data[0] == '@' ? spl_pick_request_from_query(text, size - 1, &defaults, &limits, &request, &err)
                               : spl_view_request_from_json(text, size - 1, &defaults, &limits, &request, &err);
     if (rc ? err.code != rc || !err.message[0] : err.code != 0)

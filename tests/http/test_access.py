@@ -101,6 +101,9 @@ def test_a_signed_url_is_good_for_what_it_says():
         assert d.ask(url, "HEAD").status == 200
         assert d.ask(sign(d, "/v1/datasets/wall")).status == 200
         assert d.ask(sign(d, VIEW)).status == 200
+        pick = sign(d, VIEW.replace("/view", "/pick") + "?x=8&y=8&width=16&height=16")
+        assert d.ask(pick).status == d.ask(pick, "HEAD").status == 200
+        assert d.ask(pick.replace("x=8", "x=9")).status == 403 and d.ask(pick, "POST", '{"x": 8, "y": 8}').status == 401
         at = url.index("sig=") + 4
         forged = [url.replace("width=16", "width=17"), url.replace("wall", "walk"), url[:-1], url[:at] + "A" * 43,
                   url + "&x=1", url[:at], url.replace("exp=", "exp=9"), url.replace("&exp", "&&exp")]
@@ -222,6 +225,16 @@ def test_who_asks_too_often_waits():
             time.sleep(1.1)
             status = d.ask("/v1/status")
             assert status.status == 200 and status.json()["counters"]["refused_rate"] == len(refused)
+
+
+def test_each_view_of_a_batch_counts():
+    for flag in ("--rate-limit", "--rate-limit-total"):
+        with Daemon(FAKE, flag, "1", FAKE_FRAME_MS=0) as d:
+            batch = {"width": 16, "height": 16, "container": "zip", "views": [{"lod": 1 + i / 100} for i in range(200)]}
+            assert d.post({**batch, "views": [5]}, VIEW + "s").status == 400  # which costs one
+            assert d.post(batch, VIEW + "s").status == 200
+            refused = d.ask(SMALL)
+            assert refused.status == 429 and int(refused.headers["Retry-After"]) > 50, refused.headers
 
 
 def test_connections_are_capped():

@@ -97,7 +97,16 @@ def test_bad_picks_are_refused_by_name():
             reply = d.ask(f"{PICK}?{query}")
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
         assert d.ask(VIEW + "?x=1").json()["field"] == "x"
-        assert d.ask(PICK, "POST").status == 405
+        assert d.ask(PICK, "DELETE").status == 405
+        for body, field in [("", "x"), ("{", "body"), ("[1]", "body"), ({}, "x"), ({"x": 1}, "y"), ({"x": "1", "y": 1}, "x"),
+                            ({"x": 1, "y": 721}, "y"), ({"x": 1, "y": 1, "eye": [1, 2, 3]}, "eye"),
+                            ({"x": 1, "y": 1, "camera": {"eye": [1, 2]}}, "eye"), ({"x": 1, "y": 1, "layer": "depth"}, "layer"),
+                            ({"x": 1, "y": 1, "camera": {"x": 1}}, "x"), ({"x": 1, "y": 1, "camera": 5}, "camera"),
+                            ({"x": 1, "y": 1, "budget": 5}, "budget"), ('{"x": 1, "x": 2, "y": 1}', "body"),
+                            ({"x": 9, "y": 1, "camera": {"width": 8}}, "x")]:
+            reply = d.post(body, PICK)
+            assert reply.status == 400 and reply.json()["field"] == field, (body, reply.body)
+        assert d.post({"x": 1, "y": 1}, PICK + "?x=1").status == 400
         assert d.status()["counters"]["frames"] == 0
 
 
@@ -115,12 +124,34 @@ def every_parameter_of_a_pick(d):
     assert abs(d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&fov=60&width=64&height=48").json()["depth"] - 3) < 0.02
 
 
+def a_body_means_what_a_query_means(d):
+    assert d.post({"x": 640.5, "y": 360.5}, PICK).json() == d.ask(f"{PICK}?x=640.5&y=360.5").json()
+    asked = d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&up=0,0,1&fx=60&width=64&height=48&near=0.1&far=50&lod=2&margin=0.5&"
+                  "method=points")
+    version = d.ask("/v1/datasets/wall").json()["version"]
+    rest = {"x": 32, "y": 24, "method": "points", "lod": 2, "margin": 0.5, "near": 0.1, "far": 50, "v": version}
+    posted = d.post({**rest, "width": 64, "height": 48, "camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "up": [0, 0, 1],
+                                                                  "fx": 60}}, PICK)
+    assert posted.json() == asked.json() and asked.json()["depth"], (asked.body, posted.body)
+    assert posted.headers["Splatd-Camera"] == asked.headers["Splatd-Camera"] and posted.headers["Splatd-Cache"] == "hit"
+    assert posted.headers["ETag"] is None
+    axes = [0, 0, -1, 3, 1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1]  # the same camera as a matrix, and as COLMAP writes it
+    camera = {"matrix": axes, "convention": "opencv", "fx": 60, "fy": 60, "cx": 32, "cy": 24, "width": 64, "height": 48}
+    for form in (camera, {"q": [0.5, 0.5, 0.5, -0.5], "t": [0, 1, 3], "model": "PINHOLE", "params": [60, 60, 32, 24],
+                          "width": 64, "height": 48}):
+        found = d.post({**rest, "camera": form}, PICK)
+        assert found.status == 200, found.body
+        assert math.dist(found.json()["position"], asked.json()["position"]) < 1e-6, (form, found.body, asked.body)
+    assert d.post({**rest, "v": "0" * 16}, PICK).status == 404
+
+
 def test_on_a_real_device():
     with Daemon(REAL) as d:
         for check in (a_pick_agrees_with_the_layers_and_the_camera,
                       parts_of_pixels_count,
                       picks_are_views_of_one_pixel,
-                      every_parameter_of_a_pick):
+                      every_parameter_of_a_pick,
+                      a_body_means_what_a_query_means):
             check(d)
 
 

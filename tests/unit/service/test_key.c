@@ -20,8 +20,9 @@ static struct spl_key key_of(const char *query)
     struct spl_view_request request;
     struct spl_error err = {0};
     bool json = query[0] == '{';
-    bool pick = query[0] == '@';
-    int rc = pick   ? spl_pick_request_from_query(query + 1, strlen(query) - 1, &defaults, &limits, &request, &err)
+    bool pick = query[0] == '@', body = pick && query[1] == '{';
+    int rc = body   ? spl_pick_request_from_json(query + 1, strlen(query) - 1, &defaults, &limits, &request, &err)
+             : pick ? spl_pick_request_from_query(query + 1, strlen(query) - 1, &defaults, &limits, &request, &err)
              : json ? spl_view_request_from_json(query, strlen(query), &defaults, &limits, &request, &err)
                     : spl_view_request_from_query(query, strlen(query), &defaults, &limits, &request, &err);
     if (rc)
@@ -50,6 +51,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"transparent=true&background=102030", "background=10203000"},
         {"fx=100&width=64&height=64",
          "{\"camera\":{\"fx\":100,\"fy\":100,\"cx\":32,\"cy\":32},\"width\":64,\"height\":64}"},
+        {"@x=3&y=4&fx=50&width=64&height=48", "@{\"x\":3,\"y\":4,\"camera\":{\"fx\":50,\"width\":64,\"height\":48}}"},
         {"eye=5,0,0&target=0,0,0&fx=50",
          "{\"camera\":{\"matrix\":[0,0,-1,5,1,0,0,0,0,-1,0,0,0,0,0,1],\"convention\":\"opencv\",\"fx\":50}}"},
     };
