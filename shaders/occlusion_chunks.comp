@@ -12,6 +12,7 @@ layout(std430, binding = SPL_BIND_TILES) readonly buffer tile_buffer { uint tile
 
 void main()
 {
+    load_frame();
     uint chunk = frame.first_entry + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= frame.entries)
         return;

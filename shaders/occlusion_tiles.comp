@@ -11,6 +11,7 @@ layout(std430, binding = SPL_BIND_TILES) writeonly buffer tile_buffer { uint til
 
 void main()
 {
+    load_frame();
     uint columns = (frame.width + SPL_OCCLUSION_TILE - 1u) / SPL_OCCLUSION_TILE;
     uint rows = (frame.height + SPL_OCCLUSION_TILE - 1u) / SPL_OCCLUSION_TILE;
     uint tile = gl_GlobalInvocationID.x;

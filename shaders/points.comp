@@ -56,6 +56,7 @@ void draw(spl_draw_chunk chunk, splat s)
 
 void main()
 {
+    load_frame();
     splat_run run = load_splat_run();
     for (uint i = run.first; i < run.end; i += SPL_LANES)
         draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));

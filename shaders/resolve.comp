@@ -75,6 +75,7 @@ uvec3 sample_color(uint at)
 
 void main()
 {
+    load_frame();
     uint side = frame.supersample, width = frame.width / side, pixel = gl_GlobalInvocationID.x;
     if (pixel >= width * (frame.height / side))
         return;

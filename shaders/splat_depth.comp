@@ -25,6 +25,7 @@ void draw(splat_run run, splat s)
 
 void main()
 {
+    load_frame();
     splat_run run = load_splat_run();
     for (uint i = run.first; i < run.end; i += SPL_LANES)
         draw(run, load_splat(run.chunk, i, false));

@@ -4,7 +4,16 @@
 
 #include "shared.h"
 
-layout(std430, binding = SPL_BIND_FRAME) readonly buffer frame_buffer { spl_frame_params frame; };
+layout(std430, binding = SPL_BIND_FRAME) readonly buffer frame_buffer { spl_frame_params frame_in_memory; };
+
+/* A copy in registers: software drivers load once for all lanes only where no lane can be off, else lane by lane. So every
+ * main() begins with load_frame(), and nothing reads the parameters from memory in a loop or behind a branch. */
+spl_frame_params frame;
+
+void load_frame()
+{
+    frame = frame_in_memory;
+}
 
 /* The buffers' dimension in samples is frame.width x frame.height. */
 uint sample_index(ivec2 at)
