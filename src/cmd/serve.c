@@ -1,4 +1,4 @@
-/* splatd serve: the daemon. Flags come from the service's table of parameters (service/params.def). */
+/* splatd serve: the daemon. Flags come from the service's table of parameters (service/ops/params.def). */
 #include "cmd/cmd.h"
 
 #include <getopt.h>

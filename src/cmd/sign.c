@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "service/sign.h"
+#include "service/access/sign.h"
 
 static void usage(FILE *out)
 {

@@ -6,7 +6,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
-#include "service/bundle.h"
+#include "service/view/bundle.h"
 
 void spl_headers_open(struct spl_headers *headers)
 {

@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-#include "service/request.h"
+#include "service/request/request.h"
 
 struct spl_headers {
     char *text; /* after close, the caller's to free */

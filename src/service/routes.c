@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "service/state.h"
-#include "service/tour.h"
+#include "service/tour/tour.h"
 
 static const char *const methods[] = {[SPL_GET] = MHD_HTTP_METHOD_GET,
                                       [SPL_POST] = MHD_HTTP_METHOD_POST,

@@ -14,12 +14,12 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "service/health.h"
 #include "service/listen.h"
-#include "service/ops.h"
+#include "service/ops/health.h"
+#include "service/ops/ops.h"
+#include "service/ops/supervisor.h"
 #include "service/state.h"
-#include "service/supervisor.h"
-#include "service/tour.h"
+#include "service/tour/tour.h"
 
 enum {
     drain_check_ms = 20,

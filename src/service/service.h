@@ -3,7 +3,7 @@
 #define SPL_SERVICE_SERVICE_H
 
 #include "base/error.h"
-#include "service/options.h"
+#include "service/ops/options.h"
 
 /* Blocks until SIGTERM or SIGINT (0) or until the service cannot go on (error). Call once a process, from its main
  * thread. */

@@ -7,13 +7,13 @@
 #include <sys/queue.h>
 #include <uv.h>
 
-#include "service/access.h"
-#include "service/access_log.h"
-#include "service/cache.h"
-#include "service/catalog.h"
-#include "service/latency.h"
-#include "service/pipeline.h"
+#include "service/access/access.h"
+#include "service/datasets/catalog.h"
+#include "service/ops/access_log.h"
+#include "service/ops/latency.h"
 #include "service/service.h"
+#include "service/view/cache.h"
+#include "service/view/pipeline.h"
 
 enum {
     uri_max = 8 * 1024,
@@ -193,7 +193,7 @@ struct spl_call {
     char number[24];                 /* the path's {n}, decoded; "" without */
 };
 
-/* view_route.c: /v1/datasets/{id}/view and /pick. */
+/* view/route.c: /v1/datasets/{id}/view and /pick. */
 void spl_make_view(struct request *request, const struct spl_call *call);
 void spl_pick(struct request *request, const struct spl_call *call);
 
@@ -202,7 +202,7 @@ void spl_make_views(struct request *request, const struct spl_call *call);
 void spl_batch_go_on(struct batch *batch);   /* asks for the next views where it may; never blocks */
 void spl_batch_abandon(struct batch *batch); /* its request no longer waits for it; NULL-safe */
 
-/* view_route.c: what views and batches of them check alike. */
+/* view/route.c: what views and batches of them check alike. */
 int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
                            struct spl_error *err);
 bool spl_view_has_no_room(const struct spl_service *service, struct spl_error *err); /* too much waits for clients */

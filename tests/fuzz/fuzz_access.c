@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "service/sign.h"
-#include "service/tokens.h"
+#include "service/access/sign.h"
+#include "service/access/tokens.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -210,7 +210,7 @@ def test_openapi_knows_every_parameter_and_route():
               for _, _, operation, parameters in openapi.operations()}
     schemas = {name: set(re.findall(r"^        (\w+):", body, re.M)) for name, body in
                re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
-    table = "".join((ROOT / name).read_text() for name in ("src/geom/camera_params.def", "src/service/view_params.def"))
+    table = "".join((ROOT / name).read_text() for name in ("src/geom/camera_params.def", "src/service/request/view_params.def"))
     rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z_| ]+),', table, re.M)
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}

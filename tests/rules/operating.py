@@ -15,7 +15,7 @@ for path, name in re.findall(r"`(tests/[\w/.]+?\.\w+)(?::(\w+))?`", text):
         wrong.append(f"{path} does not exist")
     elif name and not re.search(rf"\b{name}\(", file.read_text(encoding="utf-8")):
         wrong.append(f"{path} has no {name}")
-table = set(re.findall(r'^PARAMETER\(\w+, "([a-z-]+)"', (root / "src/service/params.def").read_text(encoding="utf-8"), re.M))
+table = set(re.findall(r'^PARAMETER\(\w+, "([a-z-]+)"', (root / "src/service/ops/params.def").read_text(encoding="utf-8"), re.M))
 limits = text[text.index("## Limits"):text.index("## What goes wrong")]
 for name in re.findall(r"`([a-z][a-z-]+)`", limits):
     if name not in table:

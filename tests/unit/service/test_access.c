@@ -10,10 +10,10 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
-#include "service/buckets.h"
-#include "service/secret.h"
-#include "service/sign.h"
-#include "service/tokens.h"
+#include "service/access/buckets.h"
+#include "service/access/secret.h"
+#include "service/access/sign.h"
+#include "service/access/tokens.h"
 
 #define TOKEN "correct-horse-battery"
 #define OTHER "another-secret.1234567890"

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
-#include "service/cache.h"
+#include "service/view/cache.h"
 
 static size_t account;
 

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "service/key.h"
+#include "service/view/key.h"
 
 enum { version = 7, renderer = 9 };
 

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "service/options.h"
+#include "service/ops/options.h"
 
 static struct spl_service_options options;
 

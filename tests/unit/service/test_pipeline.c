@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
-#include "service/pipeline.h"
+#include "service/view/pipeline.h"
 #include "support/make_dataset.h"
 
 static struct spl_counters counters;

@@ -8,8 +8,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "service/request.h"
-#include "service/values.h"
+#include "service/request/request.h"
+#include "service/request/values.h"
 
 static const struct spl_camera_defaults defaults = {
     .eye = {10, 0, 0}, .target = {0, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};

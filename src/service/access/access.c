@@ -1,0 +1,304 @@
+/* What is checked before a request is looked at: how often its address asks, whether its token or its signature allows
+ * what it wants, and which pages may read the answer.
+ *
+ * Without tokens, rates and origins service->access is NULL, and a request costs one comparison. No reply and no line
+ * of the log holds a token or a signature. A change of the files takes effect by SIGHUP; a request's token is borrowed
+ * only while it is routed. Owned by the loop's thread. */
+#include "service/access/access.h"
+
+#include <netinet/in.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/socket.h>
+#include <time.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "service/access/buckets.h"
+#include "service/access/sign.h"
+#include "service/state.h"
+
+struct spl_access {
+    struct spl_tokens *tokens;     // may be NULL: everybody may view and make tours
+    struct spl_sign_key key;       /* of URLs; empty: none is accepted */
+    struct spl_buckets *addresses; // may be NULL: no limit
+    struct spl_buckets *all;       // may be NULL
+};
+
+/* Only this machine can reach it. */
+static bool is_local(int fd)
+{
+    struct sockaddr_storage bound;
+    socklen_t length = sizeof bound;
+    if (getsockname(fd, (struct sockaddr *)&bound, &length))
+        return false;
+    if (bound.ss_family == AF_INET)
+        return ntohl(((struct sockaddr_in *)&bound)->sin_addr.s_addr) >> 24 == 127;
+    if (bound.ss_family == AF_INET6)
+        return IN6_IS_ADDR_LOOPBACK(&((struct sockaddr_in6 *)&bound)->sin6_addr);
+    return bound.ss_family == AF_UNIX;
+}
+
+static int read_secrets(const struct spl_service_options *options, struct spl_tokens **tokens, struct spl_sign_key *key,
+                        struct spl_error *err)
+{
+    *tokens = NULL;
+    *key = (struct spl_sign_key){0};
+    int rc = *options->tokens ? spl_tokens_read(options->tokens, tokens, err) : 0;
+    if (!rc && *options->url_key)
+        rc = spl_sign_key_read(options->url_key, key, err);
+    if (rc) {
+        spl_tokens_destroy(*tokens);
+        *tokens = NULL;
+    }
+    return rc;
+}
+
+int spl_access_init(struct spl_service *service, struct spl_error *err)
+{
+    const struct spl_service_options *options = service->options;
+    if (*options->url_key && !*options->tokens)
+        return spl_fail(err, SPL_E_USAGE, "--url-key without --tokens: everybody may view anyway");
+    if (!*options->tokens && !options->allow_anonymous && !is_local(service->listen_fd))
+        return spl_fail(err, SPL_E_USAGE,
+                        "--listen %.100s can be reached from elsewhere; give --tokens FILE, or --allow-anonymous if "
+                        "everybody there may use the service",
+                        options->listen);
+    if (!*options->tokens && !options->rate_limit && !options->rate_limit_total && !options->cors.count)
+        return 0;
+    struct spl_access *access = service->access = spl_alloc(1, sizeof *access, err);
+    if (!access)
+        return SPL_E_NOMEM;
+    int rc = read_secrets(options, &access->tokens, &access->key, err);
+    if (!rc && options->rate_limit)
+        rc = spl_buckets_create(options->rate_limit, &access->addresses, err);
+    if (!rc && options->rate_limit_total)
+        rc = spl_buckets_create(options->rate_limit_total, &access->all, err);
+    if (rc)
+        spl_access_finish(service);
+    return rc;
+}
+
+void spl_access_finish(struct spl_service *service)
+{
+    struct spl_access *access = service->access;
+    if (!access)
+        return;
+    spl_tokens_destroy(access->tokens);
+    spl_sign_key_finish(&access->key);
+    spl_buckets_destroy(access->addresses);
+    spl_buckets_destroy(access->all);
+    free(access);
+    service->access = NULL;
+}
+
+void spl_access_reload(struct spl_service *service)
+{
+    struct spl_access *access = service->access;
+    struct spl_tokens *tokens;
+    struct spl_sign_key key;
+    struct spl_error err = {0};
+    if (!access || !access->tokens) {
+        spl_log_info("SIGHUP: there are no tokens to read again");
+    } else if (read_secrets(service->options, &tokens, &key, &err)) {
+        spl_log_error("SIGHUP: the tokens stay as they were: %s", err.message);
+    } else {
+        spl_tokens_destroy(access->tokens);
+        spl_sign_key_finish(&access->key);
+        access->tokens = tokens;
+        access->key = key;
+        spl_log_info("SIGHUP: %zu tokens read", spl_tokens_get_count(tokens));
+    }
+}
+
+/* An IPv4 address, or the 64 bits of IPv6 that a network gives to one customer. */
+static void fill_key(struct request *request, uint8_t key[SPL_BUCKET_KEY])
+{
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(request->handle, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+    const struct sockaddr *address = info ? info->client_addr : NULL;
+    memset(key, 0, SPL_BUCKET_KEY);
+    if (address && address->sa_family == AF_INET) {
+        memcpy(key + 12, &((const struct sockaddr_in *)(const void *)address)->sin_addr, 4);
+    } else if (address && address->sa_family == AF_INET6) {
+        const struct in6_addr *six = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
+        if (IN6_IS_ADDR_V4MAPPED(six))
+            memcpy(key + 12, six->s6_addr + 12, 4);
+        else
+            memcpy(key, six->s6_addr, 8);
+    }
+}
+
+static const uint8_t everybody[SPL_BUCKET_KEY];
+
+static bool is_within_rates(struct request *request)
+{
+    struct spl_access *access = request->service->access;
+    uint8_t key[SPL_BUCKET_KEY];
+    unsigned wait_s = 0;
+    const char *whose = "this address asks";
+    if (access->addresses) {
+        fill_key(request, key);
+        wait_s = spl_buckets_take(access->addresses, key, spl_now_ns());
+    }
+    if (!wait_s && access->all) {
+        wait_s = spl_buckets_take(access->all, everybody, spl_now_ns());
+        whose = "all clients together ask";
+    }
+    if (!wait_s)
+        return true;
+    char detail[128], seconds[16];
+    snprintf(detail, sizeof detail, "%s more often than the service allows; come back after %u s", whose, wait_s);
+    snprintf(seconds, sizeof seconds, "%u", wait_s);
+    spl_count(&request->service->counters, refused_rate);
+    spl_reply_problem(request, MHD_HTTP_TOO_MANY_REQUESTS, "rate", "", detail);
+    if (request->response)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
+    return false;
+}
+
+void spl_access_charge(struct request *request, unsigned count)
+{
+    struct spl_access *access = request->service->access;
+    uint8_t key[SPL_BUCKET_KEY];
+    if (access && access->addresses) {
+        fill_key(request, key);
+        spl_buckets_charge(access->addresses, key, count);
+    }
+    if (access && access->all)
+        spl_buckets_charge(access->all, everybody, count);
+}
+
+/* The request's Origin where its pages may read replies; NULL otherwise. */
+static const char *allowed_origin(struct request *request)
+{
+    const struct spl_text_list *cors = &request->service->options->cors;
+    const char *origin =
+        cors->count ? MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN) : NULL;
+    for (size_t i = 0; origin && i < cors->count; i++)
+        if (!strcmp(cors->items[i], "*") || !strcasecmp(cors->items[i], origin))
+            return origin;
+    return NULL;
+}
+
+void spl_access_add_cors(struct request *request)
+{
+    const struct spl_text_list *cors = &request->service->options->cors;
+    if (!cors->count || !request->response)
+        return;
+    const char *origin = allowed_origin(request);
+    MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, "Origin");
+    if (!origin || MHD_get_response_header(request->response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN))
+        return;
+    MHD_add_response_header(request->response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN, origin);
+    MHD_add_response_header(request->response, "Access-Control-Expose-Headers", "*");
+}
+
+/* Answers what a browser asks before it sends a request of another origin. */
+static bool answer_preflight(struct request *request, const char *method)
+{
+    if (strcmp(method, MHD_HTTP_METHOD_OPTIONS) || !allowed_origin(request) ||
+        !MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, "Access-Control-Request-Method"))
+        return false;
+    spl_reply_empty(request, MHD_HTTP_NO_CONTENT);
+    if (!request->response)
+        return true;
+    MHD_add_response_header(request->response, "Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, DELETE");
+    MHD_add_response_header(request->response, "Access-Control-Allow-Headers",
+                            "Authorization, Content-Type, If-None-Match, Range");
+    MHD_add_response_header(request->response, "Access-Control-Max-Age", "600");
+    return true;
+}
+
+bool spl_access_admit(struct request *request, const char *method)
+{
+    return !request->service->access || (is_within_rates(request) && !answer_preflight(request, method));
+}
+
+static bool refuse(struct request *request, unsigned status, const char *field, const char *challenge,
+                   const char *detail)
+{
+    spl_count(&request->service->counters, refused_access);
+    spl_reply_problem(request, status, status == MHD_HTTP_UNAUTHORIZED ? "unauthorized" : "forbidden", field, detail);
+    if (request->response && challenge)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, challenge);
+    return false;
+}
+
+/* Lets a signed URL through and takes exp and sig off its query. */
+static bool check_signature(struct request *request)
+{
+    struct spl_error err = {0};
+    size_t kept = 0;
+    if (spl_sign_check(&request->service->access->key, request->uri, request->query, (int64_t)time(NULL), &kept, &err))
+        return refuse(request, MHD_HTTP_FORBIDDEN, err.field, NULL, err.message);
+    // the query lies in request->uri, which is ours
+    request->uri[request->query - request->uri + (ptrdiff_t)kept] = '\0';
+    return true;
+}
+
+/* A token in a URL would end up in logs and histories. */
+static bool has_token_in_query(const char *query)
+{
+    for (const char *pair = query; *pair; pair += strcspn(pair, "&"), pair += *pair == '&')
+        if (!strncmp(pair, "token=", 6) || !strncmp(pair, "access_token=", 13))
+            return true;
+    return false;
+}
+
+/* The token that the request shows, NULL when there is none or it is unknown; *shown says which. */
+static const struct spl_token *find_token(struct request *request, bool *shown)
+{
+    const char *value = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_AUTHORIZATION);
+    *shown = value;
+    if (!value || strncasecmp(value, "Bearer ", 7))
+        return NULL;
+    value += 7 + strspn(value + 7, " ");
+    return spl_tokens_find(request->service->access->tokens, value, strlen(value));
+}
+
+bool spl_access_check(struct request *request, enum spl_scope scope, const struct spl_call *call)
+{
+    struct spl_access *access = request->service->access;
+    if (!access || !access->tokens)
+        return scope != SPL_SCOPE_ADMIN ||
+               refuse(request, MHD_HTTP_FORBIDDEN, "", NULL,
+                      "this needs an admin token, and the service was started without --tokens");
+    if (has_token_in_query(request->query)) {
+        spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "token",
+                          "a token does not belong into a URL; send it as 'Authorization: Bearer TOKEN'");
+        return false;
+    }
+    bool shown;
+    request->token = find_token(request, &shown);
+    if (scope == SPL_SCOPE_NONE)
+        return true;
+    if (access->key.bytes && scope == SPL_SCOPE_VIEW && call->method == SPL_GET && *call->id &&
+        spl_sign_is_signed(request->query))
+        return check_signature(request);
+    if (!shown)
+        return (request->service->options->allow_anonymous && scope != SPL_SCOPE_ADMIN) ||
+               refuse(request, MHD_HTTP_UNAUTHORIZED, "", "Bearer realm=\"splatd\"",
+                      "this needs a token; send it as 'Authorization: Bearer TOKEN'");
+    if (!request->token)
+        return refuse(request, MHD_HTTP_UNAUTHORIZED, "", "Bearer realm=\"splatd\", error=\"invalid_token\"",
+                      "the token is not known here");
+    if (spl_token_allows(request->token, scope, call->id))
+        return true;
+    char challenge[96], detail[96];
+    snprintf(challenge, sizeof challenge, "Bearer realm=\"splatd\", error=\"insufficient_scope\", scope=\"%s\"",
+             spl_scope_names[scope]);
+    snprintf(detail, sizeof detail, "the token does not allow '%s'%s", spl_scope_names[scope],
+             *call->id ? " of this dataset" : "");
+    return refuse(request, MHD_HTTP_FORBIDDEN, "", challenge, detail);
+}
+
+bool spl_access_may_see(struct request *request, const char *id)
+{
+    struct spl_access *access = request->service->access;
+    if (!access || !access->tokens || request->service->options->allow_anonymous)
+        return true;
+    return request->token && spl_token_allows(request->token, SPL_SCOPE_VIEW, id);
+}

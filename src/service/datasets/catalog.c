@@ -1,0 +1,293 @@
+/* The table of datasets, and which files stand behind it.
+ *
+ * Invariant: ids are unique and sorted, so that a lookup is a binary search and a listing is the same every time. An id
+ * is compared with names that are here already; only PUT makes a path of one, after spl_catalog_id_is_valid(). */
+#include "service/datasets/catalog.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+
+enum { datasets_max = 1024 };
+
+bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file_mark *b)
+{
+    return a->device == b->device && a->inode == b->inode && a->bytes == b->bytes && a->changed_s == b->changed_s &&
+           a->changed_ns == b->changed_ns;
+}
+
+const char *spl_catalog_id_of(const char *path, size_t *length)
+{
+    const char *slash = strrchr(path, '/'), *stem = slash ? slash + 1 : path, *dot = strrchr(stem, '.');
+    *length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
+    return spl_catalog_id_is_valid(stem, *length) ? stem : NULL;
+}
+
+static int add_file(struct spl_catalog_files *files, const char *directory, const char *name, struct spl_error *err)
+{
+    struct stat status;
+    char *path = NULL;
+    if (asprintf(&path, "%s%s%s", directory, *directory ? "/" : "", name) < 0)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", name);
+    int rc = 0;
+    if (stat(path, &status)) {
+        if (errno != ENOENT && errno != ENOTDIR)
+            rc = spl_fail_errno(err, errno, "cannot examine '%s'", path);
+        goto done;
+    }
+    if (files->count == datasets_max) {
+        rc = spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)datasets_max);
+        goto done;
+    }
+    struct spl_catalog_file *grown = spl_realloc(files->items, files->count + 1, sizeof *grown, err);
+    if (!grown) {
+        rc = SPL_E_NOMEM;
+        goto done;
+    }
+    files->items = grown;
+    grown[files->count++] = (struct spl_catalog_file){.path = path,
+                                                      .in_directory = *directory,
+                                                      .mark = {.device = status.st_dev,
+                                                               .inode = status.st_ino,
+                                                               .bytes = (uint64_t)status.st_size,
+                                                               .changed_s = status.st_mtim.tv_sec,
+                                                               .changed_ns = status.st_mtim.tv_nsec}};
+    path = NULL;
+done:
+    free(path);
+    return rc;
+}
+
+static bool is_dataset_name(const char *name)
+{
+    size_t length = strlen(name);
+    return length > 5 && !strcmp(name + length - 5, ".spld");
+}
+
+static int add_directory(struct spl_catalog_files *files, const char *directory, struct spl_error *err)
+{
+    DIR *dir = opendir(directory);
+    if (!dir)
+        return spl_fail_errno(err, errno, "cannot list '%s'", directory);
+    int rc = 0;
+    for (struct dirent *item; !rc && (item = readdir(dir));) {
+        size_t ignored;
+        if (is_dataset_name(item->d_name) && spl_catalog_id_of(item->d_name, &ignored))
+            rc = add_file(files, directory, item->d_name, err);
+    }
+    closedir(dir);
+    return rc;
+}
+
+int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_files *files, struct spl_error *err)
+{
+    *files = (struct spl_catalog_files){0};
+    int rc = 0;
+    for (size_t i = 0; !rc && i < path_count; i++) {
+        struct stat status;
+        bool there = !stat(paths[i], &status), directory = there && S_ISDIR(status.st_mode);
+        if (!there && !is_dataset_name(paths[i]))
+            return spl_fail(err, SPL_E_IO, "cannot list '%s': %s", paths[i], strerror(errno));
+        rc = directory ? add_directory(files, paths[i], err) : add_file(files, "", paths[i], err);
+    }
+    return rc;
+}
+
+void spl_catalog_files_finish(struct spl_catalog_files *files)
+{
+    for (size_t i = 0; i < files->count; i++)
+        free(files->items[i].path);
+    free(files->items);
+    *files = (struct spl_catalog_files){0};
+}
+
+/* Where `id` is, or would be. */
+static size_t place_of(const struct spl_catalog *catalog, const char *id, bool *found)
+{
+    size_t low = 0, high = catalog->count;
+    *found = false;
+    while (low < high && !*found) {
+        size_t middle = (low + high) / 2;
+        int order = strcmp(id, catalog->slots[middle].id);
+        if (!order) {
+            low = middle;
+            *found = true;
+        } else if (order < 0) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    return low;
+}
+
+struct spl_catalog_slot *spl_catalog_find_slot(const struct spl_catalog *catalog, const char *id)
+{
+    bool found;
+    size_t at = place_of(catalog, id, &found);
+    return found ? &catalog->slots[at] : NULL;
+}
+
+struct spl_catalog_entry *spl_catalog_find(const struct spl_catalog *catalog, const char *id)
+{
+    const struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, id);
+    return slot ? slot->current : NULL;
+}
+
+struct spl_catalog_slot *spl_catalog_add_slot(struct spl_catalog *catalog, const char *id, const char *path,
+                                              struct spl_error *err)
+{
+    bool found;
+    size_t at = place_of(catalog, id, &found);
+    spl_assert(!found);
+    if (catalog->count == datasets_max) {
+        spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)datasets_max);
+        return NULL;
+    }
+    struct spl_catalog_slot *grown = spl_realloc(catalog->slots, catalog->count + 1, sizeof *grown, err);
+    if (!grown)
+        return NULL;
+    catalog->slots = grown;
+    char *copy = strdup(path);
+    if (!copy) {
+        spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", id);
+        return NULL;
+    }
+    memmove(grown + at + 1, grown + at, (catalog->count - at) * sizeof *grown);
+    grown[at] = (struct spl_catalog_slot){.path = copy};
+    snprintf(grown[at].id, sizeof grown[at].id, "%s", id);
+    catalog->count++;
+    return &grown[at];
+}
+
+void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    size_t folder = slash ? (size_t)(slash + 1 - path) : 0, used = 0;
+    while (*message && used + 1 < capacity) {
+        if (folder && !strncmp(message, path, folder))
+            message += folder;
+        else
+            out[used++] = *message++;
+    }
+    out[used] = '\0';
+}
+
+void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
+{
+    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, slot->path);
+}
+
+void spl_catalog_remove_slot(struct spl_catalog *catalog, struct spl_catalog_slot *slot)
+{
+    size_t at = (size_t)(slot - catalog->slots);
+    spl_catalog_entry_unref(slot->current);
+    free(slot->path);
+    memmove(slot, slot + 1, (--catalog->count - at) * sizeof *slot);
+}
+
+void spl_catalog_finish(struct spl_catalog *catalog)
+{
+    while (catalog->count)
+        spl_catalog_remove_slot(catalog, &catalog->slots[catalog->count - 1]);
+    free(catalog->slots);
+    *catalog = (struct spl_catalog){0};
+}
+
+struct opening {
+    const struct spl_catalog_files *files;
+    bool verify;
+    struct spl_catalog_entry **entries; /* one a file, as are the errors, so that nothing depends on who was first */
+    struct spl_error *errors;
+};
+
+static void open_range(void *context, size_t begin, size_t end, unsigned worker)
+{
+    (void)worker;
+    struct opening *opening = context;
+    for (size_t i = begin; i < end; i++)
+        spl_catalog_entry_open(opening->files->items[i].path, opening->verify, &opening->entries[i],
+                               &opening->errors[i]);
+}
+
+/* Puts one opened file into its slot; takes the entry. */
+static int place(struct spl_catalog *catalog, const struct spl_catalog_file *file, struct spl_catalog_entry **entry,
+                 const struct spl_error *why, struct spl_error *err)
+{
+    char id[sizeof((struct spl_catalog_slot *)0)->id];
+    size_t length;
+    const char *stem = spl_catalog_id_of(file->path, &length);
+    if (why->code && (!file->in_directory || !stem || why->code == SPL_E_NOMEM))
+        return spl_fail(err, why->code, "%s", why->message);
+    snprintf(id, sizeof id, "%.*s", (int)length, stem);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, id);
+    if (slot)
+        return spl_fail(err, SPL_E_USAGE, "two datasets are called '%.100s': '%.150s' and '%.150s'; rename one", id,
+                        slot->path, file->path);
+    if (!(slot = spl_catalog_add_slot(catalog, id, file->path, err)))
+        return SPL_E_NOMEM;
+    slot->in_directory = file->in_directory;
+    slot->opened = slot->seen = file->mark;
+    slot->current = *entry;
+    *entry = NULL;
+    if (why->code) {
+        spl_catalog_set_reason(slot, why->message);
+        spl_log_warn("dataset %s is not served: %s", id, why->message);
+    }
+    return 0;
+}
+
+static int by_path(const void *a, const void *b)
+{
+    const struct spl_catalog_file *left = a, *right = b;
+    return strcmp(left->path, right->path);
+}
+
+/* What a command line may get wrong and a later look may not. */
+static int check_paths(char *const *paths, size_t path_count, struct spl_error *err)
+{
+    for (size_t i = 0; i < path_count; i++) {
+        struct stat status;
+        if (stat(paths[i], &status))
+            return spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
+    }
+    return 0;
+}
+
+int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count, bool verify,
+                     struct spl_error *err)
+{
+    *catalog = (struct spl_catalog){0};
+    struct spl_catalog_files files = {0};
+    struct opening opening = {.files = &files, .verify = verify};
+    int rc = check_paths(paths, path_count, err);
+    if (rc || (rc = spl_catalog_list(paths, path_count, &files, err)))
+        goto done;
+    opening.entries = spl_alloc(files.count, sizeof *opening.entries, err);
+    opening.errors = spl_alloc(files.count, sizeof *opening.errors, err);
+    if (!opening.entries || !opening.errors) {
+        rc = SPL_E_NOMEM;
+        goto done;
+    }
+    if (files.count)
+        qsort(files.items, files.count, sizeof *files.items, by_path);
+    spl_parallel_for(0, files.count, 1, open_range, &opening);
+    for (size_t i = 0; !rc && i < files.count; i++)
+        rc = place(catalog, &files.items[i], &opening.entries[i], &opening.errors[i], err);
+done:
+    for (size_t i = 0; opening.entries && i < files.count; i++)
+        spl_catalog_entry_unref(opening.entries[i]);
+    free(opening.entries);
+    free(opening.errors);
+    spl_catalog_files_finish(&files);
+    if (rc)
+        spl_catalog_finish(catalog);
+    return rc;
+}

@@ -1,0 +1,80 @@
+/* The datasets that are served, found by id: one slot each, which holds the version that requests get. Owned by the
+ * loop's thread; library.c puts versions in and takes them out. */
+#ifndef SPL_SERVICE_CATALOG_H
+#define SPL_SERVICE_CATALOG_H
+
+#include "base/error.h"
+#include "service/datasets/entry.h"
+
+/* Which bytes a path named when it was looked at; zero = none yet. */
+struct spl_file_mark {
+    uint64_t device, inode, bytes;
+    int64_t changed_s, changed_ns;
+};
+
+bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file_mark *b);
+
+struct spl_catalog_slot {
+    char id[sizeof((struct spl_dataset_info *)0)->id];
+    char *path;
+    bool in_directory;                    /* of a served directory, which PUT and DELETE may change */
+    struct spl_file_mark opened, seen;    /* what was opened or refused last; what lay there at the last look */
+    unsigned missed;                      /* looks in a row that did not find it */
+    bool busy;                            /* a thread has it: being opened, uploaded, removed or made resident */
+    struct spl_catalog_entry *current;    // may be NULL; one reference
+    const struct spl_catalog_entry *next; // may be NULL; on its way to the device
+    char reason[512];                     /* why the newest file is not served; "" */
+};
+
+struct spl_catalog {
+    struct spl_catalog_slot *slots; /* sorted by id */
+    size_t count;
+};
+
+/* A file that a path stands for. */
+struct spl_catalog_file {
+    char *path; // owned
+    bool in_directory;
+    struct spl_file_mark mark;
+};
+
+struct spl_catalog_files {
+    struct spl_catalog_file *items;
+    size_t count;
+};
+
+/* Lists what `paths` stand for now: each a file, or a directory whose *.spld files are meant; names that cannot be an
+ * id are left out. Files that are not there are left out too; a directory that is not there, say because its disk was
+ * unmounted, is an error, as is a path that cannot be examined. Any thread; blocks on disk. The caller finishes *files,
+ * also after an error. */
+int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_files *files, struct spl_error *err);
+void spl_catalog_files_finish(struct spl_catalog_files *files);
+
+/* Opens everything at start, one dataset a core. A path that is not there, a broken file that was named itself, two
+ * files with one id are refused; a broken file of a directory gets a slot with the reason. On failure *catalog is
+ * empty. */
+int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count, bool verify,
+                     struct spl_error *err);
+
+/* Gives the references back. */
+void spl_catalog_finish(struct spl_catalog *catalog);
+
+/* What requests of `id` get, borrowed during the call; NULL when there is none. Keep it by a reference. */
+struct spl_catalog_entry *spl_catalog_find(const struct spl_catalog *catalog, const char *id);
+
+/* NULL when there is none; valid until the next add or remove. */
+struct spl_catalog_slot *spl_catalog_find_slot(const struct spl_catalog *catalog, const char *id);
+struct spl_catalog_slot *spl_catalog_add_slot(struct spl_catalog *catalog, const char *id, const char *path,
+                                              struct spl_error *err); /* NULL: no memory, or too many */
+void spl_catalog_remove_slot(struct spl_catalog *catalog, struct spl_catalog_slot *slot); /* with its reference */
+
+/* Remembers why the slot's file is not served, without the folder it lies in: clients read it. */
+void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message);
+
+/* Copies `message` without the folder of `path`, wherever it names it. */
+void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, const char *path);
+
+/* The id that the file at `path` has, of *length bytes; NULL for one that cannot have any. */
+const char *spl_catalog_id_of(const char *path, size_t *length);
+
+#endif

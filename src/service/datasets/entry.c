@@ -1,0 +1,90 @@
+/* Opening one dataset for serving, and counting who needs it.
+ *
+ * Invariant: once `release` is set, only the thread that drops the last reference calls it, and nobody else can hold
+ * the entry then. Any thread. */
+#include "service/datasets/entry.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+static void encode_uri(char *out, size_t capacity, const char *id)
+{
+    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
+    size_t used = (size_t)snprintf(out, capacity, "/v1/datasets/");
+    for (; *id && used + 4 <= capacity; id++)
+        used += (size_t)snprintf(out + used, capacity - used, strchr(plain, *id) ? "%c" : "%%%02X", (unsigned char)*id);
+}
+
+int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_entry **out, struct spl_error *err)
+{
+    struct spl_catalog_entry *entry = *out = NULL;
+    struct spl_camera camera = {0};
+    int rc = SPL_E_NOMEM;
+    if (!(entry = spl_alloc(1, sizeof *entry, err)))
+        return rc;
+    atomic_init(&entry->references, 1);
+    if (!(entry->path = strdup(path))) {
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", path);
+        goto done;
+    }
+    if ((rc = spl_dataset_open(path, verify, &entry->dataset, err)))
+        goto done;
+    const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
+    if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))
+        goto done;
+    entry->defaults.fov = info->default_fov;
+    entry->defaults.near = camera.near;
+    entry->defaults.far = camera.far;
+    memcpy(entry->defaults.eye, info->default_eye, sizeof entry->defaults.eye);
+    memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
+    memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
+    encode_uri(entry->uri, sizeof entry->uri, info->id);
+    rc = spl_plan_create(path, info, &entry->plan, err);
+done:
+    if (rc)
+        spl_catalog_entry_destroy(entry);
+    else
+        *out = entry;
+    return rc;
+}
+
+struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry)
+{
+    unsigned before = atomic_fetch_add(&entry->references, 1);
+    spl_assert(before > 0);
+    return entry;
+}
+
+void spl_catalog_entry_unref(struct spl_catalog_entry *entry)
+{
+    if (!entry || atomic_fetch_sub(&entry->references, 1) > 1)
+        return;
+    if (entry->release)
+        entry->release(entry, entry->release_context);
+    else
+        spl_catalog_entry_destroy(entry);
+}
+
+void spl_catalog_entry_destroy(struct spl_catalog_entry *entry)
+{
+    if (!entry)
+        return;
+    spl_plan_destroy(entry->plan);
+    spl_dataset_close(entry->dataset);
+    free(entry->path);
+    free(entry);
+}
+
+bool spl_catalog_id_is_valid(const char *id, size_t length)
+{
+    static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+    if (!length || length >= sizeof((struct spl_dataset_info *)0)->id || id[0] == '.')
+        return false;
+    for (size_t i = 0; i < length; i++)
+        if (!id[i] || !strchr(allowed, id[i]))
+            return false;
+    return true;
+}

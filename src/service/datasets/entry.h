@@ -1,0 +1,64 @@
+/* One version of one dataset, opened for serving. Immutable but for the fields that say who owns them; references are
+ * counted, so that a version that was replaced or dropped lives until the last request about it is answered.
+ *
+ * Life: open() on any thread → add to the pipeline, which makes it resident → ready, references come and go → the last
+ * unref() sends it back through the gpu thread, which lets its pages go → destroyed. */
+#ifndef SPL_SERVICE_ENTRY_H
+#define SPL_SERVICE_ENTRY_H
+
+#include <stdatomic.h>
+#include <sys/queue.h>
+
+#include <splatd/dataset.h>
+
+#include "base/error.h"
+#include "geom/camera_json.h"
+#include "service/view/plan.h"
+
+enum spl_entry_state {
+    SPL_ENTRY_OPENED,
+    SPL_ENTRY_LOADING,  /* on its way to the device */
+    SPL_ENTRY_RESIDENT, /* can be rendered */
+    SPL_ENTRY_REFUSED,  /* the device has no room for it: see err */
+    SPL_ENTRY_LEAVING,  /* nobody refers to it any more */
+    SPL_ENTRY_GONE,     /* the device has let go of it */
+};
+
+struct spl_catalog_entry {
+    char *path;
+    struct spl_dataset *dataset;
+    const struct spl_dataset_info *info;
+    struct spl_camera_defaults defaults;
+    char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
+    struct spl_plan *plan;
+
+    atomic_uint references;
+    void (*release)(struct spl_catalog_entry *entry, void *context); // by the last unref; NULL: it is destroyed
+    void *release_context;
+    _Atomic uint64_t resident_bytes; /* on the device */
+
+    /* Owned by whoever it was passed to last: the loop, or the gpu thread between add or release and the change. */
+    STAILQ_ENTRY(spl_catalog_entry) link;
+    enum spl_entry_state state;
+    struct spl_error err;
+    TAILQ_ENTRY(spl_catalog_entry) resident; // owned by: gpu
+    uint32_t pages_wanted;                   // owned by: gpu; first page that was not asked for yet
+    bool loading;                            // owned by: gpu
+};
+
+/* Maps and checks the dataset at `path`; `verify` hashes every section. Blocks on disk, any thread. The caller owns the
+ * one reference to *out. */
+int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_entry **out, struct spl_error *err);
+
+/* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */
+struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry);
+void spl_catalog_entry_unref(struct spl_catalog_entry *entry); /* NULL-safe; any thread */
+
+/* Whatever its references say; for its last owner. NULL-safe. Unmaps, which may take a while. */
+void spl_catalog_entry_destroy(struct spl_catalog_entry *entry);
+
+/* May `id` (of `length` bytes) be a dataset's id? At most 127 letters, digits, '.', '_' and '-', the first not a '.'.
+ */
+bool spl_catalog_id_is_valid(const char *id, size_t length);
+
+#endif

@@ -1,0 +1,193 @@
+/* Files come in under a hidden folder beside their place, so that a rename puts them there whole, synced and verified,
+ * or not at all, whatever crashes in between. The folder's file already has its final name, since a dataset's id is its
+ * file's stem. Runs on threads of the pool. */
+#include "service/datasets/store.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "measure/profile.h"
+
+static const char prefix[] = ".incoming-";
+enum { stale_s = 24 * 3600 };
+
+static int fail(struct spl_incoming *incoming, struct spl_error *err, const char *what)
+{
+    int why = errno;
+    incoming->no_room = why == ENOSPC || why == EDQUOT || why == EFBIG;
+    spl_incoming_abort(incoming);
+    return spl_fail_errno(err, why, "cannot %s the dataset's file", what);
+}
+
+/* What a crash has left in `folder`, which belongs to nobody any more. */
+static void remove_folder(int directory, const char *folder)
+{
+    int fd = openat(directory, folder, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *dir = fd < 0 ? NULL : fdopendir(fd);
+    if (!dir)
+        return;
+    for (struct dirent *item; (item = readdir(dir));)
+        if (strcmp(item->d_name, ".") && strcmp(item->d_name, ".."))
+            unlinkat(fd, item->d_name, 0);
+    closedir(dir);
+    unlinkat(directory, folder, AT_REMOVEDIR);
+}
+
+static void sweep(const char *directory)
+{
+    DIR *dir = opendir(directory);
+    if (!dir)
+        return;
+    time_t now = time(NULL);
+    for (struct dirent *item; (item = readdir(dir));) {
+        struct stat status;
+        if (!strncmp(item->d_name, prefix, sizeof prefix - 1) &&
+            !fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW) && S_ISDIR(status.st_mode) &&
+            now - status.st_mtime > stale_s)
+            remove_folder(dirfd(dir), item->d_name);
+    }
+    closedir(dir);
+}
+
+/* The folder of `path`, for the caller to free; NULL without memory. */
+static char *folder_of(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return !slash ? strdup(".") : slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
+}
+
+int spl_store_check_room(const char *path, uint64_t bytes, struct spl_error *err)
+{
+    struct statvfs disk;
+    char *folder = folder_of(path);
+    bool known = folder && !statvfs(folder, &disk);
+    free(folder);
+    if (!known || bytes / disk.f_frsize < disk.f_bavail)
+        return 0;
+    return spl_fail(err, SPL_E_LIMIT, "the dataset has %llu bytes, %llu are free on its disk",
+                    (unsigned long long)bytes, (unsigned long long)disk.f_bavail * disk.f_frsize);
+}
+
+int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct spl_error *err)
+{
+    char *directory = folder_of(target), *folder = NULL, *path = NULL;
+    int rc = 0;
+    *incoming = (struct spl_incoming){0};
+    if (!directory || asprintf(&folder, "%s/%sXXXXXX", directory, prefix) < 0) {
+        folder = NULL;
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
+        goto done;
+    }
+    sweep(directory);
+    if (!mkdtemp(folder)) {
+        rc = fail(incoming, err, "make a folder for");
+        goto done;
+    }
+    incoming->folder = folder;
+    folder = NULL;
+    if (asprintf(&path, "%s/%s", incoming->folder, strrchr(target, '/') ? strrchr(target, '/') + 1 : target) < 0) {
+        path = NULL;
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
+        goto done;
+    }
+    incoming->fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (incoming->fd < 0) {
+        rc = fail(incoming, err, "make");
+        goto done;
+    }
+    incoming->path = path;
+    path = NULL;
+done:
+    if (rc)
+        spl_incoming_abort(incoming);
+    free(directory);
+    free(folder);
+    free(path);
+    return rc;
+}
+
+int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err)
+{
+    for (size_t done = 0; done < length;) {
+        ssize_t wrote = write(incoming->fd, (const char *)data + done, length - done);
+        if (wrote < 0 && errno == EINTR)
+            continue;
+        if (wrote < 0)
+            return fail(incoming, err, "write");
+        done += (size_t)wrote;
+        incoming->bytes += (size_t)wrote;
+    }
+    return 0;
+}
+
+static int sync_folder_of(const char *path)
+{
+    char *folder = folder_of(path);
+    int fd = folder ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1, rc = fd < 0 ? -1 : fsync(fd);
+    if (fd >= 0)
+        close(fd);
+    free(folder);
+    return rc;
+}
+
+int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
+                        struct spl_file_mark *mark, struct spl_error *err)
+{
+    *entry = NULL;
+    if (fsync(incoming->fd))
+        return fail(incoming, err, "sync");
+    struct spl_catalog_entry *checked = NULL;
+    struct spl_error why = {0};
+    int rc = spl_catalog_entry_open(incoming->path, true, &checked, &why);
+    spl_catalog_entry_unref(checked);
+    if (rc) {
+        char message[sizeof why.message];
+        spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
+        spl_incoming_abort(incoming);
+        return spl_fail(err, rc, "%s", message);
+    }
+    if (rename(incoming->path, target) || sync_folder_of(target))
+        return fail(incoming, err, "put in place");
+    spl_incoming_abort(incoming); // what is left: the folder
+    struct spl_catalog_files files = {0};
+    char *const paths[] = {(char *)target};
+    rc = spl_catalog_entry_open(target, false, entry, err);
+    if (!rc && !spl_catalog_list(paths, 1, &files, NULL) && files.count)
+        *mark = files.items[0].mark;
+    spl_catalog_files_finish(&files);
+    return rc;
+}
+
+void spl_incoming_abort(struct spl_incoming *incoming)
+{
+    bool no_room = incoming->no_room;
+    if (incoming->path) {
+        close(incoming->fd);
+        unlink(incoming->path);
+    }
+    if (incoming->folder)
+        rmdir(incoming->folder); // empty now
+    free(incoming->path);
+    free(incoming->folder);
+    *incoming = (struct spl_incoming){.no_room = no_room};
+}
+
+int spl_stored_remove(const char *path, struct spl_error *err)
+{
+    char *profile = spl_profile_path(path, err);
+    if (!profile)
+        return SPL_E_NOMEM;
+    int rc = unlink(path) && errno != ENOENT ? spl_fail_errno(err, errno, "cannot remove the dataset's file") : 0;
+    if (!rc)
+        unlink(profile);
+    free(profile);
+    return rc;
+}

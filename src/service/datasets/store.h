@@ -1,0 +1,35 @@
+/* Dataset files of a served directory, put there and removed by clients. Everything here blocks on disk: for threads of
+ * the pool, one call at a time for each spl_incoming. */
+#ifndef SPL_SERVICE_STORE_H
+#define SPL_SERVICE_STORE_H
+
+#include "service/datasets/catalog.h"
+
+/* A file on its way: DIRECTORY/.incoming-XXXXXX/ID.spld. Zeroed = nothing there yet. */
+struct spl_incoming {
+    char *folder, *path;
+    int fd; /* valid while `path` is set */
+    uint64_t bytes;
+    bool no_room; /* why the last call failed: the disk is full */
+};
+
+/* SPL_E_LIMIT with both numbers where `bytes` do not fit on the disk of the file at `path`. Quick: it asks no disk. */
+int spl_store_check_room(const char *path, uint64_t bytes, struct spl_error *err);
+
+/* Makes the file beside `target`. Files that a crash has left there more than a day ago are removed. Nothing is left
+ * after a failure, here and below. */
+int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct spl_error *err);
+int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err);
+
+/* Syncs and verifies the file, renames it to `target` and opens it there: the caller owns *entry. SPL_E_INPUT or
+ * SPL_E_CORRUPT for what is no dataset. Ends `incoming`. */
+int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
+                        struct spl_file_mark *mark, struct spl_error *err);
+
+/* Removes it; idempotent. */
+void spl_incoming_abort(struct spl_incoming *incoming);
+
+/* Removes a dataset's file and its profile. One that is not there is removed already. */
+int spl_stored_remove(const char *path, struct spl_error *err);
+
+#endif

@@ -1,0 +1,92 @@
+/* Liveness is recent progress or idleness, never just "the process is there"; readiness is what a balancer asks.
+ *
+ * A frame that does not end is normally found by the renderer's own deadlines, which reopen the device. What is left is
+ * a thread that hangs inside a driver: it can be neither woken nor stopped, so /healthz fails once nothing has moved
+ * for deadline + stall, and when another stall has passed the process ends and leaves the rest to its supervisor. Owned
+ * by the loop's thread. */
+#include "service/ops/health.h"
+
+#include <stdio.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "service/ops/supervisor.h"
+#include "service/state.h"
+
+enum { look_ms = 500 };
+
+bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
+{
+    const struct spl_service_options *options = service->options;
+    uint64_t still_ms = service->pipeline ? spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_MS : 0;
+    if (still_ms <= options->deadline_ms + options->stall_ms)
+        return true;
+    snprintf(why, SPL_HEALTH_TEXT, "there is work, and nothing has moved for %llu ms: the device or its driver hangs",
+             (unsigned long long)still_ms);
+    return false;
+}
+
+bool spl_health_is_ready(struct spl_service *service, char why[SPL_HEALTH_TEXT])
+{
+    struct spl_pipeline_status status;
+    if (service->leaving || service->draining) {
+        snprintf(why, SPL_HEALTH_TEXT, "stopping");
+        return false;
+    }
+    if (!service->pipeline || !service->daemon) {
+        snprintf(why, SPL_HEALTH_TEXT, "datasets are being loaded");
+        return false;
+    }
+    if (spl_pipeline_get_state(service->pipeline) != SPL_PIPELINE_READY) {
+        snprintf(why, SPL_HEALTH_TEXT, "the device was lost and is being reopened");
+        return false;
+    }
+    spl_pipeline_get_status(service->pipeline, &status);
+    if (status.render_length >= status.render_capacity) {
+        snprintf(why, SPL_HEALTH_TEXT, "the queue is full: %zu of %zu views", status.render_length,
+                 status.render_capacity);
+        return false;
+    }
+    return spl_health_is_alive(service, why);
+}
+
+static void say_status(struct spl_service *service)
+{
+    static const char *const lines[] = {
+        [SPL_PIPELINE_STARTING] = "datasets are being loaded",
+        [SPL_PIPELINE_READY] = "serving",
+        [SPL_PIPELINE_REBUILDING] = "the device was lost and is being reopened",
+        [SPL_PIPELINE_FAILED] = "the device is gone",
+    };
+    enum spl_pipeline_state state =
+        service->pipeline ? spl_pipeline_get_state(service->pipeline) : SPL_PIPELINE_STARTING;
+    if (state != service->said_state && !service->leaving)
+        spl_supervisor_say_status(lines[state]);
+    service->said_state = state;
+}
+
+static void on_look(uv_timer_t *timer)
+{
+    struct spl_service *service = timer->data;
+    const struct spl_service_options *options = service->options;
+    char why[SPL_HEALTH_TEXT];
+    say_status(service);
+    if (spl_health_is_alive(service, why))
+        spl_supervisor_say_alive();
+    uint64_t still_ms = service->pipeline ? spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_MS : 0;
+    if (still_ms <= options->deadline_ms + 2 * options->stall_ms)
+        return;
+    spl_log_error(
+        "nothing has moved for %llu ms although there is work: the device or its driver hangs; ending, so that "
+        "the supervisor starts anew",
+        (unsigned long long)still_ms);
+    _exit(1); // the hanging thread cannot be joined
+}
+
+void spl_health_watch(struct spl_service *service)
+{
+    uint64_t watchdog_ms = spl_supervisor_get_watchdog_ms();
+    uint64_t every_ms = watchdog_ms && watchdog_ms / 3 < look_ms ? watchdog_ms / 3 + 1 : look_ms;
+    uv_timer_start(&service->look_timer, on_look, every_ms, every_ms);
+}

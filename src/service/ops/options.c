@@ -1,0 +1,187 @@
+/* Values of parameters: text in, checked values out, one range check for flags and config files alike.
+ *
+ * Invariant: every TEXT and every item of a LIST is ours, malloc'd, and no TEXT is NULL. Not for several threads; the
+ * service reads its options only. */
+#include "service/ops/options.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+const struct spl_parameter spl_parameters[SPL_PARAMETERS] = {
+#define PARAMETER(field, name, type, fallback, least, most, unit, text)                                                \
+    {name, SPL_PARAMETER_##type, fallback, least, most, unit, text, offsetof(struct spl_service_options, field)},
+#include "service/ops/params.def"
+#undef PARAMETER
+};
+
+static void *member(struct spl_service_options *options, size_t index)
+{
+    return (char *)options + spl_parameters[index].offset;
+}
+
+size_t spl_parameter_find(const char *name)
+{
+    size_t i = 0;
+    while (i < SPL_PARAMETERS && strcmp(name, spl_parameters[i].name))
+        i++;
+    return i;
+}
+
+/* The number in `text`, all of it; false when it is none or beyond the parameter's range. */
+static bool parse_number(const struct spl_parameter *parameter, const char *text, uint64_t *out)
+{
+    static const char suffixes[] = "KMGT";
+    char *end;
+    errno = 0;
+    uint64_t value = strtoull(text, &end, 10);
+    if (!isdigit((unsigned char)*text) || errno)
+        return false;
+    const char *suffix = parameter->type == SPL_PARAMETER_BYTES && *end ? strchr(suffixes, *end) : NULL;
+    if (suffix) {
+        unsigned shift = 10 * (unsigned)(suffix - suffixes + 1);
+        if (value > UINT64_MAX >> shift)
+            return false;
+        value <<= shift;
+        end++;
+    }
+    *out = value;
+    return !*end && value >= parameter->least && value <= parameter->most;
+}
+
+/* Where `text` stands in the names of a CHOICE. */
+static bool parse_choice(const char *names, const char *text, uint64_t *out)
+{
+    size_t length = strlen(text);
+    *out = 0;
+    for (const char *at = names; length && !strchr(text, '|'); (*out)++) {
+        if (!strncmp(at, text, length) && (at[length] == '|' || !at[length]))
+            return true;
+        if (!(at = strchr(at, '|')))
+            return false;
+        at++;
+    }
+    return false;
+}
+
+static int refuse(const struct spl_parameter *parameter, const char *text, const char *where, struct spl_error *err)
+{
+    char range[160];
+    switch (parameter->type) {
+    case SPL_PARAMETER_FLAG:
+        snprintf(range, sizeof range, "true or false");
+        break;
+    case SPL_PARAMETER_CHOICE:
+        snprintf(range, sizeof range, "one of %s", parameter->unit);
+        break;
+    case SPL_PARAMETER_COUNT:
+    case SPL_PARAMETER_BYTES:
+        snprintf(range, sizeof range, "a whole number of %s from %" PRIu64 " to %" PRIu64 "%s", parameter->unit,
+                 parameter->least, parameter->most,
+                 parameter->type == SPL_PARAMETER_BYTES ? ", or such with K, M, G or T" : "");
+        break;
+    default:
+        snprintf(range, sizeof range, "a value (%s)", parameter->unit);
+        break;
+    }
+    return spl_fail_field(err, SPL_E_USAGE, parameter->name, "%.200s%s takes %s, not '%.80s'", where, parameter->name,
+                          range, text);
+}
+
+static int add_item(struct spl_text_list *list, const char *text, struct spl_error *err)
+{
+    char **grown = spl_realloc(list->items, list->count + 1, sizeof *grown, err);
+    if (!grown)
+        return SPL_E_NOMEM;
+    list->items = grown;
+    if (!(grown[list->count] = strdup(text)))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for '%.80s'", text);
+    list->count++;
+    return 0;
+}
+
+static void clear_list(struct spl_text_list *list)
+{
+    for (size_t i = 0; i < list->count; i++)
+        free(list->items[i]);
+    free(list->items);
+    *list = (struct spl_text_list){0};
+}
+
+static int set_text(char **out, const char *text, struct spl_error *err)
+{
+    char *copy = strdup(text);
+    if (!copy)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for '%.80s'", text);
+    free(*out);
+    *out = copy;
+    return 0;
+}
+
+int spl_service_options_set(struct spl_service_options *options, size_t index, const char *text, enum spl_origin origin,
+                            const char *where, struct spl_error *err)
+{
+    const struct spl_parameter *parameter = &spl_parameters[index];
+    void *out = member(options, index);
+    struct spl_service_options scratch; /* a weaker origin's value is checked all the same */
+    bool weaker = origin < options->origin[index], valid = true;
+    if (weaker) {
+        memset(&scratch, 0, sizeof scratch);
+        out = member(&scratch, index);
+    }
+    int rc = 0;
+    switch (parameter->type) {
+    case SPL_PARAMETER_TEXT:
+        rc = weaker ? 0 : set_text(out, text, err);
+        break;
+    case SPL_PARAMETER_LIST:
+        valid = *text;
+        if (!weaker && origin > options->origin[index])
+            clear_list(out);
+        rc = weaker || !valid ? 0 : add_item(out, text, err);
+        break;
+    case SPL_PARAMETER_FLAG:
+        valid = !strcmp(text, "true") || !strcmp(text, "false");
+        *(bool *)out = valid ? text[0] == 't' : *(bool *)out;
+        break;
+    case SPL_PARAMETER_COUNT:
+    case SPL_PARAMETER_BYTES:
+        valid = parse_number(parameter, text, out);
+        break;
+    case SPL_PARAMETER_CHOICE:
+        valid = parse_choice(parameter->unit, text, out);
+        break;
+    }
+    if (!valid)
+        return refuse(parameter, text, where, err);
+    if (!rc && !weaker)
+        options->origin[index] = origin;
+    return rc;
+}
+
+int spl_service_options_init(struct spl_service_options *options, struct spl_error *err)
+{
+    int rc = 0;
+    memset(options, 0, sizeof *options);
+    for (size_t i = 0; !rc && i < SPL_PARAMETERS; i++)
+        if (spl_parameters[i].type != SPL_PARAMETER_LIST)
+            rc = spl_service_options_set(options, i, spl_parameters[i].fallback, SPL_FROM_DEFAULT, "default: ", err);
+    if (rc)
+        spl_service_options_finish(options);
+    return rc;
+}
+
+void spl_service_options_finish(struct spl_service_options *options)
+{
+    for (size_t i = 0; i < SPL_PARAMETERS; i++) {
+        if (spl_parameters[i].type == SPL_PARAMETER_TEXT)
+            free(*(char **)member(options, i));
+        if (spl_parameters[i].type == SPL_PARAMETER_LIST)
+            clear_list(member(options, i));
+    }
+    memset(options, 0, sizeof *options);
+}

@@ -1,0 +1,125 @@
+/* Query strings: name=value joined by '&', percent-encoded, numbers in decimal, vectors joined by commas.
+ *
+ * Invariant: every byte of the input is either understood or refused by the name of its parameter; nothing is read
+ * past `length`, nothing is allocated. Pure functions, any thread. */
+#include "service/request/request.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "service/request/values.h"
+
+enum { name_max = 64, text_max = 512 };
+
+int spl_percent_decode(const char *text, size_t length, char *out, size_t capacity, const char *field,
+                       struct spl_error *err)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < length; i++) {
+        int byte = (unsigned char)text[i];
+        if (byte == '%') {
+            int high = i + 2 < length ? spl_hex_digit(text[i + 1]) : -1;
+            int low = i + 2 < length ? spl_hex_digit(text[i + 2]) : -1;
+            if (high < 0 || low < 0)
+                return spl_fail_field(err, SPL_E_INPUT, field,
+                                      "'%%' at byte %zu of %s is not followed by two hex digits", i + 1, field);
+            byte = high * 16 + low;
+            i += 2;
+        }
+        if (byte < 0x20 || byte == 0x7f)
+            return spl_fail_field(err, SPL_E_INPUT, field, "%s holds the control character %d", field, byte);
+        if (used + 1 >= capacity)
+            return spl_fail_field(err, SPL_E_INPUT, field, "%s is longer than %zu bytes", field, capacity - 1);
+        out[used++] = (char)byte;
+    }
+    out[used] = '\0';
+    return 0;
+}
+
+/* Plain decimal numbers; strtod alone would also take hex floats, blanks, "nan" and "infinity". */
+static int parse_number(const char *text, size_t length, const char *name, double *out, struct spl_error *err)
+{
+    char copy[text_max];
+    memcpy(copy, text, length); // the caller's buffer has the same size
+    copy[length] = '\0';
+    const char *word = copy + (copy[0] == '-' || copy[0] == '+');
+    if (!strcasecmp(word, "nan") || !strcasecmp(word, "inf") || !strcasecmp(word, "infinity"))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be finite, not '%.16s'", name, copy);
+    char *end = copy;
+    double number = 0;
+    if (length && strspn(copy, "0123456789+-.eE") == length)
+        number = strtod(copy, &end);
+    if (end != copy + length || !length)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is not a number", name, copy);
+    *out = number;
+    return 0;
+}
+
+static int parse_numbers(struct spl_value *value, const char *text, const char *name, struct spl_error *err)
+{
+    for (const char *p = text;;) {
+        size_t length = strcspn(p, ",");
+        double ignored;
+        bool room = value->count < SPL_VALUE_NUMBERS;
+        int rc = parse_number(p, length, name, room ? &value->n[value->count] : &ignored, err);
+        if (rc)
+            return rc;
+        value->count++;
+        if (!p[length])
+            return 0;
+        p += length + 1;
+    }
+}
+
+static int parse_pair(struct values *values, const char *pair, size_t length, enum spl_value_place place,
+                      struct spl_error *err)
+{
+    char name[name_max], text[text_max];
+    const char *equals = memchr(pair, '=', length);
+    size_t name_length = equals ? (size_t)(equals - pair) : length;
+    int rc = spl_percent_decode(pair, name_length, name, sizeof name, "a parameter's name", err);
+    if (rc)
+        return rc;
+    enum param param = spl_param_find(name, place, err);
+    if (param == PARAM_COUNT)
+        return SPL_E_INPUT;
+    if (!equals)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s has no value; write %s=…", name, name);
+    struct spl_value *value = &values->v[param];
+    if ((rc = spl_values_claim(values, param, name, err)))
+        return rc;
+    if ((rc = spl_percent_decode(equals + 1, length - name_length - 1, text, sizeof text, name, err)))
+        return rc;
+    int kind = spl_params[param].kind;
+    unsigned least, most;
+    spl_kind_get_count((enum spl_value_kind)kind, &least, &most);
+    if (!most)
+        return spl_value_from_text(value, kind, name, text, err);
+    if ((rc = parse_numbers(value, text, name, err)))
+        return rc;
+    return spl_value_check(value, (enum spl_value_kind)kind, name, err);
+}
+
+int spl_values_from_query(struct values *values, const char *query, size_t length, enum spl_value_place place,
+                          struct spl_error *err)
+{
+    for (size_t at = 0; at < length;) {
+        const char *end = memchr(query + at, '&', length - at);
+        size_t pair = end ? (size_t)(end - query) - at : length - at;
+        int rc = pair ? parse_pair(values, query + at, pair, place, err) : 0;
+        if (rc)
+            return rc;
+        at += pair + 1;
+    }
+    return 0;
+}
+
+int spl_view_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
+                                struct spl_error *err)
+{
+    struct values values = {0};
+    int rc = spl_values_from_query(&values, query, length, SPL_QUERY, err);
+    return rc ? rc : spl_values_resolve(&values, defaults, limits, out, err);
+}

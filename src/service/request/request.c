@@ -1,0 +1,146 @@
+/* From given parameters to a checked view: the camera by its own rules, what is drawn and how it is encoded by these.
+ *
+ * Invariant: what comes out has passed spl_view_check() and lies within the server's caps, so that no later stage
+ * refuses it for a reason that this one could have named. Pure functions, any thread. */
+#include "service/request/request.h"
+
+#include <math.h>
+
+#include "service/request/values.h"
+
+static bool given(const struct values *values, enum param param)
+{
+    return values->v[param].given;
+}
+
+static double get(const struct values *values, enum param param, double otherwise)
+{
+    return values->v[param].given ? values->v[param].n[0] : otherwise;
+}
+
+static enum spl_format natural_format(enum spl_layer layer)
+{
+    return layer == SPL_LAYER_COLOR ? SPL_FORMAT_JPEG : SPL_FORMAT_PNG;
+}
+
+struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *request, enum spl_layer layer)
+{
+    struct spl_encode_options encode = request->encode;
+    if (request->natural)
+        encode.format = natural_format(layer);
+    return encode;
+}
+
+static int resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+{
+    double quality = get(values, PARAM_quality, 90), scale = get(values, PARAM_depth_scale, 1000);
+    double chroma = get(values, PARAM_chroma, 0);
+    enum spl_format format = (enum spl_format)get(values, PARAM_format, natural_format(out->layer));
+    if (quality < 1 || quality > 100)
+        return spl_fail_field(err, SPL_E_INPUT, "quality", "quality %g is outside 1 to 100", quality);
+    if (given(values, PARAM_chroma) && chroma != 420 && chroma != 444)
+        return spl_fail_field(err, SPL_E_INPUT, "chroma", "chroma %g is neither 420 nor 444", chroma);
+    if (chroma == 444 && format == SPL_FORMAT_WEBP)
+        return spl_fail_field(err, SPL_E_INPUT, "chroma", "a lossy WebP is always 420; leave chroma out");
+    if (!(scale >= 1e-6 && scale <= 1e9))
+        return spl_fail_field(err, SPL_E_INPUT, "depth_scale", "depth_scale %g is outside 1e-6 to 1e9", scale);
+    out->natural = !given(values, PARAM_format);
+    out->encode = (struct spl_encode_options){
+        .format = format, .quality = (int)quality, .chroma = (int)chroma, .depth_scale = scale};
+    return 0;
+}
+
+static int resolve_layers(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+{
+    bool several = given(values, PARAM_layers);
+    if (several && given(values, PARAM_layer))
+        return spl_fail_field(err, SPL_E_INPUT, "layers", "'layer' and 'layers' exclude each other");
+    if (!several && given(values, PARAM_container))
+        return spl_fail_field(err, SPL_E_INPUT, "container", "'layers' is needed where 'container' is given");
+    out->layer = (enum spl_layer)get(values, PARAM_layer, SPL_LAYER_COLOR);
+    out->view.layers = 1u << out->layer;
+    if (several) {
+        out->view.layers = (uint32_t)values->v[PARAM_layers].n[0];
+        out->layer = (enum spl_layer)__builtin_ctz(out->view.layers);
+        out->container = (enum spl_container)get(values, PARAM_container, SPL_CONTAINER_MULTIPART);
+    }
+    return 0;
+}
+
+int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err)
+{
+    double margin = get(values, PARAM_margin, view->margin);
+    if (given(values, PARAM_margin) && margin < 0) // negative means "default" further down
+        return spl_fail_field(err, SPL_E_INPUT, "margin", "margin %g is negative", margin);
+    view->method = (enum spl_method)get(values, PARAM_method, view->method);
+    view->lod = get(values, PARAM_lod, view->lod);
+    view->margin = margin;
+    return 0;
+}
+
+static int resolve_drawing(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+{
+    struct spl_view *view = &out->view;
+    int rc = spl_values_resolve_splats(values, view, err);
+    if (rc || (rc = resolve_layers(values, out, err)))
+        return rc;
+    view->supersample = get(values, PARAM_supersample, 1);
+    if (given(values, PARAM_background))
+        for (int i = 0; i < 4; i++)
+            view->background[i] = (uint8_t)values->v[PARAM_background].n[i];
+    if (get(values, PARAM_transparent, 0) != 0)
+        view->background[3] = 0;
+    return 0;
+}
+
+static int resolve_demand(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+{
+    static const double longest_ms = 600000;
+    struct spl_demand *demand = &out->demand;
+    double budget = get(values, PARAM_budget, NAN), psnr = get(values, PARAM_psnr, NAN);
+    if (given(values, PARAM_budget) && !(budget > 0 && budget <= longest_ms))
+        return spl_fail_field(err, SPL_E_INPUT, "budget", "budget %g ms is outside 0 (exclusive) to %.0f", budget,
+                              longest_ms);
+    if (given(values, PARAM_psnr) && !(psnr >= 0 && psnr <= SPL_PROFILE_PSNR_MAX))
+        return spl_fail_field(err, SPL_E_INPUT, "psnr", "psnr %g is outside 0 to %g", psnr, SPL_PROFILE_PSNR_MAX);
+    if (given(values, PARAM_psnr) && out->layer != SPL_LAYER_COLOR)
+        return spl_fail_field(err, SPL_E_INPUT, "psnr", "psnr is about colour; layer=%s takes a budget only",
+                              spl_layer_name(out->layer));
+    if (out->container && (given(values, PARAM_budget) || given(values, PARAM_psnr)))
+        return spl_fail_field(err, SPL_E_INPUT, "layers",
+                              "budget and psnr are about one layer; ask for it with 'layer'");
+    out->planned = given(values, PARAM_budget) || given(values, PARAM_psnr);
+    demand->budget_ms = budget;
+    demand->psnr = psnr;
+    demand->width = out->view.camera.width;
+    demand->height = out->view.camera.height;
+    demand->layer = out->layer;
+    demand->keep_method = given(values, PARAM_method);
+    demand->keep_lod = given(values, PARAM_lod);
+    demand->keep_supersample = given(values, PARAM_supersample);
+    demand->kept.method = out->view.method;
+    demand->kept.lod = out->view.lod;
+    demand->kept.supersample = out->view.supersample;
+    return 0;
+}
+
+void spl_values_resolve_version(const struct values *values, struct spl_view_request *out)
+{
+    const struct spl_value *v = &values->v[PARAM_v];
+    out->versioned = v->given;
+    out->version = v->given ? (uint64_t)v->n[0] << 32 | (uint64_t)v->n[1] : 0;
+}
+
+int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+                       const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
+{
+    *out = (struct spl_view_request){0};
+    spl_view_init(&out->view);
+    int rc;
+    if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
+        (rc = resolve_drawing(values, out, err)) || (rc = resolve_encoding(values, out, err)) ||
+        (rc = resolve_demand(values, out, err)))
+        return rc;
+    spl_values_resolve_version(values, out);
+    return spl_view_check(&out->view, err);
+}

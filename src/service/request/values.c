@@ -1,0 +1,178 @@
+/* The table of parameters, and the syntax of single values that queries and JSON share beyond those of cameras. Pure
+ * functions, any thread. */
+#include "service/request/values.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#define LAYER_NAMES "color, depth, range, normal, id, coverage"
+
+const struct param_info spl_params[PARAM_COUNT] = {
+#define PARAM(name, alias, kind, places, help) {#name, alias, SPL_KIND_##kind, places},
+#include "service/request/view_params.def"
+#undef PARAM
+};
+
+enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
+{
+    for (int i = 0; i < PARAM_COUNT; i++) {
+        const struct param_info *info = &spl_params[i];
+        bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
+        if (strcmp(name, info->name) && !alias)
+            continue;
+        unsigned places = info->places;
+        if (i < (int)SPL_CAMERA_PARAMS)
+            places |= (places & SPL_QUERY ? SPL_PICK : 0) | (places & SPL_BODY ? SPL_PICK_BODY : 0);
+        else
+            places |= places & SPL_PICK ? SPL_PICK_BODY : 0;
+        if (places & place)
+            return (enum param)i;
+        spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
+                       place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
+                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, lod, margin and v"
+                       : info->places == SPL_PICK           ? "it is a parameter of a pick"
+                       : info->places & SPL_CAMERA          ? "give it in the \"camera\" object of a POST"
+                                                            : "give it beside \"camera\"");
+        return PARAM_COUNT;
+    }
+    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; api/openapi.yaml lists those of a view", name);
+    return PARAM_COUNT;
+}
+
+int spl_values_claim(struct values *values, enum param param, const char *name, struct spl_error *err)
+{
+    if (values->v[param].given)
+        return spl_fail_field(err, SPL_E_INPUT, name, "'%s' is given twice", spl_params[param].name);
+    values->v[param].given = true;
+    return 0;
+}
+
+int spl_hex_digit(char c)
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}
+
+static int parse_color(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    if (!strcmp(text, "transparent")) {
+        value->n[3] = 0; // the rest is 0 already
+        return 0;
+    }
+    const char *digits = text[0] == '#' ? text + 1 : !strncasecmp(text, "0x", 2) ? text + 2 : text;
+    size_t length = strlen(digits);
+    bool good = length == 6 || length == 8;
+    for (size_t i = 0; good && i < length; i++)
+        good = spl_hex_digit(digits[i]) >= 0;
+    if (!good)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write RRGGBB, RRGGBBAA or transparent",
+                              name, text);
+    value->n[3] = 255;
+    for (size_t i = 0; i < length / 2; i++)
+        value->n[i] = spl_hex_digit(digits[2 * i]) * 16 + spl_hex_digit(digits[2 * i + 1]);
+    return 0;
+}
+
+/* "50ms", "0.05s", "50". */
+static int parse_duration(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    size_t digits = strspn(text, "0123456789.");
+    const char *unit = text + digits;
+    char *end = NULL;
+    double scale = !*unit || !strcmp(unit, "ms") ? 1 : !strcmp(unit, "s") ? 1000 : 0;
+    value->n[0] = digits ? scale * strtod(text, &end) : 0;
+    if (end != unit || scale == 0)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no time; write 50ms, 0.05s or 50", name, text);
+    return 0;
+}
+
+static int parse_version(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    size_t length = strspn(text, "0123456789abcdef");
+    if (length != 16 || text[length])
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no version; write the dataset's 16 hex digits",
+                              name, text);
+    uint64_t version = strtoull(text, NULL, 16);
+    value->n[0] = (double)(version >> 32);
+    value->n[1] = (double)(version & UINT32_MAX);
+    return 0;
+}
+
+int spl_value_add_layer(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    int layer = spl_layer_from_name(text);
+    if (layer < 0)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s: '%.32s' is unknown; known are " LAYER_NAMES, name, text);
+    unsigned set = (unsigned)value->n[0];
+    if (set >> layer & 1)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s has '%s' twice", name, text);
+    value->n[0] = set | 1u << layer;
+    return 0;
+}
+
+static int parse_layers(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    char word[32];
+    for (const char *p = text;; p++) {
+        size_t length = strcspn(p, ",");
+        snprintf(word, sizeof word, "%.*s", (int)(length < sizeof word ? length : sizeof word - 1), p);
+        int rc = spl_value_add_layer(value, name, word, err);
+        if (rc)
+            return rc;
+        p += length;
+        if (!*p)
+            return 0;
+    }
+}
+
+static int container_from_name(const char *name)
+{
+    return !strcmp(name, "multipart") ? SPL_CONTAINER_MULTIPART : !strcmp(name, "zip") ? SPL_CONTAINER_ZIP : -1;
+}
+
+static int built_format_from_name(const char *name)
+{
+    int format = spl_format_from_name(name);
+    return format >= 0 && spl_format_is_built((enum spl_format)format) ? format : -1;
+}
+
+static int flag_from_name(const char *name)
+{
+    return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
+}
+
+int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err)
+{
+    const struct {
+        int (*lookup)(const char *name);
+        const char *choices;
+    } table[] = {
+        [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
+        [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points"},
+        [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
+        [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
+                                                         ? "jpeg, png, webp, npy, raw"
+                                                         : "jpeg, png, npy, raw (this build makes no webp)"},
+        [SPL_KIND_CONTAINER] = {container_from_name, "multipart, zip"},
+    };
+    if (kind == SPL_KIND_COLOR)
+        return parse_color(value, name, text, err);
+    if (kind == SPL_KIND_DURATION)
+        return parse_duration(value, name, text, err);
+    if (kind == SPL_KIND_LAYERS)
+        return parse_layers(value, name, text, err);
+    if (kind == SPL_KIND_VERSION)
+        return parse_version(value, name, text, err);
+    if (kind < SPL_KIND_END)
+        return spl_value_from_choice(value, (enum spl_value_kind)kind, name, text, err);
+    int choice = table[kind].lookup(text);
+    if (choice < 0)
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, text,
+                              table[kind].choices);
+    value->n[0] = choice;
+    return 0;
+}

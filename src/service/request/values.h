@@ -1,0 +1,78 @@
+/* Between a request's syntax (query.c, json.c) and its meaning (request.c): the parameters that were
+ * given, as plain numbers. */
+#ifndef SPL_SERVICE_VALUES_H
+#define SPL_SERVICE_VALUES_H
+
+#include <stdbool.h>
+
+#include "base/error.h"
+#include "geom/camera_json.h"
+#include "service/request/request.h"
+
+/* The kinds of camera parameters go before these. */
+enum {
+    SPL_KIND_FLAG = SPL_KIND_END,
+    SPL_KIND_COLOR,
+    SPL_KIND_METHOD,
+    SPL_KIND_LAYER,
+    SPL_KIND_LAYERS, /* bit per enum spl_layer */
+    SPL_KIND_FORMAT,
+    SPL_KIND_CONTAINER,
+    SPL_KIND_DURATION, /* ms */
+    SPL_KIND_VERSION,  /* upper and lower 32 bits */
+};
+
+enum param {
+#define PARAM(name, alias, kind, places, help) PARAM_##name,
+#include "service/request/view_params.def"
+#undef PARAM
+    PARAM_COUNT
+};
+_Static_assert((int)PARAM_method == (int)SPL_CAMERA_PARAMS, "the camera's parameters come first");
+
+struct param_info {
+    const char *name, *alias;
+    int kind;        /* enum spl_value_kind, or one of the above */
+    unsigned places; /* of enum spl_value_place */
+};
+extern const struct param_info spl_params[PARAM_COUNT];
+
+struct values {
+    struct spl_value v[PARAM_COUNT]; /* colours: R, G, B, A */
+};
+
+/* 0..15, -1 for anything else. */
+int spl_hex_digit(char c);
+
+/* The parameter called `name` in `place`; PARAM_COUNT and a filled `err` for one that is unknown there. */
+enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err);
+
+/* Marks `param` as given under `name`; refuses the second time. */
+int spl_values_claim(struct values *values, enum param param, const char *name, struct spl_error *err);
+
+/* Text to the numbers of a choice, a flag, a colour or a duration. */
+int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err);
+
+/* The same for LAYERS: adds one name to the set; refuses what is in it already. */
+int spl_value_add_layer(struct spl_value *value, const char *name, const char *text, struct spl_error *err);
+
+/* A query's parameters, those of `place`. */
+int spl_values_from_query(struct values *values, const char *query, size_t length, enum spl_value_place place,
+                          struct spl_error *err);
+
+/* A JSON object's parameters, those of `place`; borrows it. */
+int spl_values_from_object(struct values *values, json_t *object, enum spl_value_place place, struct spl_error *err);
+
+/* A body's parameters, those of `place`; none for an empty one. */
+int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
+                         struct spl_error *err);
+
+/* Meaning: defaults, conflicts, ranges, the camera. */
+int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+                       const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
+
+/* The parts of it that picks share: method, lod, margin; the version. */
+int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err);
+void spl_values_resolve_version(const struct values *values, struct spl_view_request *out);
+
+#endif

@@ -1,0 +1,98 @@
+/* A batch: many views in one JSON body. What stands beside "views" goes for each of them where it says nothing else.
+ *
+ * Errors name the view: views[3].fov. Invariant: no reference to the document outlives the call. Pure functions, any
+ * thread. */
+#include "service/request/request.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "service/request/values.h"
+
+static int resolve_view(const struct values *common, json_t *json, const struct spl_camera_defaults *defaults,
+                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
+{
+    struct values own = {0};
+    if (!json_is_object(json))
+        return spl_fail(err, SPL_E_INPUT, "a view must be an object, not %s", spl_json_type_name(json));
+    int rc = spl_values_from_object(&own, json, SPL_BODY, err);
+    for (int i = 0; i < PARAM_COUNT; i++)
+        if (!own.v[i].given)
+            own.v[i] = common->v[i];
+    if (rc || (rc = spl_values_resolve(&own, defaults, limits, out, err)))
+        return rc;
+    if (out->container)
+        return spl_fail_field(err, SPL_E_INPUT, "layers",
+                              "a view of a batch has one layer; list the view once a layer");
+    return 0;
+}
+
+static int resolve_all(const struct values *common, json_t *list, const struct spl_camera_defaults *defaults,
+                       const struct spl_camera_limits *limits, struct spl_views_request *out, struct spl_error *err)
+{
+    uint64_t pixels = 0;
+    if (!(out->views = spl_alloc(json_array_size(list), sizeof *out->views, err)))
+        return SPL_E_NOMEM;
+    for (; out->count < json_array_size(list); out->count++) {
+        struct spl_view_request *view = &out->views[out->count];
+        struct spl_error why = {0};
+        char field[sizeof why.field + 24];
+        int rc = resolve_view(common, json_array_get(list, out->count), defaults, limits, view, &why);
+        snprintf(field, sizeof field, "views[%zu]%s%s", out->count, why.field[0] ? "." : "", why.field);
+        if (rc)
+            return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);
+        pixels += (uint64_t)view->view.camera.width * view->view.camera.height;
+    }
+    if (pixels > limits->pixels)
+        return spl_fail_field(err, SPL_E_INPUT, "views", "%zu views have %llu pixels in all; the limit is %llu",
+                              out->count, (unsigned long long)pixels, (unsigned long long)limits->pixels);
+    return 0;
+}
+
+/* Takes "views" out of the document, so that what is left are parameters. */
+static int read_document(json_t *document, struct values *common, json_t **list, struct spl_error *err)
+{
+    if (!json_is_object(document))
+        return spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
+                              spl_json_type_name(document));
+    *list = json_incref(json_object_get(document, "views"));
+    if (!json_is_array(*list) || !json_array_size(*list) || json_array_size(*list) > SPL_VIEWS_MAX)
+        return spl_fail_field(err, SPL_E_INPUT, "views", "views must be an array of 1 to %d views, not %s of %zu",
+                              SPL_VIEWS_MAX, spl_json_type_name(*list), json_array_size(*list));
+    json_object_del(document, "views");
+    return spl_values_from_object(common, document, SPL_BODY, err);
+}
+
+int spl_views_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_views_request *out,
+                                struct spl_error *err)
+{
+    struct values common = {0};
+    json_error_t where;
+    json_t *list = NULL, *document = json_loadb(length ? body : "", length, JSON_REJECT_DUPLICATES, &where);
+    *out = (struct spl_views_request){0};
+    int rc;
+    if (!document)
+        rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
+                            where.text);
+    else
+        rc = read_document(document, &common, &list, err);
+    struct spl_value *container = &common.v[PARAM_container];
+    out->container = container->given ? (enum spl_container)container->n[0] : SPL_CONTAINER_MULTIPART;
+    *container = (struct spl_value){0}; // of the batch, not of its views
+    if (!rc)
+        rc = resolve_all(&common, list, defaults, limits, out, err);
+    json_decref(list);
+    json_decref(document);
+    if (rc)
+        spl_views_request_finish(out);
+    return rc;
+}
+
+void spl_views_request_finish(struct spl_views_request *request)
+{
+    free(request->views);
+    *request = (struct spl_views_request){0};
+}

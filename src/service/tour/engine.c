@@ -1,0 +1,338 @@
+/* The life of tours: taken up at start, fed to the pipeline frame by frame, ended, swept when they are old.
+ *
+ * Frames go to the pipeline's lane behind people's views, SPL_TOUR_IN_FLIGHT of them at a time, so that a view waits
+ * for one tour frame at most; the oldest tour that has frames to be made goes first. A frame that fails for a reason
+ * that passes (a lost device, a deadline) is made again; anything else ends the tour and says why: a full disk, a
+ * quota, a dataset that is no longer the same. Invariant: spl_tours.bytes is the sum of the tours' bytes. Loop's
+ * thread. */
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "service/tour/tour.h"
+
+enum { writing_max = 4, failures_max = 10 };
+
+bool spl_tour_has_ended(const struct spl_tour *tour)
+{
+    return tour->state == SPL_TOUR_DONE || tour->state == SPL_TOUR_FAILED;
+}
+
+static void changed(struct spl_tour *tour)
+{
+    tour->changes++;
+    spl_tour_streams_wake(tour);
+}
+
+/* A file of `now` bytes is there instead of one of `before`. */
+static void account(struct spl_tour *tour, uint64_t before, uint64_t now)
+{
+    if (tour->removed)
+        return;
+    tour->bytes += now - before;
+    tour->tours->bytes += now - before;
+}
+
+static void end(struct spl_tour *tour, enum spl_tour_state state)
+{
+    tour->state = state;
+    tour->ended_s = time(NULL);
+    tour->ended_ns = spl_now_ns();
+    tour->age_s = 0;
+    free(tour->spec.cameras);
+    tour->spec.cameras = NULL;
+    json_decref(tour->body); // may be large, and nothing is made of it any more
+    tour->body = json_null();
+    spl_log_info("tour %s: %s after %zu of %zu frames%s%s", tour->name, spl_tour_state_names[state], tour->frames_done,
+                 tour->spec.frames, tour->failure.code ? ": " : "", tour->failure.message);
+    spl_tour_work_state(tour);
+    changed(tour);
+}
+
+/* Clients read why: without the folder that a file lies in. */
+static void hide_folder(const struct spl_tours *tours, char *message)
+{
+    size_t length = strlen(tours->directory);
+    for (char *found; (found = strstr(message, tours->directory)) && found[length] == '/';) {
+        char *file = strchr(found + length + 1, '/'); // behind the tour's name
+        file = file ? file + 1 : found + length + 1;
+        memmove(found, file, strlen(file) + 1);
+    }
+}
+
+void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why)
+{
+    if (spl_tour_has_ended(tour) || tour->removed)
+        return;
+    tour->failure = *why;
+    hide_folder(tour->tours, tour->failure.message);
+    end(tour, SPL_TOUR_FAILED);
+}
+
+/* The next step of a tour all of whose frames are done. */
+static void advance(struct spl_tour *tour)
+{
+    if (tour->removed || tour->state != SPL_TOUR_RENDERING || tour->frames_done < tour->spec.frames)
+        return;
+    if (!tour->spec.video) {
+        end(tour, SPL_TOUR_DONE);
+        return;
+    }
+    if (tour->tours->making_video) // one at a time: the thread pool has others to serve
+        return;
+    tour->tours->making_video = true;
+    tour->state = SPL_TOUR_VIDEO;
+    spl_tour_work_video(tour);
+    changed(tour);
+}
+
+/* True when the quota is used up; the tour has failed then. */
+static bool is_over_quota(struct spl_tour *tour, uint64_t more)
+{
+    uint64_t limit = tour->tours->service->options->tour_disk_max;
+    struct spl_error err = {0};
+    if (tour->tours->bytes + tour->tours->writing_bytes + more <= limit)
+        return false;
+    spl_fail(&err, SPL_E_LIMIT, "tours would fill more than the %llu bytes that they may; remove some",
+             (unsigned long long)limit);
+    spl_tour_fail(tour, &err);
+    return true;
+}
+
+static void reopen(struct spl_tour *tour, size_t frame, const struct spl_error *err)
+{
+    tour->frames[frame] = SPL_FRAME_OPEN;
+    if (frame < tour->first_open)
+        tour->first_open = frame;
+    if (!spl_code_get_info(err->code)->retry || ++tour->failures > failures_max)
+        spl_tour_fail(tour, err);
+}
+
+/* A frame came back from the pipeline. */
+static void take_job(struct spl_job *job)
+{
+    struct spl_tour *tour = job->owner;
+    struct spl_tours *tours = tour->tours;
+    tours->in_flight--;
+    tour->in_flight--;
+    if (job->err.code) {
+        reopen(tour, job->frame_number, &job->err);
+    } else if (!tour->removed && !spl_tour_has_ended(tour) && !is_over_quota(tour, job->encoded.length)) {
+        tours->writing++;
+        tours->writing_bytes += job->encoded.length;
+        spl_count(&tours->service->counters, tour_frames);
+        spl_tour_work_frame(tour, job->frame_number, &job->encoded);
+    }
+    spl_job_destroy(job);
+    spl_tours_pump(tours);
+    spl_tour_let_go(tour);
+}
+
+void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, const struct spl_error *err)
+{
+    tour->tours->writing--;
+    tour->tours->writing_bytes -= bytes;
+    if (err->code) {
+        reopen(tour, frame, err);
+        return;
+    }
+    tour->failures = 0;
+    tour->frames[frame] = SPL_FRAME_DONE;
+    tour->frames_done++;
+    account(tour, 0, bytes);
+    changed(tour);
+    advance(tour);
+}
+
+void spl_tour_video_made(struct spl_tour *tour, uint64_t bytes, const struct spl_error *err)
+{
+    tour->tours->making_video = false;
+    if (tour->removed || tour->tours->stopping)
+        return; // made again after the restart
+    if (err->code) {
+        spl_tour_fail(tour, err);
+        return;
+    }
+    account(tour, 0, bytes);
+    end(tour, SPL_TOUR_DONE);
+}
+
+void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct spl_error *err)
+{
+    if (!err->code) {
+        account(tour, tour->state_bytes, bytes);
+        tour->state_bytes = bytes;
+    } else if (tour->ended_s) {
+        spl_log_warn("tour %s: %s; a restart takes it up again", tour->name, err->message);
+    } else {
+        spl_tour_fail(tour, err);
+    }
+}
+
+/* False when the pipeline has no place, or the tour has ended. */
+static bool submit(struct spl_tour *tour, size_t frame)
+{
+    struct spl_tours *tours = tour->tours;
+    struct spl_catalog_entry *entry = spl_catalog_find(&tours->service->catalog, tour->dataset);
+    struct spl_error err = {0};
+    char version[17] = "";
+    if (entry)
+        snprintf(version, sizeof version, "%016llx", (unsigned long long)entry->info->version);
+    if (strcmp(version, tour->version)) {
+        spl_fail(&err, SPL_E_NOT_FOUND, "dataset '%s' is no longer the version that the tour was asked of",
+                 tour->dataset);
+        spl_tour_fail(tour, &err);
+        return false;
+    }
+    struct spl_job *job = spl_alloc(1, sizeof *job, &err);
+    if (!job)
+        return false;
+    job->entry = spl_catalog_entry_ref(entry);
+    job->dataset = entry->dataset;
+    job->plan = entry->plan;
+    job->request = tour->spec.view;
+    job->request.view.camera = tour->spec.cameras[frame];
+    job->accepted_ns = spl_now_ns();
+    job->deadline_ns = SPL_NEVER; // views go first, however long that takes
+    job->behind = true;
+    job->frame_number = frame;
+    job->owner = tour;
+    job->done = take_job;
+    if (spl_pipeline_submit(tours->service->pipeline, job, &err)) {
+        spl_job_destroy(job);
+        return false;
+    }
+    tour->frames[frame] = SPL_FRAME_IN_FLIGHT;
+    tour->in_flight++;
+    tours->in_flight++;
+    return true;
+}
+
+void spl_tours_pump(struct spl_tours *tours)
+{
+    if (!tours || tours->stopping || tours->service->draining ||
+        spl_pipeline_get_state(tours->service->pipeline) != SPL_PIPELINE_READY)
+        return;
+    struct spl_tour *tour, *next;
+    for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
+        next = TAILQ_NEXT(tour, link);
+        if (!tour->state_bytes)
+            continue; // frames without a tour.json would be nobody's after a crash
+        advance(tour);
+        while (tour->state == SPL_TOUR_RENDERING && tour->first_open < tour->spec.frames) {
+            if (tours->in_flight == SPL_TOUR_IN_FLIGHT || tours->in_flight + tours->writing >= writing_max)
+                return;
+            if (tour->frames[tour->first_open] == SPL_FRAME_OPEN) {
+                if (!tour->began_ns) {
+                    tour->began_ns = spl_now_ns();
+                    tour->began_done = tour->frames_done;
+                }
+                if (!submit(tour, tour->first_open))
+                    break;
+            }
+            tour->first_open++;
+        }
+    }
+}
+
+struct spl_tour *spl_tours_find(struct spl_tours *tours, const char *name)
+{
+    struct spl_tour *tour;
+    TAILQ_FOREACH(tour, &tours->all, link)
+    if (!strcmp(tour->name, name))
+        return tour;
+    return NULL;
+}
+
+static int make_name(struct spl_tours *tours, char name[SPL_TOUR_NAME + 1], struct spl_error *err)
+{
+    do {
+        uint64_t random;
+        if (getrandom(&random, sizeof random, 0) != sizeof random)
+            return spl_fail_errno(err, errno, "the system gives no random numbers");
+        snprintf(name, SPL_TOUR_NAME + 1, "%016llx", (unsigned long long)random);
+    } while (spl_tours_find(tours, name));
+    return 0;
+}
+
+int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, json_t *body,
+                  struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err)
+{
+    uint64_t disk = tours->service->options->tour_disk_max;
+    struct spl_tour *other;
+    size_t unfinished = 0;
+    TAILQ_FOREACH(other, &tours->all, link)
+    unfinished += !spl_tour_has_ended(other);
+    if (unfinished >= SPL_TOURS_UNFINISHED)
+        return spl_fail(err, SPL_E_BUSY, "%zu tours are still to be made; come back later", unfinished);
+    if (tours->count >= SPL_TOURS_MAX)
+        return spl_fail(err, SPL_E_BUSY, "%zu tours are kept; remove some", tours->count);
+    if (tours->bytes >= disk)
+        return spl_fail(err, SPL_E_BUSY, "tours fill all of the %llu bytes that they may; remove some",
+                        (unsigned long long)disk);
+    struct spl_tour *tour = spl_alloc(1, sizeof *tour, err);
+    if (!tour)
+        return SPL_E_NOMEM;
+    tour->frames = spl_alloc(spec->frames, 1, err);
+    int rc = tour->frames ? make_name(tours, tour->name, err) : SPL_E_NOMEM;
+    if (rc) {
+        spl_tour_free(tour);
+        return rc;
+    }
+    tour->tours = tours;
+    tour->body = json_incref(body);
+    tour->spec = *spec;
+    *spec = (struct spl_tour_spec){0};
+    tour->created_s = time(NULL);
+    snprintf(tour->dataset, sizeof tour->dataset, "%s", entry->info->id);
+    snprintf(tour->version, sizeof tour->version, "%016llx", (unsigned long long)entry->info->version);
+    TAILQ_INSERT_TAIL(&tours->all, tour, link);
+    tours->count++;
+    spl_tour_work_state(tour);
+    spl_tours_pump(tours);
+    *out = tour;
+    return 0;
+}
+
+void spl_tours_remove(struct spl_tour *tour)
+{
+    struct spl_tours *tours = tour->tours;
+    TAILQ_REMOVE(&tours->all, tour, link);
+    tours->count--;
+    tours->bytes -= tour->bytes;
+    tour->bytes = 0;
+    tour->removed = true;
+    atomic_store(&tour->cancelled, true);
+    changed(tour);
+    spl_tour_let_go(tour);
+}
+
+void spl_tour_let_go(struct spl_tour *tour)
+{
+    if (!tour->removed || tour->works || tour->in_flight || tour->readers)
+        return;
+    spl_tour_work_remove(tour);
+    spl_tour_free(tour);
+}
+
+void spl_tours_sweep(struct spl_tours *tours)
+{
+    struct spl_tour *tour, *next;
+    uint64_t now = spl_now_ns();
+    for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
+        next = TAILQ_NEXT(tour, link);
+        if (!spl_tour_has_ended(tour) ||
+            tour->age_s + (now - tour->ended_ns) / SPL_NS_PER_S < tours->service->options->tour_age_s)
+            continue;
+        spl_log_info("tour %s: old enough to be removed", tour->name);
+        spl_tours_remove(tour);
+    }
+    spl_tours_pump(tours); // a submission that found no memory is tried again
+}

@@ -1,0 +1,132 @@
+/* A file of a tour as a reply: whole, or the range that was asked for.
+ *
+ * MHD reads it through a callback, block by block, because each block must count as progress of the connection: a large
+ * video over a slow line takes longer than a reply may. Blocks are read on the loop, mostly from the page cache. Owned
+ * by the loop's thread. */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/range.h"
+#include "service/tour/tour.h"
+#include "service/view/key.h"
+
+enum { block_bytes = 64 << 10 };
+
+struct reading {
+    struct spl_tour *tour; // held; its `readers`
+    struct connection *connection;
+    int fd;
+    uint64_t offset;
+};
+
+static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
+{
+    struct reading *reading = context;
+    ssize_t got;
+    do
+        got = pread(reading->fd, out, room, (off_t)(reading->offset + position));
+    while (got < 0 && errno == EINTR);
+    reading->connection->since_ns = spl_now_ns();
+    return got > 0 ? got : MHD_CONTENT_READER_END_WITH_ERROR; // the size was said: it became shorter
+}
+
+static void on_free(void *context)
+{
+    struct reading *reading = context;
+    close(reading->fd);
+    reading->tour->readers--;
+    spl_tour_let_go(reading->tour);
+    free(reading);
+}
+
+static void header(struct request *request, const char *name, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static void header(struct request *request, const char *name, const char *format, ...)
+{
+    char text[256];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    MHD_add_response_header(request->response, name, text);
+}
+
+/* A range counts only while the file is the one that the client has a part of. */
+static enum spl_range wanted(struct request *request, const char *tag, uint64_t size, uint64_t *first, uint64_t *length)
+{
+    const char *same = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_RANGE);
+    const char *range = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_RANGE);
+    return spl_range_parse(same && strcmp(same, tag) ? NULL : range, size, first, length);
+}
+
+static void add_cache_headers(struct request *request, const char *tag)
+{
+    header(request, MHD_HTTP_HEADER_ETAG, "%s", tag);
+    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "private, max-age=31536000, immutable");
+    header(request, MHD_HTTP_HEADER_ACCEPT_RANGES, "bytes");
+}
+
+static void refuse_range(struct request *request, uint64_t size)
+{
+    char detail[96];
+    snprintf(detail, sizeof detail, "the range begins behind the file's %llu bytes", (unsigned long long)size);
+    spl_reply_problem(request, MHD_HTTP_RANGE_NOT_SATISFIABLE, "range", "Range", detail);
+    if (request->response)
+        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes */%llu", (unsigned long long)size);
+}
+
+void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *file, const char *type,
+                         const char *tag)
+{
+    struct spl_error err = {0};
+    struct stat status;
+    char path[4096];
+    uint64_t first, length;
+    const char *held = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
+    if (held && spl_etag_matches(held, tag)) {
+        request->status = MHD_HTTP_NOT_MODIFIED;
+        if ((request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT)))
+            add_cache_headers(request, tag);
+        return;
+    }
+    snprintf(path, sizeof path, "%s/%s/%s", tour->tours->directory, tour->name, file);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (fd < 0 || fstat(fd, &status)) {
+        spl_fail_errno(&err, errno, "%s of tour %s cannot be read", file, tour->name);
+        spl_reply_error(request, &err);
+        goto close_file;
+    }
+    enum spl_range range = wanted(request, tag, (uint64_t)status.st_size, &first, &length);
+    if (range == SPL_RANGE_UNSATISFIABLE) {
+        refuse_range(request, (uint64_t)status.st_size);
+        goto close_file;
+    }
+    struct reading *reading = spl_alloc(1, sizeof *reading, NULL);
+    if (!reading)
+        goto close_file;
+    *reading = (struct reading){tour, request->connection, fd, first};
+    request->response = MHD_create_response_from_callback(length, block_bytes, on_read, reading, on_free);
+    if (!request->response) {
+        free(reading);
+        goto close_file;
+    }
+    tour->readers++;
+    request->status = range == SPL_RANGE_PART ? MHD_HTTP_PARTIAL_CONTENT : MHD_HTTP_OK;
+    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
+    add_cache_headers(request, tag);
+    if (range == SPL_RANGE_PART)
+        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes %llu-%llu/%lld", (unsigned long long)first,
+               (unsigned long long)(first + length - 1), (long long)status.st_size);
+    return;
+close_file:
+    if (fd >= 0)
+        close(fd);
+}

@@ -1,0 +1,162 @@
+/* The tours' folder at start, and the end of it all.
+ *
+ * The folder is locked, so that two services never write one tour. Tours that had not ended are parsed again from the
+ * body that was accepted and go on with the frames that are missing; what a removal or a crash left half done is
+ * cleared away. Before and after the loop runs. */
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "service/tour/tour.h"
+
+enum { sweep_ms = 1000 };
+
+struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service)
+{
+    const struct spl_service_options *options = service->options;
+    return (struct spl_tour_limits){
+        .image = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = options->pixels_max},
+        .frames = options->tour_frames_max,
+        .pixels = options->tour_pixels_max,
+    };
+}
+
+/* The cameras again. The same version of the dataset has the same defaults, so they are the same to the bit. */
+static void take_up(struct spl_tour *tour)
+{
+    struct spl_service *service = tour->tours->service;
+    const struct spl_catalog_entry *entry = spl_catalog_find(&service->catalog, tour->dataset);
+    struct spl_tour_limits limits = spl_tour_get_limits(service);
+    struct spl_tour_spec spec;
+    struct spl_error err = {0};
+    json_t *body = entry ? json_deep_copy(tour->body) : NULL; // the parser adds to it
+    if (!entry)
+        spl_fail(&err, SPL_E_NOT_FOUND, "dataset '%s' is no longer served", tour->dataset);
+    else if (!spl_tour_spec_from_json(body, &entry->defaults, &limits, &spec, &err) &&
+             spec.frames != tour->spec.frames) {
+        spl_tour_spec_finish(&spec);
+        spl_fail(&err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);
+    }
+    json_decref(body);
+    if (err.code) {
+        spl_tour_fail(tour, &err);
+        return;
+    }
+    spl_tour_spec_finish(&tour->spec);
+    tour->spec = spec;
+    tour->state = SPL_TOUR_RENDERING; // a video that was being made is begun again
+    spl_log_info("tour %s: goes on at %zu of %zu frames", tour->name, tour->frames_done, tour->spec.frames);
+}
+
+static void load(struct spl_tours *tours, const char *name)
+{
+    struct spl_tour *tour, *after;
+    struct spl_error err = {0};
+    int rc = spl_tour_load(tours, name, &tour, &err);
+    if (rc == SPL_E_NOT_FOUND) { // a crash while it began: it has no frames yet
+        spl_tour_store_remove(tours->directory, name);
+        return;
+    }
+    if (rc) {
+        spl_log_warn("%s/%s is left alone: %s", tours->directory, name, err.message);
+        return;
+    }
+    TAILQ_FOREACH(after, &tours->all, link)
+    if (after->created_s > tour->created_s)
+        break;
+    if (after)
+        TAILQ_INSERT_BEFORE(after, tour, link);
+    else
+        TAILQ_INSERT_TAIL(&tours->all, tour, link);
+    tours->count++;
+    tours->bytes += tour->bytes;
+}
+
+static void on_sweep(uv_timer_t *timer)
+{
+    spl_tours_sweep(timer->data);
+}
+
+static int load_all(struct spl_tours *tours, struct spl_error *err)
+{
+    DIR *dir = opendir(tours->directory);
+    if (!dir)
+        return spl_fail_errno(err, errno, "cannot list '%s'", tours->directory);
+    for (struct dirent *item; (item = readdir(dir));) {
+        if (spl_tour_name_is_valid(item->d_name))
+            load(tours, item->d_name);
+        else if (item->d_name[0] == '.' && spl_tour_name_is_valid(item->d_name + strspn(item->d_name, ".")))
+            spl_tour_store_remove(tours->directory, item->d_name);
+    }
+    closedir(dir);
+    struct spl_tour *tour;
+    TAILQ_FOREACH(tour, &tours->all, link)
+    if (!spl_tour_has_ended(tour))
+        take_up(tour);
+    uv_timer_start(&tours->sweep_timer, on_sweep, sweep_ms, sweep_ms);
+    return 0;
+}
+
+static int lock(struct spl_tours *tours, struct spl_error *err)
+{
+    if (mkdir(tours->directory, 0777) && errno != EEXIST)
+        return spl_fail_errno(err, errno, "cannot make the tours' folder '%s'", tours->directory);
+    tours->lock = open(tours->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (tours->lock < 0)
+        return spl_fail_errno(err, errno, "cannot open the tours' folder '%s'", tours->directory);
+    if (access(tours->directory, W_OK | X_OK))
+        return spl_fail_errno(err, errno, "cannot write into the tours' folder '%s'", tours->directory);
+    if (flock(tours->lock, LOCK_EX | LOCK_NB))
+        return spl_fail(err, SPL_E_USAGE, "another service keeps its tours in '%s'; give each a folder of its own",
+                        tours->directory);
+    return 0;
+}
+
+int spl_tours_open(struct spl_service *service, const char *directory, struct spl_error *err)
+{
+    struct spl_tours *tours = spl_alloc(1, sizeof *tours, err);
+    if (!tours)
+        return SPL_E_NOMEM;
+    service->tours = tours;
+    tours->service = service;
+    tours->lock = -1;
+    TAILQ_INIT(&tours->all);
+    uv_timer_init(&service->loop, &tours->sweep_timer);
+    uv_timer_init(&service->loop, &tours->stream_timer);
+    tours->sweep_timer.data = tours->stream_timer.data = tours;
+    if (!(tours->directory = strdup(directory)))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the tours' folder");
+    int rc = lock(tours, err);
+    return rc ? rc : load_all(tours, err);
+}
+
+void spl_tours_stop(struct spl_tours *tours)
+{
+    if (!tours)
+        return;
+    struct spl_tour *tour;
+    tours->stopping = true;
+    TAILQ_FOREACH(tour, &tours->all, link)
+    atomic_store(&tour->cancelled, true); // a video that is being made; the next start makes it
+}
+
+void spl_tours_close(struct spl_tours *tours)
+{
+    if (!tours)
+        return;
+    for (struct spl_tour *tour; (tour = TAILQ_FIRST(&tours->all));) {
+        TAILQ_REMOVE(&tours->all, tour, link);
+        spl_tour_free(tour);
+    }
+    if (tours->lock >= 0)
+        close(tours->lock);
+    free(tours->directory);
+    free(tours);
+}

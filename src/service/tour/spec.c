@@ -1,0 +1,209 @@
+/* Bodies of POST …/tours: {"path", "frames" | "fps" and "seconds", "interpolation", "settings", "video"}.
+ *
+ * Settings are those of a view and are read by its parser, so that both mean the same. Invariant: what comes out lies
+ * within the limits, and every camera has passed spl_camera_check(). Pure functions, any thread. */
+#include "service/tour/spec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "cloud/path.h"
+#include "image/video.h"
+
+static int fail_type(const char *name, const char *wanted, const json_t *json, struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name, wanted, spl_json_type_name(json));
+}
+
+static int check_keys(json_t *object, const char *where, const char *const *known, struct spl_error *err)
+{
+    const char *name;
+    json_t *value;
+    json_object_foreach(object, name, value)
+    {
+        const char *const *k = known;
+        while (*k && strcmp(*k, name))
+            k++;
+        if (!*k)
+            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of %s; api/tours.md lists them", name,
+                                  where);
+    }
+    return 0;
+}
+
+static int read_number(const json_t *body, const char *name, double *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(body, name);
+    *out = NAN;
+    if (json && !json_is_number(json))
+        return fail_type(name, "a number", json, err);
+    if (json)
+        *out = json_number_value(json);
+    return 0;
+}
+
+static int read_name(const json_t *object, const char *name, const char *const *names, int *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, name);
+    char known[128] = "";
+    *out = 0;
+    if (!json)
+        return 0;
+    if (!json_is_string(json))
+        return fail_type(name, "text", json, err);
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(names[i], json_string_value(json))) {
+            *out = i;
+            return 0;
+        }
+        strcat(strcat(known, i ? ", " : ""), names[i]);
+    }
+    return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, json_string_value(json),
+                          known);
+}
+
+/* `closed` goes to the path: it is a property of the loop, not of how one moves along it. */
+static int read_motion(json_t *body, struct spl_path_motion *motion, struct spl_camera_path *path,
+                       struct spl_error *err)
+{
+    static const char *const known[] = {"positions", "rotations", "ease", "closed", NULL};
+    json_t *json = json_object_get(body, "interpolation"), *closed = json_object_get(json, "closed");
+    int positions, rotations, ease, rc;
+    *motion = (struct spl_path_motion){0};
+    if (!json)
+        return 0;
+    if (!json_is_object(json))
+        return fail_type("interpolation", "an object", json, err);
+    if (closed && !json_is_boolean(closed))
+        return fail_type("closed", "true or false", closed, err);
+    if ((rc = check_keys(json, "interpolation", known, err)) ||
+        (rc = read_name(json, "positions", spl_path_positions_names, &positions, err)) ||
+        (rc = read_name(json, "rotations", spl_path_rotations_names, &rotations, err)) ||
+        (rc = read_name(json, "ease", spl_path_ease_names, &ease, err)))
+        return rc;
+    *motion = (struct spl_path_motion){positions, rotations, ease};
+    if (closed)
+        path->closed = json_is_true(closed);
+    return 0;
+}
+
+static int parse_settings(const json_t *settings, const struct spl_camera_defaults *defaults,
+                          const struct spl_camera_limits *limits, struct spl_view_request *view, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    char field[sizeof why.field + 16];
+    if (settings && !json_is_object(settings))
+        return fail_type("settings", "an object", settings, err);
+    if (json_object_get(settings, "camera"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
+    if (!json_object_get(settings, "width") != !json_object_get(settings, "height"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.width", "width and height are given together or not at all");
+    char *text = settings ? json_dumps(settings, JSON_COMPACT) : strdup("");
+    if (!text)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the settings");
+    int rc = spl_view_request_from_json(text, strlen(text), defaults, limits, view, &why);
+    free(text);
+    snprintf(field, sizeof field, "settings%s%s", why.field[0] ? "." : "", why.field);
+    if (rc)
+        return spl_fail_field(err, rc, field, "%s", why.message);
+    if (view->container == SPL_CONTAINER_MULTIPART && json_object_get(settings, "container"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.container", "several layers of a tour's frame come as zip");
+    if (view->container)
+        view->container = SPL_CONTAINER_ZIP;
+    if (view->versioned)
+        return spl_fail_field(err, SPL_E_INPUT, "settings.v", "a tour stays with the version that it began with");
+    if (view->planned)
+        return spl_fail_field(err, SPL_E_INPUT, isnan(view->demand.budget_ms) ? "settings.psnr" : "settings.budget",
+                              "frames of a tour look alike only with one setting: give method, lod and supersample");
+    return 0;
+}
+
+static int read_path(json_t *body, const struct spl_camera_defaults *defaults, const struct spl_tour_limits *limits,
+                     struct spl_tour_spec *out, struct spl_camera_path *path, struct spl_error *err)
+{
+    json_t *json = json_object_get(body, "path");
+    const struct spl_camera *camera = &out->view.view.camera;
+    struct spl_camera_defaults own = *defaults;
+    own.near = camera->near;
+    own.far = camera->far;
+    bool sized = json_object_get(json_object_get(body, "settings"), "width");
+    struct spl_path_options options = {.width = sized ? camera->width : 0,
+                                       .height = sized ? camera->height : 0,
+                                       .defaults = &own,
+                                       .limits = &limits->image};
+    if (!json)
+        return spl_fail_field(err, SPL_E_INPUT, "path", "a tour needs a path; api/tours.md lists the formats");
+    return spl_camera_path_from_json(json, &options, path, err);
+}
+
+static int check_limits(const struct spl_camera_path *path, const struct spl_tour_limits *limits, size_t frames,
+                        struct spl_error *err)
+{
+    uint64_t pixels = (uint64_t)path->cameras->width * path->cameras->height;
+    if (frames > limits->frames)
+        return spl_fail_field(err, SPL_E_LIMIT, "frames", "%zu frames; the limit is %llu", frames,
+                              (unsigned long long)limits->frames);
+    if (frames > limits->pixels / pixels)
+        return spl_fail_field(err, SPL_E_LIMIT, "frames",
+                              "%zu frames of %llu pixels; the limit of a tour is %llu pixels", frames,
+                              (unsigned long long)pixels, (unsigned long long)limits->pixels);
+    return 0;
+}
+
+static int check_video(const json_t *body, struct spl_tour_spec *out, struct spl_error *err)
+{
+    const json_t *video = json_object_get(body, "video");
+    const struct spl_view_request *view = &out->view;
+    if (video && !json_is_boolean(video))
+        return fail_type("video", "true or false", video, err);
+    out->video = json_is_true(video);
+    if (!out->video)
+        return 0;
+    bool picture = view->encode.format == SPL_FORMAT_JPEG ||
+                   (view->encode.format == SPL_FORMAT_PNG && view->layer == SPL_LAYER_COLOR);
+    if (!picture || view->container)
+        return spl_fail_field(err, SPL_E_INPUT, "video", "a video is made of JPEGs, or of PNGs of colour");
+    return spl_video_check(out->cameras->width, out->cameras->height, err);
+}
+
+int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defaults,
+                            const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err)
+{
+    static const char *const known[] = {"path", "frames", "fps", "seconds", "interpolation", "settings", "video", NULL};
+    struct spl_camera_path path = {0};
+    struct spl_path_motion motion;
+    double frames, fps, seconds;
+    int rc;
+    *out = (struct spl_tour_spec){0};
+    if (!json_is_object(body))
+        return fail_type("body", "a JSON object", body, err);
+    if ((rc = check_keys(body, "a tour", known, err)) || (rc = read_number(body, "frames", &frames, err)) ||
+        (rc = read_number(body, "fps", &fps, err)) || (rc = read_number(body, "seconds", &seconds, err)))
+        return rc;
+    if (!isnan(frames) && !(frames >= 1 && frames <= 1e9 && frames == floor(frames)))
+        return spl_fail_field(err, SPL_E_INPUT, "frames", "frames %g is no whole number from 1 on", frames);
+    if ((rc = parse_settings(json_object_get(body, "settings"), defaults, &limits->image, &out->view, err)) ||
+        (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
+        (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, &out->frames, &out->fps,
+                                    err)) ||
+        (rc = check_limits(&path, limits, out->frames, err)))
+        goto done;
+    if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))
+        rc = SPL_E_NOMEM;
+    else if (!(rc = spl_camera_path_sample(&path, &motion, out->frames, out->cameras, err)))
+        rc = check_video(body, out, err);
+    out->view.view.camera = rc ? out->view.view.camera : out->cameras[0];
+done:
+    spl_camera_path_finish(&path);
+    if (rc)
+        spl_tour_spec_finish(out);
+    return rc;
+}
+
+void spl_tour_spec_finish(struct spl_tour_spec *spec)
+{
+    free(spec->cameras);
+    *spec = (struct spl_tour_spec){0};
+}

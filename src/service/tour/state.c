@@ -1,0 +1,169 @@
+/* tour.json, and a tour from its folder.
+ *
+ * tour.json says what the frames are, so that a finished tour can be served after its dataset has gone; the body that
+ * was accepted is parsed again only when frames are still to be made. A folder that is not understood is left alone and
+ * named in the log. Loop's thread, at start. */
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "geom/camera_path.h"
+#include "service/tour/tour.h"
+#include "service/view/bundle.h"
+
+enum { state_bytes_max = 16 << 20, format_version = 1 };
+
+const char *const spl_tour_state_names[] = {"rendering", "video", "done", "failed", NULL};
+
+/* Several layers of a frame come as one ZIP file. */
+const char *spl_tour_format_name(const struct spl_tour *tour)
+{
+    const struct spl_view_request *view = &tour->spec.view;
+    return view->container ? "zip" : spl_format_name(view->encode.format);
+}
+
+const char *spl_tour_media_type(const struct spl_tour *tour)
+{
+    const struct spl_view_request *view = &tour->spec.view;
+    return view->container ? spl_container_media_type(view->container) : spl_format_media_type(view->encode.format);
+}
+
+void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32])
+{
+    snprintf(out, 32, "%06zu.%.8s", frame, spl_tour_format_name(tour));
+}
+
+void spl_tour_free(struct spl_tour *tour)
+{
+    if (!tour)
+        return;
+    json_decref(tour->body);
+    spl_tour_spec_finish(&tour->spec);
+    free(tour->frames);
+    free(tour);
+}
+
+json_t *spl_tour_to_json(const struct spl_tour *tour)
+{
+    const struct spl_tour_spec *spec = &tour->spec;
+    const struct spl_camera *camera = &spec->view.view.camera;
+    json_t *failure = tour->failure.code
+                          ? json_pack("{s:i, s:s}", "code", tour->failure.code, "message", tour->failure.message)
+                          : json_null();
+    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:O}", "format_version",
+                     format_version, "dataset", tour->dataset, "version", tour->version, "state",
+                     spl_tour_state_names[tour->state], "created", (json_int_t)tour->created_s, "ended",
+                     (json_int_t)tour->ended_s, "frames", (json_int_t)spec->frames, "width", (int)camera->width,
+                     "height", (int)camera->height, "fps", spec->fps, "layers", (int)spec->view.view.layers, "format",
+                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", tour->body);
+}
+
+static int read_state(const char *text)
+{
+    int i = 0;
+    while (spl_tour_state_names[i] && strcmp(text, spl_tour_state_names[i]))
+        i++;
+    return spl_tour_state_names[i] ? i : -1;
+}
+
+static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
+{
+    const char *dataset, *version, *state, *format;
+    json_int_t created, ended, frames;
+    int known, width, height, video, layers;
+    json_t *failure;
+    const char *message;
+    struct spl_tour_spec *spec = &tour->spec;
+    if (json_unpack(json, "{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:F, s:i, s:s, s:b, s:o, s:o}",
+                    "format_version", &known, "dataset", &dataset, "version", &version, "state", &state, "created",
+                    &created, "ended", &ended, "frames", &frames, "width", &width, "height", &height, "fps", &spec->fps,
+                    "layers", &layers, "format", &format, "video", &video, "failure", &failure, "body", &tour->body) ||
+        known != format_version)
+        return spl_fail(err, SPL_E_CORRUPT, "tour.json is not what this version writes");
+    json_incref(tour->body);
+    bool zip = !strcmp(format, "zip");
+    int format_number = zip ? 0 : spl_format_from_name(format);
+    int state_number = read_state(state);
+    if (state_number < 0 || layers < 1 || layers >> SPL_LAYER_COUNT || format_number < 0 || frames < 1 ||
+        frames > SPL_CAMERA_PATH_MAX || width < 1 || height < 1 || !(spec->fps > 0) ||
+        strlen(dataset) >= sizeof tour->dataset || strlen(version) >= sizeof tour->version)
+        return spl_fail(err, SPL_E_CORRUPT, "tour.json holds values that no tour has");
+    strcpy(tour->dataset, dataset);
+    strcpy(tour->version, version);
+    tour->state = (enum spl_tour_state)state_number;
+    tour->created_s = created;
+    tour->ended_s = ended;
+    spec->frames = (size_t)frames;
+    spec->video = video;
+    spec->view.view.layers = (uint32_t)layers;
+    spec->view.container = zip ? SPL_CONTAINER_ZIP : SPL_CONTAINER_NONE;
+    spec->view.encode.format = (enum spl_format)format_number;
+    spec->view.view.camera.width = (uint32_t)width;
+    spec->view.view.camera.height = (uint32_t)height;
+    message = json_string_value(json_object_get(failure, "message"));
+    if (json_is_object(failure))
+        spl_fail(&tour->failure, (int)json_integer_value(json_object_get(failure, "code")), "%s",
+                 message ? message : "");
+    return 0;
+}
+
+/* Which frames lie there, and how large everything is. */
+static void look_at_files(struct spl_tour *tour)
+{
+    char path[4096], name[32];
+    struct stat status;
+    for (size_t i = 0; i < tour->spec.frames; i++) {
+        spl_tour_file_name(tour, i, name);
+        snprintf(path, sizeof path, "%s/%s/%s", tour->tours->directory, tour->name, name);
+        if (stat(path, &status))
+            continue;
+        tour->frames[i] = SPL_FRAME_DONE;
+        tour->frames_done++;
+        tour->bytes += (uint64_t)status.st_size;
+    }
+    snprintf(path, sizeof path, "%s/%s/video.mp4", tour->tours->directory, tour->name);
+    if (spl_tour_has_ended(tour) && !stat(path, &status))
+        tour->bytes += (uint64_t)status.st_size;
+}
+
+int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err)
+{
+    uint8_t *bytes = NULL;
+    size_t length;
+    json_t *json = NULL;
+    json_error_t where;
+    struct spl_tour *tour = spl_alloc(1, sizeof *tour, err);
+    int rc = tour ? spl_tour_store_read(tours->directory, name, "tour.json", state_bytes_max, &bytes, &length, err)
+                  : SPL_E_NOMEM;
+    if (rc)
+        goto done;
+    tour->tours = tours;
+    strcpy(tour->name, name);
+    if (!(json = json_loadb((const char *)bytes, length, JSON_REJECT_DUPLICATES, &where))) {
+        rc = spl_fail(err, SPL_E_CORRUPT, "tour.json: line %d: %s", where.line, where.text);
+        goto done;
+    }
+    if ((rc = from_json(tour, json, err)))
+        goto done;
+    if (!(tour->frames = spl_alloc(tour->spec.frames, 1, err))) {
+        rc = SPL_E_NOMEM;
+        goto done;
+    }
+    tour->bytes = tour->state_bytes = length;
+    look_at_files(tour);
+    int64_t age_s = time(NULL) - tour->ended_s;
+    tour->age_s = age_s > 0 ? (uint64_t)age_s : 0; // from here on by a clock that does not jump
+    tour->ended_ns = spl_now_ns();
+done:
+    free(bytes);
+    json_decref(json);
+    if (rc)
+        spl_tour_free(tour);
+    else
+        *out = tour;
+    return rc;
+}

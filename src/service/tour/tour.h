@@ -1,0 +1,145 @@
+/* Tours: many frames along a path, made while nobody's view waits, kept on disk. Owned by the loop's thread but where
+ * noted; file work goes to uv's threads (work.c).
+ *
+ * DIR/NAME/ holds tour.json (what is made, and how it ended), 000000.jpg … (finished frames, whole or not there) and
+ * video.mp4. Which frames are done is what lies on disk; tour.json is written when a tour begins and when it ends. */
+#ifndef SPL_SERVICE_TOUR_H
+#define SPL_SERVICE_TOUR_H
+
+#include <stdatomic.h>
+
+#include "service/state.h"
+#include "service/tour/spec.h"
+
+enum {
+    SPL_TOUR_NAME = 16,        /* hex digits, random: a name cannot be guessed and is no path */
+    SPL_TOURS_MAX = 1000,      /* kept at a time */
+    SPL_TOURS_UNFINISHED = 32, /* of them; each holds its path in memory */
+    SPL_TOUR_IN_FLIGHT = 3     /* frames in the pipeline: one rendered, one waiting, one encoded; <= SPL_QUEUE_BEHIND */
+};
+
+enum spl_tour_state { SPL_TOUR_RENDERING, SPL_TOUR_VIDEO, SPL_TOUR_DONE, SPL_TOUR_FAILED };
+extern const char *const spl_tour_state_names[];
+
+enum spl_frame_state { SPL_FRAME_OPEN, SPL_FRAME_IN_FLIGHT, SPL_FRAME_DONE };
+
+struct spl_tour_stream;
+
+struct spl_tour {
+    TAILQ_ENTRY(spl_tour) link; // spl_tours.all, oldest first
+    struct spl_tours *tours;
+    char name[SPL_TOUR_NAME + 1], dataset[256], version[17];
+    json_t *body;              /* as it was accepted; null once it has ended */
+    struct spl_tour_spec spec; /* cameras NULL once it has ended */
+    enum spl_tour_state state;
+    struct spl_error failure;
+    unsigned char *frames; /* enum spl_frame_state each */
+    size_t frames_done, first_open, in_flight, failures;
+    uint64_t bytes, state_bytes;     /* of its files, of tour.json */
+    int64_t created_s, ended_s;      /* wall clock; ended 0 = not yet */
+    uint64_t ended_ns, age_s;        /* monotonic time and age when it ended, or was taken up as ended */
+    uint64_t began_ns, began_done;   /* this process's share, for the time that is left */
+    uint64_t changes;                /* of anything a client sees */
+    size_t works, readers;           /* file works and replies that hold it */
+    bool state_writing, state_again; /* tour.json is being written; has changed since */
+    bool removed;                    /* off the list; freed when nothing holds it */
+    atomic_bool cancelled;           /* read by file works */
+};
+
+struct spl_tours {
+    struct spl_service *service;
+    char *directory;
+    int lock; /* of the directory, held for life */
+    TAILQ_HEAD(spl_tour_list, spl_tour) all;
+    size_t count, in_flight, writing;
+    uint64_t bytes, writing_bytes;
+    bool stopping, making_video;
+    uv_timer_t sweep_timer, stream_timer;
+    LIST_HEAD(, spl_tour_stream) streams;
+    size_t stream_count;
+};
+
+/* engine.c: their life. open: makes the directory if need be, locks it, takes up what lies in it. stop: nothing
+ * new begins, streams end; before the loop's last run. close: after it. The last two take NULL. */
+int spl_tours_open(struct spl_service *service, const char *directory, struct spl_error *err);
+void spl_tours_stop(struct spl_tours *tours);
+void spl_tours_close(struct spl_tours *tours);
+
+/* Gives idle slots of the pipeline to frames; call when something may have become free. Takes NULL. */
+void spl_tours_pump(struct spl_tours *tours);
+
+/* Ends every stream at its next chunk, so that a service can stop. Takes NULL. */
+void spl_tours_end_streams(struct spl_tours *tours);
+
+/* Removes what is too old. */
+void spl_tours_sweep(struct spl_tours *tours);
+
+struct spl_tour *spl_tours_find(struct spl_tours *tours, const char *name); /* NULL when there is none */
+
+/* Adds a tour of `body` (a new reference is taken) and begins it; takes spec. SPL_E_BUSY: too many, or the disk quota
+ * is used up. */
+int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, json_t *body,
+                  struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err);
+
+/* Cancels what is going on and takes the tour off the list and the disk. */
+void spl_tours_remove(struct spl_tour *tour);
+
+/* Frees a removed tour once nothing holds it; call after works, in_flight or readers went down. */
+void spl_tour_let_go(struct spl_tour *tour);
+
+void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why); /* ends it, its frames stay */
+bool spl_tour_has_ended(const struct spl_tour *tour);
+struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service);
+
+/* state.c: tour.json and back. */
+json_t *spl_tour_to_json(const struct spl_tour *tour); /* new reference, NULL without memory */
+int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err);
+void spl_tour_free(struct spl_tour *tour);
+const char *spl_tour_format_name(const struct spl_tour *tour); /* of a frame: "jpeg", "zip" */
+const char *spl_tour_media_type(const struct spl_tour *tour);
+void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32]);
+
+/* store.c: files of a tour; any thread, blocks on disk. Each is whole or not there. */
+int spl_tour_store_write(const char *directory, const char *name, const char *file, const void *bytes, size_t length,
+                         struct spl_error *err);
+int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
+                        size_t *length, struct spl_error *err); /* the caller frees *bytes */
+void spl_tour_store_remove(const char *directory, const char *name);
+bool spl_tour_name_is_valid(const char *name);
+
+/* work.c: the same on uv's threads; each tells the engine when it is done. */
+void spl_tour_work_state(struct spl_tour *tour);
+void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded *encoded); /* takes the bytes */
+void spl_tour_work_video(struct spl_tour *tour);
+void spl_tour_work_remove(struct spl_tour *tour);
+
+/* engine.c, called by work.c on the loop. */
+void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, const struct spl_error *err);
+void spl_tour_video_made(struct spl_tour *tour, uint64_t bytes, const struct spl_error *err);
+void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct spl_error *err);
+
+/* describe.c: what clients see; new reference. */
+json_t *spl_tour_describe(const struct spl_tour *tour);
+
+/* stream.c: server-sent events and the MJPEG stream of a tour, as request->response. */
+void spl_tour_stream_events(struct request *request, struct spl_tour *tour);
+void spl_tour_stream_pictures(struct request *request, struct spl_tour *tour);
+void spl_tour_streams_wake(struct spl_tour *tour); /* something has changed */
+
+/* file.c, zip.c: files of a tour as request->response. */
+void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *file, const char *type,
+                         const char *tag);
+void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
+
+/* route.c */
+void spl_create_tour(struct request *request, const struct spl_call *call);
+void spl_list_tours(struct request *request, const struct spl_call *call);
+void spl_show_tour(struct request *request, const struct spl_call *call);
+void spl_remove_tour(struct request *request, const struct spl_call *call);
+void spl_show_tour_events(struct request *request, const struct spl_call *call);
+void spl_show_tour_stream(struct request *request, const struct spl_call *call);
+void spl_show_tour_frame(struct request *request, const struct spl_call *call);
+void spl_show_tour_zip(struct request *request, const struct spl_call *call);
+void spl_show_tour_video(struct request *request, const struct spl_call *call);
+
+#endif

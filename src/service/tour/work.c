@@ -1,0 +1,211 @@
+/* File work of tours on uv's threads: the loop hands over bytes or a name and hears when it is done.
+ *
+ * A work holds its tour (tour->works), so that nothing is freed below it; what a work reads of the tour does not change
+ * while it runs: name, spec, frames that are done. The video is made from the finished frames, beside them, so that a
+ * restart in the middle makes the same one. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "image/load.h"
+#include "image/video.h"
+#include "service/tour/tour.h"
+
+struct work {
+    uv_work_t uv;
+    struct spl_tour *tour; // held; NULL for a removal
+    struct spl_tours *tours;
+    char name[SPL_TOUR_NAME + 1], file[32];
+    void *bytes; // owned
+    size_t length, frame;
+    struct spl_encoded encoded; // owned
+    uint64_t video_bytes;
+    struct spl_error err;
+};
+
+static void finish(struct work *work)
+{
+    struct spl_tour *tour = work->tour;
+    spl_encoded_finish(&work->encoded);
+    free(work->bytes);
+    free(work);
+    if (!tour)
+        return;
+    tour->works--;
+    spl_tours_pump(tour->tours);
+    spl_tour_let_go(tour);
+}
+
+/* NULL without memory, after a line in the log. */
+static struct work *begin(struct spl_tour *tour, struct spl_error *err)
+{
+    struct work *work = spl_alloc(1, sizeof *work, err);
+    if (!work)
+        return NULL;
+    work->uv.data = work;
+    work->tour = tour;
+    work->tours = tour->tours;
+    strcpy(work->name, tour->name);
+    tour->works++;
+    return work;
+}
+
+static void queue(struct work *work, uv_work_cb run, uv_after_work_cb after)
+{
+    uv_queue_work(&work->tours->service->loop, &work->uv, run, after); // fails without a callback only
+}
+
+static void write_bytes(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    const void *bytes = work->bytes ? work->bytes : work->encoded.bytes;
+    spl_tour_store_write(work->tours->directory, work->name, work->file, bytes, work->length, &work->err);
+}
+
+static void after_state(uv_work_t *uv, int status)
+{
+    (void)status;
+    struct work *work = uv->data;
+    struct spl_tour *tour = work->tour;
+    tour->state_writing = false;
+    spl_tour_state_written(tour, work->length, &work->err);
+    if (tour->state_again && !tour->removed)
+        spl_tour_work_state(tour);
+    finish(work);
+}
+
+/* One at a time, so that the last one is the one that stays. */
+void spl_tour_work_state(struct spl_tour *tour)
+{
+    struct spl_error err = {0};
+    tour->state_again = tour->state_writing;
+    if (tour->state_writing)
+        return;
+    json_t *json = spl_tour_to_json(tour);
+    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    json_decref(json);
+    struct work *work = text ? begin(tour, &err) : NULL;
+    if (!work) {
+        free(text);
+        spl_log_error("tour %s: out of memory for its state", tour->name);
+        spl_fail(&err, SPL_E_NOMEM, "out of memory for the tour's state");
+        spl_tour_fail(tour, &err); // nothing where it has ended
+        return;
+    }
+    work->bytes = text;
+    work->length = strlen(text);
+    strcpy(work->file, "tour.json");
+    tour->state_writing = true;
+    queue(work, write_bytes, after_state);
+}
+
+static void after_frame(uv_work_t *uv, int status)
+{
+    (void)status;
+    struct work *work = uv->data;
+    spl_tour_frame_written(work->tour, work->frame, work->length, &work->err);
+    finish(work);
+}
+
+void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded *encoded)
+{
+    struct spl_error err = {0};
+    struct work *work = begin(tour, &err);
+    if (!work) {
+        spl_tour_frame_written(tour, frame, encoded->length, &err);
+        return;
+    }
+    work->encoded = *encoded;
+    *encoded = (struct spl_encoded){0};
+    work->length = work->encoded.length;
+    work->frame = frame;
+    spl_tour_file_name(tour, frame, work->file);
+    queue(work, write_bytes, after_frame);
+}
+
+static int add_frames(struct work *work, struct spl_video *video)
+{
+    struct spl_tour *tour = work->tour;
+    int rc = 0;
+    for (size_t i = 0; !rc && i < tour->spec.frames; i++) {
+        char path[4096], name[32];
+        struct spl_image image;
+        spl_tour_file_name(tour, i, name);
+        snprintf(path, sizeof path, "%s/%s/%s", work->tours->directory, work->name, name);
+        if (atomic_load(&tour->cancelled))
+            return spl_fail(&work->err, SPL_E_CANCELLED, "the tour was cancelled");
+        if ((rc = spl_image_load(path, SPL_LAYER_COLOR, &image, &work->err)))
+            return rc;
+        rc = spl_video_add(video, &image, &work->err);
+        spl_image_finish(&image);
+    }
+    return rc;
+}
+
+static void make_video(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    const struct spl_camera *camera = &work->tour->spec.view.view.camera;
+    struct spl_video *video = NULL;
+    struct stat status;
+    char temporary[4096], path[4096];
+    snprintf(temporary, sizeof temporary, "%s/%s/.video.mp4", work->tours->directory, work->name);
+    snprintf(path, sizeof path, "%s/%s/video.mp4", work->tours->directory, work->name);
+    int rc = spl_video_create(temporary, camera->width, camera->height, work->tour->spec.fps, &video, &work->err);
+    if (!rc && !(rc = add_frames(work, video)))
+        rc = spl_video_finish(video, &work->err);
+    spl_video_destroy(video);
+    if (!rc && (rename(temporary, path) || stat(path, &status)))
+        rc = spl_fail_errno(&work->err, errno, "%s: cannot be written", path);
+    if (rc)
+        unlink(temporary);
+    else
+        work->video_bytes = (uint64_t)status.st_size;
+}
+
+static void after_video(uv_work_t *uv, int status)
+{
+    (void)status;
+    struct work *work = uv->data;
+    spl_tour_video_made(work->tour, work->video_bytes, &work->err);
+    finish(work);
+}
+
+void spl_tour_work_video(struct spl_tour *tour)
+{
+    struct spl_error err = {0};
+    struct work *work = begin(tour, &err);
+    if (work)
+        queue(work, make_video, after_video);
+    else
+        spl_tour_video_made(tour, 0, &err);
+}
+
+static void remove_files(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    spl_tour_store_remove(work->tours->directory, work->name);
+}
+
+static void after_remove(uv_work_t *uv, int status)
+{
+    (void)status;
+    finish(uv->data);
+}
+
+void spl_tour_work_remove(struct spl_tour *tour)
+{
+    struct work *work = begin(tour, NULL);
+    if (!work) {
+        spl_log_error("tour %s: out of memory; its files stay", tour->name);
+        return;
+    }
+    tour->works--;
+    work->tour = NULL; // the tour itself is freed now
+    queue(work, remove_files, after_remove);
+}

@@ -1,0 +1,160 @@
+/* Bodies of several files.
+ *
+ * The boundary of multipart is one random string for ever: 128 bits that no image holds but by design of its owner, and
+ * equal requests keep equal bytes. Entries of a ZIP file have no time for the same reason, and are stored, since images
+ * are compressed already. */
+#include "service/view/bundle.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <jansson.h>
+
+#include "base/memory.h"
+#include "service/headers.h"
+
+#define BOUNDARY "splatd-b1f64e2a9c7d4e0583a6d7f25c10e98b"
+
+const char *spl_container_media_type(enum spl_container container)
+{
+    return container == SPL_CONTAINER_ZIP ? "application/zip" : "multipart/mixed; boundary=" BOUNDARY;
+}
+
+const char *spl_format_suffix(enum spl_format format)
+{
+    static const char *const suffixes[SPL_FORMAT_COUNT] = {".jpg", ".png", ".npy", ".raw", ".webp"};
+    return suffixes[format];
+}
+
+static void write_part(FILE *stream, const struct spl_part *part)
+{
+    fprintf(stream, "--" BOUNDARY "\r\n");
+    for (const char *name = part->headers, *value; (value = spl_headers_value(name)); name = spl_headers_next(value))
+        fprintf(stream, "%s: %s\r\n", name, value);
+    fprintf(stream, "Content-Disposition: attachment; filename=\"%s\"\r\nContent-Length: %zu\r\n\r\n", part->name,
+            part->length);
+    fwrite(part->bytes, 1, part->length, stream);
+    fprintf(stream, "\r\n");
+}
+
+static int write_multipart(FILE *stream, const struct spl_part *parts, size_t count, struct spl_error *err)
+{
+    (void)err;
+    for (size_t i = 0; i < count; i++)
+        write_part(stream, &parts[i]);
+    fprintf(stream, "--" BOUNDARY "--\r\n");
+    return 0;
+}
+
+static la_ssize_t on_write(struct archive *archive, void *context, const void *bytes, size_t length)
+{
+    (void)archive;
+    return (la_ssize_t)fwrite(bytes, 1, length, context);
+}
+
+static bool add_entry(struct archive *zip, const char *name, const void *bytes, size_t length)
+{
+    struct archive_entry *entry = archive_entry_new();
+    if (!entry)
+        return false;
+    archive_entry_set_pathname(entry, name);
+    archive_entry_set_filetype(entry, AE_IFREG);
+    archive_entry_set_perm(entry, 0644);
+    archive_entry_set_size(entry, (la_int64_t)length);
+    bool good = archive_write_header(zip, entry) == ARCHIVE_OK &&
+                (!length || archive_write_data(zip, bytes, length) == (la_ssize_t)length);
+    archive_entry_free(entry);
+    return good;
+}
+
+static char *make_index(const struct spl_part *parts, size_t count)
+{
+    json_t *index = json_array();
+    for (size_t i = 0; i < count; i++) {
+        json_t *headers = json_object();
+        for (const char *name = parts[i].headers, *value; (value = spl_headers_value(name));
+             name = spl_headers_next(value))
+            json_object_set_new(headers, name, json_string(value));
+        json_array_append_new(index, json_pack("{s:s, s:o}", "name", parts[i].name, "headers", headers));
+    }
+    char *text = json_dumps(index, JSON_INDENT(1));
+    json_decref(index);
+    return text;
+}
+
+static int write_zip(FILE *stream, const struct spl_part *parts, size_t count, struct spl_error *err)
+{
+    struct archive *zip = archive_write_new();
+    char *index = make_index(parts, count);
+    bool good = zip && index && archive_write_set_format_zip(zip) == ARCHIVE_OK &&
+                archive_write_zip_set_compression_store(zip) == ARCHIVE_OK &&
+                archive_write_set_bytes_in_last_block(zip, 1) == ARCHIVE_OK &&
+                archive_write_open(zip, stream, NULL, on_write, NULL) == ARCHIVE_OK;
+    for (size_t i = 0; good && i < count; i++)
+        good = add_entry(zip, parts[i].name, parts[i].bytes, parts[i].length);
+    good = good && add_entry(zip, "index.json", index, strlen(index)) && archive_write_close(zip) == ARCHIVE_OK;
+    int rc = good ? 0 : spl_fail(err, SPL_E_NOMEM, "out of memory for a ZIP file of %zu images", count);
+    archive_write_free(zip);
+    free(index);
+    return rc;
+}
+
+int spl_bundle(enum spl_container container, const struct spl_part *parts, size_t count, struct spl_encoded *out,
+               struct spl_error *err)
+{
+    char *bytes = NULL;
+    size_t length = 0;
+    FILE *stream = open_memstream(&bytes, &length);
+    *out = (struct spl_encoded){0};
+    if (!stream)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for %zu images", count);
+    int rc = (container == SPL_CONTAINER_ZIP ? write_zip : write_multipart)(stream, parts, count, err);
+    bool failed = ferror(stream);
+    if ((fclose(stream) || failed) && !rc)
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for %zu images", count);
+    if (rc)
+        free(bytes);
+    else
+        *out = (struct spl_encoded){
+            .bytes = (uint8_t *)bytes, .length = length, .media_type = spl_container_media_type(container)};
+    return rc;
+}
+
+int spl_bundle_layers(const struct spl_view_request *request, const struct spl_frame *frame, struct spl_encoded *out,
+                      struct spl_error *err)
+{
+    struct spl_part parts[SPL_LAYER_COUNT] = {0};
+    struct spl_encoded encoded[SPL_LAYER_COUNT] = {0};
+    size_t count = 0;
+    int rc = 0;
+    for (unsigned i = 0; !rc && i < SPL_LAYER_COUNT; i++) {
+        if (!(request->view.layers >> i & 1))
+            continue;
+        enum spl_layer layer = (enum spl_layer)i;
+        struct spl_encode_options options = spl_view_get_encoding(request, layer);
+        struct spl_part *part = &parts[count];
+        struct spl_headers headers;
+        if ((rc = spl_image_encode(&frame->images[i], &options, &encoded[count], err)))
+            break;
+        spl_headers_open(&headers);
+        spl_headers_add(&headers, "Splatd-Layer", "%s", spl_layer_name(layer));
+        spl_headers_add_layer(&headers, request, layer, &encoded[count]);
+        if (!spl_headers_close(&headers))
+            rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the headers of a layer");
+        snprintf(part->name, sizeof part->name, "%s%s", spl_layer_name(layer), spl_format_suffix(options.format));
+        part->headers = headers.text;
+        part->bytes = encoded[count].bytes;
+        part->length = encoded[count].length;
+        count++;
+    }
+    if (!rc)
+        rc = spl_bundle(request->container, parts, count, out, err);
+    for (size_t i = 0; i < SPL_LAYER_COUNT; i++) {
+        spl_encoded_finish(&encoded[i]);
+        free((char *)parts[i].headers);
+    }
+    return rc;
+}

@@ -1,0 +1,31 @@
+/* The encode threads: one frame in, bytes of a format out: an image, several in a container, or what a pick found. Each
+ * frame's pixels are released as soon as they are encoded, so that what waits for slow clients is compressed. */
+#include "base/clock.h"
+#include "service/view/bundle.h"
+#include "service/view/pick.h"
+#include "service/view/stages.h"
+
+static void encode(struct spl_job *job)
+{
+    uint64_t began = spl_now_ns();
+    if (spl_job_is_over(job))
+        return;
+    const struct spl_view_request *request = &job->request;
+    if (request->picks)
+        spl_pick_encode(request, &job->frame, job->dataset, &job->encoded, &job->err);
+    else if (request->container)
+        spl_bundle_layers(request, &job->frame, &job->encoded, &job->err);
+    else
+        spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
+    job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
+}
+
+void *spl_encode_thread_run(void *argument)
+{
+    struct spl_pipeline *pipeline = argument;
+    for (struct spl_job *job; (job = spl_queue_pop(pipeline->encode, SPL_NEVER));) {
+        encode(job);
+        spl_pipeline_finish_job(pipeline, job);
+    }
+    return NULL;
+}

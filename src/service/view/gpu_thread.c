@@ -1,0 +1,335 @@
+/* The gpu thread: the only one that touches the renderer, for its whole life.
+ *
+ * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
+ * new renderer is made from the mapped datasets. Versions of datasets are added a page at a time between frames, so
+ * that nobody waits for them. More than `rebuilds_max` losses within `rebuild_window_ns` end the process, for its
+ * supervisor to decide.
+ *
+ * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
+ * lost, K times in all (1 when left out). */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "service/view/key.h"
+#include "service/view/stages.h"
+
+enum { rebuilds_max = 3 };
+static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
+
+struct gpu {
+    struct spl_pipeline *pipeline;
+    struct spl_renderer *renderer;    // may be NULL
+    uint64_t losses_ns[rebuilds_max]; /* times of the latest losses, ring */
+    uint64_t losses;
+    uint64_t frames, inject_every, inject_left, inject_at;
+    TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
+    uint64_t pages_evicted;                  /* of this renderer, as counted so far */
+};
+
+static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
+{
+    atomic_store(&pipeline->state, (int)state);
+    pipeline->options.wake(pipeline->options.wake_context);
+}
+
+/* Publishes what is on the device; a page that came may have driven out those of any dataset. */
+static void publish_residency(struct gpu *gpu)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_residency_info info;
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_renderer_get_residency(gpu->renderer, entry->dataset, &info);
+        atomic_store(&entry->resident_bytes, info.bytes);
+    }
+    spl_renderer_get_residency(gpu->renderer, NULL, &info);
+    atomic_store(&pipeline->device_bytes, info.taken_bytes);
+    atomic_store(&pipeline->device_limit_bytes, info.limit_bytes);
+    atomic_fetch_add(&pipeline->options.counters->pages_evicted, info.pages_evicted - gpu->pages_evicted);
+    gpu->pages_evicted = info.pages_evicted;
+}
+
+/* A file that was cut or overwritten in place costs its own views only. */
+static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_renderer_preload(gpu->renderer, entry->dataset, &why);
+    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
+        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
+        return 0;
+    }
+    return rc ? spl_fail(err, rc, "%s", why.message) : 0;
+}
+
+static int build(struct gpu *gpu, struct spl_error *err)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_catalog_entry *entry;
+    int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
+    spl_pipeline_touch(pipeline);
+    if (rc)
+        return rc;
+    gpu->pages_evicted = 0;
+    pthread_mutex_lock(&pipeline->mutex);
+    pipeline->device = *spl_renderer_get_device(gpu->renderer);
+    pthread_mutex_unlock(&pipeline->mutex);
+    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        entry->pages_wanted = 0;
+        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
+            return rc;
+    }
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        if (spl_queue_is_closed(pipeline->render))
+            break;
+        if (!entry->loading && (rc = preload(gpu, entry, err)))
+            return rc;
+        spl_pipeline_touch(pipeline);
+    }
+    publish_residency(gpu);
+    return 0;
+}
+
+static void tear_down(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    if (!gpu->renderer)
+        return;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    spl_renderer_destroy(gpu->renderer);
+    gpu->renderer = NULL;
+    atomic_store(&gpu->pipeline->device_bytes, 0);
+}
+
+static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    TAILQ_REMOVE(&gpu->entries, entry, resident);
+    publish_residency(gpu);
+}
+
+/* Gives back an entry that was to be added; the last unref() need not come here any more. */
+static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+{
+    entry->err = *why;
+    entry->loading = false;
+    entry->release = NULL;
+    spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
+}
+
+/* Takes up what the loop wants added and lets go of what nobody refers to any more. */
+static void take_orders(struct gpu *gpu)
+{
+    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
+        if (entry->state == SPL_ENTRY_LEAVING) {
+            let_entry_go(gpu, entry);
+            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+            continue;
+        }
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        TAILQ_INSERT_TAIL(&gpu->entries, entry, resident);
+        entry->pages_wanted = 0;
+        entry->loading = true;
+        struct spl_error err = {0};
+        if (spl_renderer_add(gpu->renderer, entry->dataset, &err)) {
+            let_entry_go(gpu, entry);
+            refuse_entry(gpu, entry, &err);
+        }
+    }
+}
+
+static struct spl_catalog_entry *find_loading(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    if (entry->loading)
+        return entry;
+    return NULL;
+}
+
+/* Answers everything that waits. */
+static void refuse_waiting(struct gpu *gpu)
+{
+    for (struct spl_job *job; (job = spl_queue_pop(gpu->pipeline->render, 0));) {
+        spl_fail(&job->err, SPL_E_DEVICE_LOST, "the device was lost; it is being reopened");
+        spl_pipeline_finish_job(gpu->pipeline, job);
+    }
+}
+
+static void give_up(struct gpu *gpu, const struct spl_error *why)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    pipeline->failure = *why;
+    spl_queue_close(pipeline->render);
+    refuse_waiting(gpu);
+    set_state(pipeline, SPL_PIPELINE_FAILED);
+}
+
+/* False when the bound on losses is reached; counts this one. */
+static bool may_rebuild(struct gpu *gpu)
+{
+    uint64_t now = spl_now_ns(), *slot = &gpu->losses_ns[gpu->losses % rebuilds_max];
+    bool allowed = gpu->losses < rebuilds_max || now - *slot > rebuild_window_ns;
+    *slot = now;
+    gpu->losses++;
+    spl_count(gpu->pipeline->options.counters, device_losses);
+    return allowed;
+}
+
+/* Makes a new renderer after a loss; false when the process had better end. */
+static bool recover(struct gpu *gpu, const struct spl_error *why)
+{
+    struct spl_error err = *why;
+    spl_pipeline_touch(gpu->pipeline);
+    set_state(gpu->pipeline, SPL_PIPELINE_REBUILDING);
+    for (;;) {
+        spl_log_warn("device lost: %s", err.message);
+        refuse_waiting(gpu);
+        tear_down(gpu);
+        if (!may_rebuild(gpu)) {
+            struct spl_error last = {0};
+            spl_fail(&last, SPL_E_DEVICE_LOST, "the device was lost more than %d times within %d s; last: %.300s",
+                     (int)rebuilds_max, (int)(rebuild_window_ns / SPL_NS_PER_S), err.message);
+            give_up(gpu, &last);
+            return false;
+        }
+        err = (struct spl_error){0};
+        if (!build(gpu, &err))
+            break;
+    }
+    spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
+    set_state(gpu->pipeline, SPL_PIPELINE_READY);
+    return true;
+}
+
+/* Loads one page of an entry; false when the thread must end. */
+static bool load_page(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    bool more;
+    struct spl_error err = {0};
+    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, entry->pages_wanted++, &more, &err);
+    if (rc == SPL_E_DEVICE_LOST)
+        return recover(gpu, &err);
+    publish_residency(gpu);
+    if (rc) {
+        let_entry_go(gpu, entry);
+        refuse_entry(gpu, entry, &err);
+    } else if (!more) {
+        entry->loading = false;
+        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
+    }
+    return true;
+}
+
+static void inject(struct gpu *gpu)
+{
+    if (!gpu->inject_left || gpu->frames < gpu->inject_at)
+        return;
+    gpu->inject_left--;
+    gpu->inject_at = gpu->frames + gpu->inject_every;
+    spl_renderer_inject_loss(gpu->renderer);
+}
+
+/* Sets the view to what its demand is best met with. A job that lacks the time is refused before it is planned. */
+static int plan(struct spl_job *job)
+{
+    if (!job->plan || !job->request.planned)
+        return 0;
+    double left_ms = (double)spl_remaining_ns(job->deadline_ns) / SPL_NS_PER_MS;
+    return spl_plan_apply(job->plan, &job->request, left_ms, &job->choice, &job->promised_ms, &job->err);
+}
+
+/* Renders one job and passes it on; false when the thread must end. */
+static bool serve(struct gpu *gpu, struct spl_job *job)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    spl_pipeline_touch(pipeline);
+    job->queue_ms = (double)(spl_now_ns() - job->accepted_ns) / SPL_NS_PER_MS;
+    if (spl_job_is_over(job) || spl_pipeline_reserve_frame(pipeline, job)) {
+        spl_pipeline_finish_job(pipeline, job);
+        return true;
+    }
+    job->began_ns = spl_now_ns();
+    if (plan(job)) {
+        spl_pipeline_finish_job(pipeline, job);
+        return true;
+    }
+    inject(gpu);
+    uint64_t began = spl_now_ns();
+    job->request.view.deadline_ns = job->deadline_ns;
+    int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
+    spl_pipeline_touch(pipeline);
+    struct spl_error err = job->err;
+    if (!rc) {
+        gpu->frames++;
+        spl_count(pipeline->options.counters, frames);
+        job->rendered_ns = spl_now_ns();
+        uint64_t took = job->rendered_ns - began, mean = atomic_load(&pipeline->frame_ns);
+        atomic_store(&pipeline->frame_ns, mean ? (7 * mean + took) / 8 : took);
+        if (job->frame.stats.pages_loaded)
+            publish_residency(gpu);
+        else
+            atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
+        job->stats = job->frame.stats;
+        const struct spl_device_info *device = spl_renderer_get_device(gpu->renderer);
+        job->renderer = atomic_load(&pipeline->renderer);
+        snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
+        bool usual = !job->request.picks && !job->request.container;
+        if (job->plan && usual && !job->stats.pages_loaded) // loading is no property of the setting
+            spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
+        rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
+    }
+    if (rc)
+        spl_pipeline_finish_job(pipeline, job);
+    return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
+}
+
+static void run(struct gpu *gpu)
+{
+    struct spl_queue *render = gpu->pipeline->render;
+    for (;;) {
+        take_orders(gpu);
+        struct spl_catalog_entry *loading = find_loading(gpu);
+        struct spl_job *job = spl_queue_pop(render, loading ? 0 : SPL_NEVER);
+        if (!job && spl_queue_is_closed(render))
+            break;
+        if (job && !serve(gpu, job))
+            break;
+        if (loading && !load_page(gpu, loading))
+            break;
+    }
+}
+
+void *spl_gpu_thread_run(void *argument)
+{
+    struct gpu gpu = {.pipeline = argument};
+    const struct spl_pipeline_options *options = &gpu.pipeline->options;
+    struct spl_error err = {0};
+    const char *plan = getenv("SPLATD_INJECT_LOSS_AFTER");
+    if (plan && sscanf(plan, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
+        gpu.inject_left = 1;
+    gpu.inject_at = gpu.inject_every;
+    TAILQ_INIT(&gpu.entries);
+    for (size_t i = 0; i < options->entry_count; i++)
+        TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
+    if (build(&gpu, &err)) {
+        give_up(&gpu, &err);
+    } else {
+        set_state(gpu.pipeline, SPL_PIPELINE_READY);
+        run(&gpu);
+    }
+    tear_down(&gpu);
+    err = (struct spl_error){.code = SPL_E_CANCELLED, .message = "the service is stopping"};
+    for (struct spl_catalog_entry *entry; (entry = find_loading(&gpu));)
+        refuse_entry(&gpu, entry, &err);
+    return NULL;
+}

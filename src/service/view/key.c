@@ -1,0 +1,134 @@
+/* Canonical forms.
+ *
+ * Invariant: what changes a byte of the body or a header that describes it goes in; what does not stays out, and each
+ * number goes in one way only (-0 as 0, the default margin as its value), so that a request written differently has the
+ * same key. Fields have fixed places, a missing one is 0, so no two forms run into each other. */
+#include "service/view/key.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include <xxhash.h>
+
+static uint64_t hash_program(void)
+{
+    unsigned char block[1 << 16];
+    XXH3_state_t *state = XXH3_createState();
+    FILE *file = fopen("/proc/self/exe", "rb");
+    uint64_t hash = 0;
+    if (state && XXH3_64bits_reset(state) == XXH_OK && file) {
+        for (size_t n; (n = fread(block, 1, sizeof block, file)) > 0;)
+            XXH3_64bits_update(state, block, n);
+        hash = XXH3_64bits_digest(state);
+    }
+    if (file)
+        fclose(file);
+    XXH3_freeState(state);
+    return hash;
+}
+
+uint64_t spl_renderer_hash(const struct spl_device_info *device)
+{
+    char text[2 * SPL_DEVICE_NAME_MAX + 96];
+    int length = snprintf(text, sizeof text, "%s\n%s\n%s\n%s\n%016llx", SPLATD_VERSION, device->backend, device->name,
+                          device->driver, (unsigned long long)hash_program());
+    return XXH3_64bits(text, (size_t)length);
+}
+
+struct form {
+    uint64_t words[96];
+    size_t count;
+};
+
+static void add(struct form *form, uint64_t word)
+{
+    spl_assert(form->count < sizeof form->words / sizeof *form->words);
+    form->words[form->count++] = word;
+}
+
+static void add_number(struct form *form, double number)
+{
+    uint64_t word;
+    number += 0.0; // -0 becomes 0
+    memcpy(&word, &number, sizeof word);
+    add(form, word);
+}
+
+static void add_camera(struct form *form, const struct spl_camera *camera)
+{
+    for (int i = 0; i < 3; i++)
+        add_number(form, camera->eye[i]);
+    for (int i = 0; i < 9; i++)
+        add_number(form, camera->rotation[i]);
+    add_number(form, camera->fx);
+    add_number(form, camera->fy);
+    add_number(form, camera->cx);
+    add_number(form, camera->cy);
+    add_number(form, camera->near);
+    add_number(form, camera->far);
+    add(form, (uint64_t)camera->width << 32 | camera->height);
+}
+
+static void add_encoding(struct form *form, const struct spl_view_request *request, enum spl_layer layer)
+{
+    struct spl_encode_options options = spl_view_get_encoding(request, layer), *encode = &options;
+    bool jpeg = encode->format == SPL_FORMAT_JPEG, webp = encode->format == SPL_FORMAT_WEBP;
+    add(form, (uint64_t)layer << 32 | (uint64_t)encode->format);
+    add(form, jpeg || webp ? (uint64_t)encode->quality : 0);
+    add(form, jpeg ? (uint64_t)spl_encode_chroma(encode) : 0);
+    bool distance = layer == SPL_LAYER_DEPTH || layer == SPL_LAYER_RANGE;
+    add_number(form, encode->format == SPL_FORMAT_PNG && distance ? encode->depth_scale : 0);
+}
+
+struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t version, uint64_t renderer)
+{
+    const struct spl_view *view = &request->view;
+    const uint8_t *b = view->background;
+    uint32_t background = (uint32_t)b[0] << 24 | (uint32_t)b[1] << 16 | (uint32_t)b[2] << 8 | b[3];
+    struct form form = {0};
+    add(&form, version);
+    add(&form, renderer);
+    add_camera(&form, &view->camera);
+    add(&form, (uint64_t)view->method << 32 | view->layers);
+    add_number(&form, view->lod);
+    add_number(&form, view->supersample);
+    add_number(&form, view->margin < 0 ? 1 : view->margin);
+    add(&form, view->layers & 1u << SPL_LAYER_COLOR ? background : 0);
+    add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
+    if (request->picks) {
+        add_camera(&form, &request->pick.camera);
+        add_number(&form, request->pick.x);
+        add_number(&form, request->pick.y);
+    }
+    for (unsigned layer = 0; layer < SPL_LAYER_COUNT && !request->picks; layer++)
+        if (view->layers >> layer & 1)
+            add_encoding(&form, request, (enum spl_layer)layer);
+    XXH128_hash_t hash = XXH3_128bits(form.words, form.count * sizeof *form.words);
+    return (struct spl_key){.words = {hash.high64, hash.low64}};
+}
+
+void spl_key_etag(const struct spl_key *key, char etag[SPL_ETAG_BYTES])
+{
+    snprintf(etag, SPL_ETAG_BYTES, "\"%016llx%016llx\"", (unsigned long long)key->words[0],
+             (unsigned long long)key->words[1]);
+}
+
+bool spl_etag_matches(const char *if_none_match, const char *etag)
+{
+    size_t length = strlen(etag);
+    const char *p = if_none_match + strspn(if_none_match, " \t");
+    if (*p == '*')
+        return !p[1 + strspn(p + 1, " \t")];
+    for (;;) {
+        p += strspn(p, " \t,");
+        if (!strncmp(p, "W/", 2))
+            p += 2;
+        const char *end = *p == '"' ? strchr(p + 1, '"') : NULL;
+        if (!end)
+            return false;
+        size_t found = (size_t)(end + 1 - p);
+        p = end + 1;
+        if (found == length && !strncmp(p - found, etag, length))
+            return true;
+    }
+}

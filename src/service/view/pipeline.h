@@ -1,0 +1,115 @@
+/* From a checked view to encoded bytes: the gpu thread and the encode threads, tied by bounded queues.
+ *
+ *     submit → [render queue] → gpu → [encode queue] → encode → [done queue] → take
+ *
+ * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
+ * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and the
+ * last unref() of one send it to the gpu thread, take_change() brings it back. */
+#ifndef SPL_SERVICE_PIPELINE_H
+#define SPL_SERVICE_PIPELINE_H
+
+#include <stdatomic.h>
+
+#include <splatd/render.h>
+
+#include "base/error.h"
+#include "service/datasets/entry.h"
+#include "service/ops/counters.h"
+#include "service/request/request.h"
+#include "service/view/plan.h"
+
+struct spl_job {
+    struct spl_catalog_entry *entry;   /* one reference; may be NULL in tests, as may `plan` */
+    const struct spl_dataset *dataset; /* of it */
+    struct spl_view_request request;
+    uint64_t accepted_ns;
+    _Atomic uint64_t deadline_ns;      /* the loop may raise it at any time */
+    atomic_bool dropped;               /* set by the loop at any time: nobody waits for it, skip the work */
+    bool behind;                       /* a tour's frame: made while nobody's view waits */
+    size_t frame_number;               /* of it */
+    void *owner;                       // owned by: loop
+    void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
+
+    struct spl_frame frame; /* between gpu and encode */
+    struct spl_frame_stats stats;
+    struct spl_encoded encoded;
+    size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
+    double queue_ms, encode_ms;
+    uint64_t renderer;              /* spl_renderer_hash() of what rendered it */
+    char device[300];               /* the same in words */
+    const char *route;              /* for statistics; static, NULL: none */
+    struct spl_plan *plan;          /* of `entry`; NULL: nothing is planned */
+    struct spl_choice choice;       /* where request.planned */
+    double promised_ms;             /* the same */
+    uint64_t began_ns, rendered_ns; /* of the frame, planning included */
+    struct spl_error err;
+};
+
+/* Releases everything and the job itself; NULL-safe. */
+void spl_job_destroy(struct spl_job *job);
+
+struct spl_pipeline_options {
+    struct spl_renderer_options renderer;
+    struct spl_catalog_entry *const *entries; /* resident before the state becomes READY; the caller's references */
+    size_t entry_count;
+    size_t queue, encoders;
+    size_t frame_bytes_max; /* host memory for frames that wait for an encoder, 0 = 1 GiB */
+    struct spl_counters *counters;
+    void (*wake)(void *context); /* called from any thread: a job is done, or the state changed */
+    void *wake_context;
+};
+
+enum spl_pipeline_state {
+    SPL_PIPELINE_STARTING, /* device and datasets are being loaded */
+    SPL_PIPELINE_READY,
+    SPL_PIPELINE_REBUILDING, /* the device was lost */
+    SPL_PIPELINE_FAILED,     /* for good; see spl_pipeline_get_failure() */
+};
+
+struct spl_pipeline;
+
+/* Starts the threads; the gpu thread makes renderer and residency and reports through `wake`. */
+int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err);
+
+/* Stops taking jobs, finishes those inside, joins the threads, destroys what was not taken: jobs, and entries that
+ * nobody refers to. References that others hold must be gone before. NULL-safe. */
+void spl_pipeline_destroy(struct spl_pipeline *pipeline);
+
+/* Never blocks. SPL_E_BUSY when the queue is full. */
+int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
+
+/* A finished job or NULL; never blocks. */
+struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline);
+
+/* Makes `entry` resident, page by page between frames. Takes the caller's reference; take_change() gives it back with
+ * the entry, which then is SPL_ENTRY_RESIDENT or SPL_ENTRY_REFUSED. From now on the last unref() of the entry, on any
+ * thread, sends it here, and take_change() gives it back as SPL_ENTRY_GONE, for the caller to destroy. */
+void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
+
+/* An entry whose state has changed, or NULL; never blocks. */
+struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline);
+
+enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline);
+
+/* spl_renderer_hash() of what renders at present; 0 before the first. */
+uint64_t spl_pipeline_get_renderer(struct spl_pipeline *pipeline);
+
+/* Why it failed; only once the state is SPL_PIPELINE_FAILED. */
+const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);
+
+struct spl_pipeline_status {
+    struct spl_device_info device; /* of the last renderer that worked; zero before the first */
+    uint64_t device_bytes, device_limit_bytes;
+    size_t render_length, render_capacity, encode_length, encode_capacity;
+    double frame_ms; /* moving mean */
+};
+void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status);
+
+/* For how long nothing has moved although there is work: a job inside, or a device that is being reopened. 0 when idle.
+ * A pulse for health checks. Any thread. */
+uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline);
+
+/* Seconds after which a refused request may be repeated with hope, at least 1. */
+unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline);
+
+#endif

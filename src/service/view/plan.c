@@ -1,0 +1,187 @@
+/* One dataset's plan.
+ *
+ * Invariant: the planner is over the profile that copy_profile() gives out, or over its own table where there is none.
+ * The file is looked at whenever a view is planned, one stat() each, so that 'splatd bench' need not restart the
+ * service; a file that was refused is not read again until it changes. What follows the frame is learned here as well,
+ * since a budget ends with the reply: encoding and its queues, as milliseconds a megapixel by layer and format, and a
+ * margin for their spread. */
+#include "service/view/plan.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+
+static const double encoding_margin = 1.25, encoding_gain = 0.2, encoding_step = 1; /* ln */
+static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
+                                                        [SPL_FORMAT_PNG] = 60,
+                                                        [SPL_FORMAT_NPY] = 3,
+                                                        [SPL_FORMAT_RAW] = 3,
+                                                        [SPL_FORMAT_WEBP] = 60}; /* ms a megapixel */
+
+struct spl_plan {
+    char *path; /* of the profile */
+    const struct spl_dataset_info *info;
+    struct spl_device_info device; // owned by: gpu
+    struct spl_planner planner;    // owned by: gpu
+    struct stat seen;              // owned by: gpu; of the file that was read last, zero when there was none
+    pthread_mutex_t mutex;
+    struct spl_profile profile;                         // guarded by: mutex; count 0 = none
+    struct spl_error refused;                           // guarded by: mutex; why not
+    double encoding[SPL_LAYER_COUNT][SPL_FORMAT_COUNT]; // guarded by: mutex; ms a megapixel
+};
+
+int spl_plan_create(const char *dataset_path, const struct spl_dataset_info *info, struct spl_plan **out,
+                    struct spl_error *err)
+{
+    struct spl_plan *plan = spl_alloc(1, sizeof *plan, err);
+    if (!plan)
+        return SPL_E_NOMEM;
+    plan->info = info;
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        memcpy(plan->encoding[layer], encoding_first, sizeof encoding_first);
+    spl_fail(&plan->refused, SPL_E_NOT_FOUND, "the profile of '%s' has not been read yet", info->id);
+    pthread_mutex_init(&plan->mutex, NULL);
+    if (!(plan->path = spl_profile_path(dataset_path, err)) || spl_planner_init(&plan->planner, NULL, NULL, err)) {
+        spl_plan_destroy(plan);
+        return SPL_E_NOMEM;
+    }
+    *out = plan;
+    return 0;
+}
+
+void spl_plan_destroy(struct spl_plan *plan)
+{
+    if (!plan)
+        return;
+    spl_planner_finish(&plan->planner);
+    spl_profile_finish(&plan->profile);
+    pthread_mutex_destroy(&plan->mutex);
+    free(plan->path);
+    free(plan);
+}
+
+static void set_supersample(struct spl_view *view, const struct spl_setting *setting)
+{
+    view->supersample = setting->supersample;
+}
+
+/* Can this renderer draw it at all? A profile may come from one that can do more. */
+static bool is_usable(const struct spl_setting *setting)
+{
+    struct spl_view view;
+    spl_view_init(&view);
+    set_supersample(&view, setting);
+    return view.supersample == setting->supersample;
+}
+
+static void read_profile(struct spl_plan *plan)
+{
+    struct spl_profile profile;
+    struct spl_planner planner;
+    struct spl_error err = {0};
+    int rc = spl_profile_load(plan->path, plan->info, &plan->device, &profile, &err);
+    if (rc && rc != SPL_E_NOT_FOUND)
+        spl_log_warn("profile ignored: %s", err.message);
+    if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
+        spl_planner_finish(&plan->planner);
+        plan->planner = planner;
+    } else {
+        spl_profile_finish(&profile); // goes on with the planner that there is
+    }
+    if (profile.count)
+        spl_log_info("dataset %s: profile of %zu settings", plan->info->id, profile.count);
+    pthread_mutex_lock(&plan->mutex);
+    spl_profile_finish(&plan->profile);
+    plan->profile = profile;
+    plan->refused = err;
+    pthread_mutex_unlock(&plan->mutex);
+}
+
+static bool has_changed(struct spl_plan *plan)
+{
+    struct stat now = {0}, *seen = &plan->seen;
+    if (stat(plan->path, &now))
+        now = (struct stat){0};
+    bool same = now.st_ino == seen->st_ino && now.st_size == seen->st_size &&
+                now.st_mtim.tv_sec == seen->st_mtim.tv_sec && now.st_mtim.tv_nsec == seen->st_mtim.tv_nsec;
+    *seen = now;
+    return !same;
+}
+
+void spl_plan_set_device(struct spl_plan *plan, const struct spl_device_info *device)
+{
+    plan->device = *device;
+    has_changed(plan);
+    read_profile(plan);
+}
+
+static double *encoding_of(struct spl_plan *plan, const struct spl_view_request *request)
+{
+    return &plan->encoding[request->layer][request->encode.format];
+}
+
+static double megapixels(const struct spl_view_request *request)
+{
+    return 1e-6 * request->view.camera.width * request->view.camera.height;
+}
+
+int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, double left_ms, struct spl_choice *choice,
+                   double *promised_ms, struct spl_error *err)
+{
+    if (has_changed(plan))
+        read_profile(plan);
+    struct spl_demand demand = request->demand;
+    pthread_mutex_lock(&plan->mutex);
+    demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
+    pthread_mutex_unlock(&plan->mutex);
+    if (!isnan(demand.budget_ms))
+        demand.budget_ms = fmin(demand.budget_ms, left_ms);
+    int rc = spl_planner_choose(&plan->planner, &demand, choice, err);
+    if (rc)
+        return rc;
+    request->view.method = choice->setting.method;
+    request->view.lod = choice->setting.lod;
+    set_supersample(&request->view, &choice->setting);
+    *promised_ms = choice->ms + demand.extra_ms;
+    return 0;
+}
+
+void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
+{
+    const struct spl_view *view = &request->view;
+    struct spl_setting setting = {view->method, view->lod, view->supersample};
+    ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
+    if (index >= 0)
+        spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);
+}
+
+void spl_plan_learn_reply(struct spl_plan *plan, const struct spl_view_request *request, double ms)
+{
+    pthread_mutex_lock(&plan->mutex);
+    double *known = encoding_of(plan, request), step = log(ms / megapixels(request) / *known);
+    if (isfinite(step))
+        *known *= exp(encoding_gain * fmin(fmax(step, -encoding_step), encoding_step));
+    pthread_mutex_unlock(&plan->mutex);
+}
+
+int spl_plan_copy_profile(struct spl_plan *plan, struct spl_profile *out, struct spl_error *err)
+{
+    int rc = 0;
+    pthread_mutex_lock(&plan->mutex);
+    *out = plan->profile;
+    if (!out->count)
+        rc = spl_fail(err, SPL_E_NOT_FOUND, "%s", plan->refused.message);
+    else if (!(out->points = spl_alloc_raw(out->count, sizeof *out->points, err)))
+        rc = SPL_E_NOMEM;
+    else
+        memcpy(out->points, plan->profile.points, out->count * sizeof *out->points);
+    pthread_mutex_unlock(&plan->mutex);
+    if (rc)
+        *out = (struct spl_profile){0};
+    return rc;
+}
