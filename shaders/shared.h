@@ -69,6 +69,9 @@
  * normal. The blend margin grows with it, up to this much. */
 #define SPL_MARGIN_SLANT 4.0f
 
+/* The coarsest level of a texture that is drawn has this many texels a side. */
+#define SPL_TEXTURE_SIDE_MIN 4
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */

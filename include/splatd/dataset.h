@@ -22,6 +22,8 @@ enum spl_attribute {
     SPL_ATTRIBUTE_CLASS,
     SPL_ATTRIBUTE_UNCERTAINTY,
     SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
+    SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
+    SPL_ATTRIBUTE_DICTIONARY,
     SPL_ATTRIBUTE_COUNT
 };
 
@@ -29,7 +31,8 @@ struct spl_dataset_info {
     char id[128];              /* the file's stem */
     uint64_t version;          /* XXH3 over the section table: changes whenever any content does */
     uint64_t file_bytes;
-    uint64_t page_bytes;       /* bytes that become resident on the GPU when everything is */
+    uint64_t page_bytes;       /* bytes of pages and textures that become resident on the GPU when everything is */
+    uint64_t dictionary_bytes; /* the same of the textures' atoms, expanded with their mips; 0 = no textures */
     uint64_t points;           /* read from the sources, before duplicates were dropped */
     uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
     uint64_t splats;           /* leaf splats plus those of the inner levels */
@@ -39,6 +42,7 @@ struct spl_dataset_info {
     double default_eye[3], default_target[3], default_up[3], default_fov; /* a view that shows the dataset */
     double splat_radius;       /* median radius of the leaf splats */
     bool has_color, has_class, has_uncertainty;
+    uint32_t atoms, texture_size; /* of the dictionary: atoms of texture_size x texture_size texels; 0 = no textures */
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
 };
 

@@ -231,10 +231,10 @@ static unsigned rebase(int32_t *code, uint32_t count, int32_t *base)
     return bits_for_count((uint32_t)(high - low));
 }
 
-static void encode_colors(const struct spl_splat *splats, uint32_t count, struct spl_chunk *chunk, struct codes *codes)
+static void encode_colors(const uint8_t (*color)[3], uint32_t count, struct spl_chunk *chunk, struct codes *codes)
 {
     for (uint32_t i = 0; i < count; i++) {
-        int32_t r = splats[i].color[0], g = splats[i].color[1], b = splats[i].color[2];
+        int32_t r = color[i][0], g = color[i][1], b = color[i][2];
         codes->cu[i] = b - g;
         codes->cv[i] = r - g;
         codes->cy[i] = g + ((b - g + r - g) >> 2);
@@ -318,9 +318,16 @@ static void put_stream(struct bit_writer *w, int32_t *const *code, const unsigne
         put(w, 0, 32 - w->pending_bits);
 }
 
+static void put_colors(struct bit_writer *w, const struct spl_chunk *chunk, struct codes *codes)
+{
+    uint32_t c = chunk->color_bits;
+    put_stream(w, (int32_t *[]){codes->cy, codes->cu, codes->cv},
+               (unsigned[]){c >> SPL_COLOR_Y & 15, c >> SPL_COLOR_U & 15, c >> SPL_COLOR_V & 15}, 3, chunk->count);
+}
+
 static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes, uint32_t *words)
 {
-    uint32_t g = chunk->geometry_bits, c = chunk->color_bits, e = chunk->extra_bits;
+    uint32_t g = chunk->geometry_bits, e = chunk->extra_bits;
     struct bit_writer writer = {.words = words};
     put_stream(
         &writer,
@@ -328,8 +335,7 @@ static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes
         (unsigned[]){g >> SPL_GEOMETRY_X & 31, g >> SPL_GEOMETRY_Y & 31, g >> SPL_GEOMETRY_Z & 31,
                      g >> SPL_GEOMETRY_U & 15, g >> SPL_GEOMETRY_V & 15, g >> SPL_GEOMETRY_RADIUS & 15},
         6, chunk->count);
-    put_stream(&writer, (int32_t *[]){codes->cy, codes->cu, codes->cv},
-               (unsigned[]){c >> SPL_COLOR_Y & 15, c >> SPL_COLOR_U & 15, c >> SPL_COLOR_V & 15}, 3, chunk->count);
+    put_colors(&writer, chunk, codes);
     put_stream(&writer, (int32_t *[]){codes->classification}, (unsigned[]){e >> SPL_EXTRA_CLASS & 15}, 1, chunk->count);
     put_stream(&writer, (int32_t *[]){codes->uncertainty}, (unsigned[]){e >> SPL_EXTRA_UNCERTAINTY & 15}, 1,
                chunk->count);
@@ -342,6 +348,7 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
 {
     spl_assert(count >= 1 && count <= SPL_CHUNK_SPLATS);
     double value[3][SPL_CHUNK_SPLATS], radius[SPL_CHUNK_SPLATS], inverse_radius[SPL_CHUNK_SPLATS];
+    uint8_t color[SPL_CHUNK_SPLATS][3];
     for (uint32_t i = 0; i < count; i++) {
         const float *n = splats[i].normal;
         spl_assert(splats[i].radius > 0 && isfinite(splats[i].radius + n[0] + n[1] + n[2] + splats[i].uncertainty) &&
@@ -350,13 +357,14 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
             value[a][i] = position[i][a];
         radius[i] = splats[i].radius;
         inverse_radius[i] = 1.0 / radius[i];
+        memcpy(color[i], splats[i].color, sizeof color[i]);
     }
     struct codes codes;
     *chunk = (struct spl_chunk){.count = count};
     double position_sum = encode_positions(value, inverse_radius, count, options->position_error, chunk, &codes);
     encode_radii(radius, count, options->radius_error, chunk, &codes);
     double normal_sum = encode_normals(splats, count, options->normal_error, chunk, &codes);
-    encode_colors(splats, count, chunk, &codes);
+    encode_colors((const uint8_t(*)[3])color, count, chunk, &codes);
     if (options->has_class)
         encode_classes(splats, count, chunk, &codes);
     if (options->has_uncertainty)
@@ -364,4 +372,20 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
     if (error)
         *error = (struct spl_chunk_error){.position_over_radius = position_sum, .normal_radians = normal_sum};
     return write_streams(chunk, &codes, words);
+}
+
+uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, const uint8_t (*color)[3],
+                           struct spl_chunk *out, uint32_t *words)
+{
+    struct codes codes;
+    *out = *chunk;
+    out->geometry_word = 0;
+    encode_colors(color, chunk->count, out, &codes);
+    uint32_t geometry = spl_chunk_color_word(out), begin = spl_chunk_class_word(chunk);
+    uint32_t rest = chunk->geometry_word + spl_chunk_words(chunk) - begin;
+    memcpy(words, page + chunk->geometry_word, geometry * sizeof *words);
+    struct bit_writer writer = {.words = words, .used = geometry};
+    put_colors(&writer, out, &codes);
+    memcpy(words + writer.used, page + begin, rest * sizeof *words);
+    return writer.used + rest;
 }

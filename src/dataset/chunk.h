@@ -56,6 +56,12 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error);
 
+/* The same chunk with other colours, `color[i]` for splat i: its geometry, classes and uncertainties are copied as they
+ * lie in `page`, bit for bit. Writes `words` (room for SPL_CHUNK_WORDS_MAX) and *out, whose geometry_word becomes 0.
+ * Returns the number of words. `chunk` must be one that opening has checked. */
+uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, const uint8_t (*color)[3],
+                           struct spl_chunk *out, uint32_t *words);
+
 /* Decodes splat `i` (< chunk->count) of a chunk whose page starts at `page`. Same arithmetic as the shader, in floats:
  * position = origin + step * code. */
 void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat);

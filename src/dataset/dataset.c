@@ -82,9 +82,13 @@ int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, st
     if (!rc)
         rc = spl_dataset_read_sections(dataset, verify, err);
     if (!rc)
+        rc = spl_dataset_read_dictionary(dataset, err);
+    if (!rc)
         rc = spl_dataset_read_meta(dataset, err);
     if (!rc)
         rc = spl_dataset_check_structure(dataset, err);
+    if (!rc && verify)
+        rc = spl_dataset_check_textures(dataset, err);
     if (!rc)
         rc = set_id(dataset, err);
 done:
@@ -107,6 +111,9 @@ void spl_dataset_close(struct spl_dataset *dataset)
     free(dataset->meta_text);
     free(dataset->nodes);
     free(dataset->chunks);
+    free(dataset->textures);
+    free(dataset->atoms);
+    free(dataset->chunk_textures);
     free(dataset->sections);
     free(dataset->pages);
     free(dataset->path);
@@ -223,7 +230,8 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
         [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
         [SPL_ATTRIBUTE_CLASS] = "class",       [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
-        [SPL_ATTRIBUTE_CHUNK] = "chunk",
+        [SPL_ATTRIBUTE_CHUNK] = "chunk",       [SPL_ATTRIBUTE_TEXTURE] = "texture",
+        [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return names[attribute];
 }

@@ -7,6 +7,7 @@
 #include <jansson.h>
 
 #include "dataset/format.h"
+#include "sparse/dictionary.h"
 
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);
@@ -16,6 +17,21 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
  * holds it against its checksum where the dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or
  * overwritten in place since. Any thread; blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
+
+/* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, `chunk_word` (by chunk: where
+ * its codes start in its page's textures, or SPL_TEXTURE_NONE) is NULL then. */
+const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset);
+const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset);
+
+/* Bytes of the textures of page `index` (< info.pages); 0 without textures. */
+size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t index);
+
+/* Reads them to `out`. Holds them against their checksum where the dataset was opened with `verify`, else against the
+ * dictionary and chunks, so that every code read decodes. SPL_E_CORRUPT. Any thread; blocks on disk. */
+int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err);
+
+/* Adds every splat to histogram[number of its atoms], 0..SPL_ATOMS_MAX. As read_textures. */
+int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogram, struct spl_error *err);
 
 /* The bytes of page `index` (< info.pages) in a map of the file, for tools: touching them raises SIGBUS when the file
  * was cut short in place. */

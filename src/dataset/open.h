@@ -1,4 +1,4 @@
-/* A mapped dataset from the inside, and the stages of opening one. Only dataset.c, sections.c, meta.c and structure.c
+/* A mapped dataset from the inside, and the stages of opening one. Only the files that open one and textures.c
  * include this. Each stage trusts what the ones before it have checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "dataset/dataset.h"
+#include "sparse/dictionary.h"
 
 struct spl_dataset {
     struct spl_dataset_info info;
@@ -20,10 +21,15 @@ struct spl_dataset {
     struct spl_section *sections;
     uint32_t section_count;
     const struct spl_section *meta_section, *node_section, *chunk_section;
+    const struct spl_section *atoms_section, *chunk_textures_section; // NULL = no textures
     char *meta_text;
     const struct spl_section **pages; /* by index; info.pages of them */
     struct spl_node *nodes;
     struct spl_chunk *chunks;
+    const struct spl_section **textures; /* by page; all NULL where there are none */
+    void *atoms;                         /* section ATOM, which `dictionary` points into */
+    struct spl_dictionary dictionary;    /* count 0 = no textures */
+    uint32_t *chunk_textures;            /* by chunk; NULL = no textures */
     json_t *meta;
 };
 
@@ -37,6 +43,13 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 
 /* Header, section table, extents and checksums; fills everything up to `chunks` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);
+
+/* Checks ATOM and CTEX in themselves, and that each page has its TEXP, and fills `dictionary` and info; with no section of
+ * these kinds it does nothing. */
+int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *err);
+
+/* Reads every TEXP and holds each code against dictionary and chunks; for a verified dataset. Blocks on disk. */
+int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *err);
 
 /* Parses META and fills info from it. */
 int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err);

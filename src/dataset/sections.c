@@ -29,7 +29,7 @@ static const char *section_name(const struct spl_section *section, char text[40]
         char c = (char)(section->type >> 8 * i);
         letters[i] = c > ' ' && c < 127 ? c : '?';
     }
-    if (section->type == SPL_SECTION_PAGE)
+    if (section->type == SPL_SECTION_PAGE || section->type == SPL_SECTION_TEXTURES)
         snprintf(text, 40, "section %s %u", letters, section->index);
     else
         snprintf(text, 40, "section %s", letters);
@@ -137,25 +137,31 @@ static void *copy_section(const struct spl_dataset *dataset, const struct spl_se
 static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_section *nodes, *chunks;
+    uint32_t textures = 0;
     char name[40];
     dataset->pages = spl_alloc(dataset->section_count, sizeof *dataset->pages, err);
-    if (!dataset->pages)
+    dataset->textures = spl_alloc(dataset->section_count, sizeof *dataset->textures, err);
+    if (!dataset->pages || !dataset->textures)
         return SPL_E_NOMEM;
     for (uint32_t i = 0; i < dataset->section_count; i++) {
         const struct spl_section *s = &dataset->sections[i], **place;
-        if (s->type == SPL_SECTION_PAGE) {
-            if (s->index != dataset->info.pages)
+        if (s->type == SPL_SECTION_PAGE || s->type == SPL_SECTION_TEXTURES) {
+            bool page = s->type == SPL_SECTION_PAGE;
+            uint32_t *count = page ? &dataset->info.pages : &textures;
+            if (s->index != *count)
                 return corrupt(dataset, err, section_name(s, name), "is out of order");
             if (s->bytes < SPL_PAGE_TAIL_WORDS * sizeof(uint32_t) || s->bytes > SPL_PAGE_BYTES_MAX || s->bytes % 4)
                 return corrupt(dataset, err, section_name(s, name), "has a size that no page can have");
             dataset->info.page_bytes += s->bytes;
-            dataset->pages[dataset->info.pages++] = s;
+            (page ? dataset->pages : dataset->textures)[(*count)++] = s;
             continue;
         }
-        place = s->type == SPL_SECTION_META     ? &dataset->meta_section
-                : s->type == SPL_SECTION_NODES  ? &dataset->node_section
-                : s->type == SPL_SECTION_CHUNKS ? &dataset->chunk_section
-                                                : NULL;
+        place = s->type == SPL_SECTION_META             ? &dataset->meta_section
+                : s->type == SPL_SECTION_NODES          ? &dataset->node_section
+                : s->type == SPL_SECTION_CHUNKS         ? &dataset->chunk_section
+                : s->type == SPL_SECTION_ATOMS          ? &dataset->atoms_section
+                : s->type == SPL_SECTION_CHUNK_TEXTURES ? &dataset->chunk_textures_section
+                                                        : NULL;
         if (!place)
             continue;
         if (*place || s->index)
@@ -177,6 +183,9 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
     if (!chunks->bytes || chunks->bytes % sizeof(struct spl_chunk) ||
         chunks->bytes / sizeof(struct spl_chunk) > UINT32_MAX)
         return corrupt(dataset, err, "section CHNK", "is not a whole number of chunks");
+    if (!dataset->atoms_section != !textures || !dataset->chunk_textures_section != !textures ||
+        (textures && textures != dataset->info.pages))
+        return corrupt(dataset, err, "section table", "lists some of ATOM, CTEX and a TEXP for each page, but not all");
     dataset->info.nodes = (uint32_t)(nodes->bytes / sizeof(struct spl_node));
     dataset->info.chunks = (uint32_t)(chunks->bytes / sizeof(struct spl_chunk));
     return SPL_OK;
@@ -188,7 +197,10 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
     struct spl_error why = {0};
     if ((dataset->meta_text = copy_section(dataset, dataset->meta_section, &why)) &&
         (dataset->nodes = copy_section(dataset, dataset->node_section, &why)) &&
-        (dataset->chunks = copy_section(dataset, dataset->chunk_section, &why)))
+        (dataset->chunks = copy_section(dataset, dataset->chunk_section, &why)) &&
+        (!dataset->atoms_section || (dataset->atoms = copy_section(dataset, dataset->atoms_section, &why))) &&
+        (!dataset->chunk_textures_section ||
+         (dataset->chunk_textures = copy_section(dataset, dataset->chunk_textures_section, &why))))
         return SPL_OK;
     return spl_fail(err, why.code, "%s", why.message);
 }
@@ -202,10 +214,12 @@ struct hashing {
 
 static int check_section(const struct spl_dataset *dataset, const struct spl_section *section, bool verify)
 {
-    const void *copy = section == dataset->meta_section    ? (const void *)dataset->meta_text
-                       : section == dataset->node_section  ? (const void *)dataset->nodes
-                       : section == dataset->chunk_section ? (const void *)dataset->chunks
-                                                           : NULL;
+    const void *copy = section == dataset->meta_section             ? (const void *)dataset->meta_text
+                       : section == dataset->node_section           ? (const void *)dataset->nodes
+                       : section == dataset->chunk_section          ? (const void *)dataset->chunks
+                       : section == dataset->atoms_section          ? dataset->atoms
+                       : section == dataset->chunk_textures_section ? (const void *)dataset->chunk_textures
+                                                                    : NULL;
     uint64_t hash = section->hash;
     int rc = SPL_OK;
     if (copy)

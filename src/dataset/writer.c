@@ -16,16 +16,25 @@
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "dataset/dictionary.h"
 
 enum { section_alignment = 64 };
+
+/* Words of the section being filled. */
+struct words {
+    uint32_t *at;
+    size_t capacity, used; /* the tail not counted */
+};
 
 struct spl_dataset_writer {
     char *path, *part_path;
     int fd;
     bool finished;
     uint64_t offset;                 /* where the file ends so far */
-    uint32_t *page;                  /* the page being filled */
-    size_t page_capacity, page_used; /* words, the tail not counted */
+    struct words page;               /* the page being filled */
+    struct words textures;           /* of its chunks */
+    struct words chunk_textures;     /* one of each chunk of the dataset */
+    const struct spl_dictionary *dictionary; /* NULL = no textures */
     struct spl_section *sections;
     size_t section_count, section_capacity;
     uint32_t page_count;
@@ -85,15 +94,35 @@ static size_t page_bytes(size_t used_words)
     return align((used_words + SPL_PAGE_TAIL_WORDS) * sizeof(uint32_t), section_alignment);
 }
 
+static int flush_words(struct spl_dataset_writer *writer, uint32_t type, struct words *words, struct spl_error *err)
+{
+    size_t bytes = page_bytes(words->used), used = words->used * sizeof(uint32_t);
+    memset((char *)words->at + used, 0, bytes - used);
+    words->used = 0;
+    return add_section(writer, type, writer->page_count, words->at, bytes, err);
+}
+
 static int flush_page(struct spl_dataset_writer *writer, struct spl_error *err)
 {
-    size_t bytes = page_bytes(writer->page_used), used = writer->page_used * sizeof(uint32_t);
-    memset((char *)writer->page + used, 0, bytes - used);
-    int rc = add_section(writer, SPL_SECTION_PAGE, writer->page_count, writer->page, bytes, err);
-    if (rc)
-        return rc;
+    int rc = flush_words(writer, SPL_SECTION_PAGE, &writer->page, err);
+    if (!rc && writer->dictionary)
+        rc = flush_words(writer, SPL_SECTION_TEXTURES, &writer->textures, err);
     writer->page_count++;
-    writer->page_used = 0;
+    return rc;
+}
+
+/* Makes room for `count` more words and the tail. */
+static int reserve(struct words *words, size_t count, struct spl_error *err)
+{
+    size_t wanted = page_bytes(words->used + count) / sizeof *words->at;
+    if (wanted <= words->capacity)
+        return SPL_OK;
+    wanted = wanted > 2 * words->capacity ? wanted : 2 * words->capacity;
+    uint32_t *grown = spl_realloc(words->at, wanted, sizeof *grown, err);
+    if (!grown)
+        return SPL_E_NOMEM;
+    words->at = grown;
+    words->capacity = wanted;
     return SPL_OK;
 }
 
@@ -130,12 +159,11 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
         return SPL_E_NOMEM;
     writer->fd = -1;
     writer->offset = sizeof(struct spl_file_header);
-    writer->page_capacity = SPL_PAGE_BYTES / sizeof(uint32_t);
-    writer->page = spl_alloc_raw(writer->page_capacity, sizeof(uint32_t), err);
     writer->path = strdup(path);
-    int rc = SPL_E_NOMEM;
-    if (!writer->page)
+    int rc = reserve(&writer->page, SPL_PAGE_BYTES / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS, err);
+    if (rc)
         goto failed;
+    rc = SPL_E_NOMEM;
     if (!writer->path || asprintf(&writer->part_path, "%s.part-%ld", path, (long)getpid()) < 0) {
         writer->part_path = NULL;
         spl_fail(err, rc, "out of memory for the name of %s", path);
@@ -161,31 +189,72 @@ failed:
     return rc;
 }
 
-int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
-                                struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err)
+int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const struct spl_dictionary *dictionary,
+                                      struct spl_error *err)
 {
-    if (word_count > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) || page_bytes(word_count) > SPL_PAGE_BYTES_MAX)
+    spl_assert(!writer->page_count && !writer->page.used && dictionary->count);
+    uint64_t bytes = spl_dictionary_expanded_bytes(dictionary->count, dictionary->size);
+    if (bytes > SPL_DICTIONARY_BYTES_MAX)
+        return spl_fail(err, SPL_E_LIMIT,
+                        "%s: a dictionary of %u atoms of %u x %u takes %llu MiB on a device, more than its %u; "
+                        "take fewer or smaller atoms",
+                        writer->path, dictionary->count, dictionary->size, dictionary->size,
+                        (unsigned long long)(bytes >> 20), SPL_DICTIONARY_BYTES_MAX >> 20);
+    writer->dictionary = dictionary;
+    return reserve(&writer->textures, 0, err);
+}
+
+/* Notes the words at which the chunks' codes lie in the page, and appends the codes. */
+static int add_textures(struct spl_dataset_writer *writer, const struct spl_node_textures *textures, size_t chunk_count,
+                        struct spl_error *err)
+{
+    struct words *to = &writer->textures, *of = &writer->chunk_textures;
+    if (reserve(to, textures->word_count, err) || reserve(of, chunk_count, err))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < chunk_count; i++) {
+        uint32_t word = textures->chunk_word[i];
+        of->at[of->used++] = word == SPL_TEXTURE_NONE ? word : word + (uint32_t)to->used;
+    }
+    memcpy(to->at + to->used, textures->words, textures->word_count * sizeof *to->at);
+    to->used += textures->word_count;
+    return SPL_OK;
+}
+
+int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
+                                         struct spl_chunk *chunks, size_t chunk_count,
+                                         const struct spl_node_textures *textures, uint32_t *page,
+                                         struct spl_error *err)
+{
+    struct words *to = &writer->page;
+    size_t larger = word_count > textures->word_count ? word_count : textures->word_count;
+    if (larger > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) || page_bytes(larger) > SPL_PAGE_BYTES_MAX)
         return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)", writer->path,
-                        word_count * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
-    if (writer->page_used && page_bytes(writer->page_used + word_count) > SPL_PAGE_BYTES) {
+                        larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
+    if (to->used && (page_bytes(to->used + word_count) > SPL_PAGE_BYTES ||
+                     page_bytes(writer->textures.used + textures->word_count) > SPL_PAGE_BYTES)) {
         int rc = flush_page(writer, err);
         if (rc)
             return rc;
     }
-    size_t capacity = page_bytes(writer->page_used + word_count) / sizeof(uint32_t);
-    if (capacity > writer->page_capacity) {
-        uint32_t *grown = spl_realloc(writer->page, capacity, sizeof *grown, err);
-        if (!grown)
-            return SPL_E_NOMEM;
-        writer->page = grown;
-        writer->page_capacity = capacity;
-    }
-    memcpy(writer->page + writer->page_used, words, word_count * sizeof *words);
+    int rc = reserve(to, word_count, err);
+    if (!rc && writer->dictionary)
+        rc = add_textures(writer, textures, chunk_count, err);
+    if (rc)
+        return rc;
+    memcpy(to->at + to->used, words, word_count * sizeof *words);
     for (size_t i = 0; i < chunk_count; i++)
-        chunks[i].geometry_word += (uint32_t)writer->page_used;
-    writer->page_used += word_count;
+        chunks[i].geometry_word += (uint32_t)to->used;
+    to->used += word_count;
     *page = writer->page_count;
     return SPL_OK;
+}
+
+int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
+                                struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err)
+{
+    spl_assert(!writer->dictionary);
+    return spl_dataset_writer_add_textured_node(writer, words, word_count, chunks, chunk_count,
+                                                &(struct spl_node_textures){0}, page, err);
 }
 
 static int sync_directory(const char *path, struct spl_error *err)
@@ -206,6 +275,26 @@ static int sync_directory(const char *path, struct spl_error *err)
     return rc;
 }
 
+/* ATOM and CTEX. */
+static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
+{
+    const struct spl_dictionary *from = writer->dictionary;
+    struct spl_atoms_header header = {.count = from->count, .size = from->size};
+    size_t scales = from->count * sizeof *from->scale, texels = (size_t)from->count * spl_texture_values(from->size);
+    char *bytes = spl_alloc_raw(sizeof header + scales + texels, 1, err);
+    if (!bytes)
+        return SPL_E_NOMEM;
+    memcpy(bytes, &header, sizeof header);
+    memcpy(bytes + sizeof header, from->scale, scales);
+    memcpy(bytes + sizeof header + scales, from->texels, texels);
+    int rc = add_section(writer, SPL_SECTION_ATOMS, 0, bytes, sizeof header + scales + texels, err);
+    free(bytes);
+    spl_assert(writer->chunk_textures.used == chunk_count);
+    return rc ? rc
+              : add_section(writer, SPL_SECTION_CHUNK_TEXTURES, 0, writer->chunk_textures.at,
+                            chunk_count * sizeof(uint32_t), err);
+}
+
 static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                       const struct spl_chunk *chunks, size_t chunk_count, const char *meta, struct spl_error *err)
 {
@@ -216,6 +305,8 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
         rc = add_section(writer, SPL_SECTION_NODES, 0, nodes, node_count * sizeof *nodes, err);
     if (!rc)
         rc = add_section(writer, SPL_SECTION_CHUNKS, 0, chunks, chunk_count * sizeof *chunks, err);
+    if (!rc && writer->dictionary)
+        rc = write_textures(writer, chunk_count, err);
     if (rc)
         return rc;
     size_t table_bytes = writer->section_count * sizeof *writer->sections;
@@ -264,7 +355,9 @@ void spl_dataset_writer_destroy(struct spl_dataset_writer *writer)
         close(writer->fd);
     }
     free(writer->sections);
-    free(writer->page);
+    free(writer->page.at);
+    free(writer->textures.at);
+    free(writer->chunk_textures.at);
     free(writer->part_path);
     free(writer->path);
     free(writer);

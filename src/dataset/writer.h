@@ -8,6 +8,7 @@
 #include <jansson.h>
 
 #include "base/error.h"
+#include "sparse/dictionary.h"
 
 struct spl_dataset_writer;
 
@@ -19,6 +20,24 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
  * chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
 int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
                                 struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err);
+
+/* Makes it a file with textures, before the first node. `dictionary` (count > 0, size 8, 16 or 32) is borrowed until
+ * finish. SPL_E_LIMIT when it is larger than a device can bind. */
+int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const struct spl_dictionary *dictionary,
+                                      struct spl_error *err);
+
+/* The node's codes, as spl_texture_encode() makes them, one chunk's after another's. */
+struct spl_node_textures {
+    const uint32_t *words;
+    size_t word_count;
+    const uint32_t *chunk_word;  /* where each chunk's start in `words`, or SPL_TEXTURE_NONE */
+};
+
+/* add_node for a file with textures. Nodes must come in the order of their chunks. */
+int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
+                                         struct spl_chunk *chunks, size_t chunk_count,
+                                         const struct spl_node_textures *textures, uint32_t *page,
+                                         struct spl_error *err);
 
 /* Writes nodes, chunks and `meta` (borrowed), the table and the header, syncs file and directory, renames over the
  * target. The writer stays to be destroyed. */

@@ -1,0 +1,142 @@
+/* Container to container, a node at a time; see retexture.h. Ids and the order of nodes and chunks stay, so that what a
+ * caller knows by splat or chunk holds in both files; only pages may be cut at other nodes. The caller's thread. */
+#include "dataset/retexture.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "dataset/chunk.h"
+#include "dataset/texture.h"
+#include "dataset/writer.h"
+
+struct pass {
+    const struct spl_retexture *what;
+    struct spl_dataset_writer *writer;
+    struct spl_node *nodes; /* of the new file */
+    struct spl_chunk *chunks;
+    uint32_t *page;      /* of the old one */
+    uint32_t page_index; /* UINT32_MAX = none yet */
+    uint32_t *words;     /* of the node's chunks */
+    uint32_t *texture_words, *chunk_word;
+};
+
+static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
+{
+    size_t bytes;
+    if (index == p->page_index)
+        return SPL_OK;
+    spl_dataset_get_page(p->what->from, index, &bytes);
+    uint32_t *page = spl_realloc(p->page, bytes, 1, err);
+    if (!page)
+        return SPL_E_NOMEM;
+    p->page = page;
+    p->page_index = index;
+    return spl_dataset_read_page(p->what->from, index, page, err);
+}
+
+/* The chunk's streams with the colours wanted; returns the words appended. */
+static uint32_t copy_chunk(struct pass *p, struct spl_chunk *chunk, uint32_t *words)
+{
+    struct spl_chunk from = *chunk;
+    if (p->what->colors)
+        return spl_chunk_recolor(&from, p->page, p->what->colors + from.first_id, chunk, words);
+    uint32_t count = spl_chunk_words(&from);
+    memcpy(words, p->page + from.geometry_word, count * sizeof *words);
+    return count;
+}
+
+static int write_node(struct pass *p, struct spl_node *node, struct spl_error *err)
+{
+    struct spl_chunk *chunks = p->chunks + node->first_chunk;
+    const struct spl_dictionary *dictionary = p->what->dictionary;
+    struct spl_node_textures textures = {.words = p->texture_words, .chunk_word = p->chunk_word};
+    size_t used = 0;
+    int rc = load_page(p, node->page, err);
+    for (uint32_t i = 0; i < node->chunk_count && !rc; i++) {
+        uint32_t count = copy_chunk(p, &chunks[i], p->words + used);
+        chunks[i].geometry_word = (uint32_t)used;
+        used += count;
+        if (!dictionary)
+            continue;
+        struct spl_chunk_code code = {0};
+        rc = p->what->code_chunk(p->what->context, node->first_chunk + i, &code, err);
+        if (rc)
+            break;
+        spl_assert(code.splats == chunks[i].count);
+        count = spl_texture_encode(&code, p->texture_words + textures.word_count);
+        p->chunk_word[i] = count ? (uint32_t)textures.word_count : SPL_TEXTURE_NONE;
+        textures.word_count += count;
+    }
+    return rc ? rc
+              : spl_dataset_writer_add_textured_node(p->writer, p->words, used, chunks, node->chunk_count, &textures,
+                                                     &node->page, err);
+}
+
+/* META of the old file, in which the splats now have a colour. */
+static json_t *make_meta(const struct spl_retexture *what)
+{
+    json_t *meta = json_deep_copy(spl_dataset_get_meta(what->from));
+    if (meta && what->colors)
+        json_object_set_new(json_object_get(meta, "attributes"), "color", json_true());
+    json_object_del(meta, "textures");
+    if (meta && what->textures)
+        json_object_set(meta, "textures", (json_t *)what->textures);
+    return meta;
+}
+
+static int allocate(struct pass *p, uint32_t node_count, uint32_t chunk_count, struct spl_error *err)
+{
+    size_t most = 0;
+    for (uint32_t i = 0; i < node_count; i++)
+        most = p->nodes[i].chunk_count > most ? p->nodes[i].chunk_count : most;
+    size_t texture_words = p->what->dictionary ? most * SPL_TEXTURE_WORDS_MAX : 1;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(p->what->from, &chunk_count);
+    p->chunks = spl_alloc_raw(chunk_count, sizeof *p->chunks, err);
+    p->words = spl_alloc_raw(most * SPL_CHUNK_WORDS_MAX, sizeof *p->words, err);
+    p->texture_words = spl_alloc_raw(texture_words, sizeof *p->texture_words, err);
+    p->chunk_word = spl_alloc_raw(most, sizeof *p->chunk_word, err);
+    if (!p->chunks || !p->words || !p->texture_words || !p->chunk_word)
+        return SPL_E_NOMEM;
+    memcpy(p->chunks, chunks, chunk_count * sizeof *chunks);
+    return SPL_OK;
+}
+
+int spl_dataset_retexture(const struct spl_retexture *retexture, const char *path, struct spl_error *err)
+{
+    struct spl_retexture what = *retexture;
+    if (what.dictionary && !what.dictionary->count)
+        what.dictionary = NULL;
+    struct pass p = {.what = &what, .page_index = UINT32_MAX};
+    uint32_t node_count, chunk_count = spl_dataset_get_info(what.from)->chunks;
+    const struct spl_node *nodes = spl_dataset_get_nodes(what.from, &node_count);
+    json_t *meta = make_meta(&what);
+    p.nodes = spl_alloc_raw(node_count, sizeof *nodes, err);
+    int rc = SPL_E_NOMEM;
+    if (!meta)
+        spl_fail(err, rc, "out of memory for the description of %s", path);
+    if (!meta || !p.nodes)
+        goto done;
+    memcpy(p.nodes, nodes, node_count * sizeof *nodes);
+    if ((rc = allocate(&p, node_count, chunk_count, err)) || (rc = spl_dataset_writer_create(path, &p.writer, err)))
+        goto done;
+    if (what.dictionary)
+        rc = spl_dataset_writer_set_dictionary(p.writer, what.dictionary, err);
+    for (uint32_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
+        rc = p.nodes[i].first_chunk == next
+                 ? write_node(&p, &p.nodes[i], err)
+                 : spl_fail(err, SPL_E_UNSUPPORTED, "the chunks of %s are not in the order of its nodes; pack it again",
+                            spl_dataset_get_info(what.from)->id);
+    if (!rc)
+        rc = spl_dataset_writer_finish(p.writer, p.nodes, node_count, p.chunks, chunk_count, meta, err);
+done:
+    spl_dataset_writer_destroy(p.writer);
+    json_decref(meta);
+    free(p.nodes);
+    free(p.chunks);
+    free(p.page);
+    free(p.words);
+    free(p.texture_words);
+    free(p.chunk_word);
+    return rc;
+}

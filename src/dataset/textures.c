@@ -1,0 +1,174 @@
+/* The texture sections of a dataset: what opening checks of them, and reading a page's. Codes are the only part of a
+ * file that could lead a kernel out of a buffer, so they are judged before anybody decodes them: at open of a verified
+ * dataset, at each reading of another. Opening on the opener's thread, the rest on any. */
+#include "dataset/dataset.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include <xxhash.h>
+
+#include "base/memory.h"
+#include "dataset/dictionary.h"
+#include "dataset/open.h"
+#include "dataset/texture.h"
+
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *what)
+{
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s %s; copy or pack the dataset again", dataset->path, section,
+                    what);
+}
+
+int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const struct spl_atoms_header *header = dataset->atoms;
+    struct spl_dataset_info *info = &dataset->info;
+    if (!header)
+        return SPL_OK;
+    uint64_t bytes = dataset->atoms_section->bytes;
+    if (bytes < sizeof *header)
+        return wrong(dataset, err, "ATOM", "is shorter than its header");
+    if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
+        header->reserved[1])
+        return wrong(dataset, err, "ATOM", "has a size of textures or a reserved field that version 1 does not have");
+    if (!header->count || header->count > SPL_DICTIONARY_MAX ||
+        spl_dictionary_expanded_bytes(header->count, header->size) > SPL_DICTIONARY_BYTES_MAX)
+        return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
+    uint64_t scales = header->count * sizeof(float),
+             texels = (uint64_t)header->count * spl_texture_values(header->size);
+    if (bytes != sizeof *header + scales + texels)
+        return wrong(dataset, err, "ATOM", "has a size that is not its atoms'");
+    dataset->dictionary = (struct spl_dictionary){
+        .count = header->count,
+        .size = header->size,
+        .scale = (float *)(void *)((char *)dataset->atoms + sizeof *header),
+        .texels = (int8_t *)dataset->atoms + sizeof *header + scales,
+    };
+    for (uint32_t i = 0; i < header->count; i++)
+        if (!(dataset->dictionary.scale[i] >= 0 && isfinite(dataset->dictionary.scale[i])))
+            return wrong(dataset, err, "ATOM", "has a scale that is negative or not finite");
+    if (dataset->chunk_textures_section->bytes != info->chunks * sizeof(uint32_t))
+        return wrong(dataset, err, "CTEX", "has not one word for each chunk");
+    info->atoms = header->count;
+    info->texture_size = header->size;
+    info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);
+    info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY] = 8 * bytes;
+    info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * dataset->chunk_textures_section->bytes;
+    for (uint32_t page = 0; page < info->pages; page++)
+        info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] += 8 * dataset->textures[page]->bytes;
+    return SPL_OK;
+}
+
+/* Judges the codes of every chunk of page `index`, whose textures are `words`. */
+static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
+{
+    size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_PAGE_TAIL_WORDS;
+    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
+        const struct spl_node *node = &dataset->nodes[n];
+        if (node->page != index)
+            continue;
+        for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
+            uint32_t first = dataset->chunk_textures[c];
+            if (first == SPL_TEXTURE_NONE)
+                continue;
+            const char *what = first < count ? spl_texture_judge(words + first, count - first, dataset->chunks[c].count,
+                                                                 dataset->dictionary.count)
+                                             : "starts beyond the end of the section";
+            if (what)
+                return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %u %s; pack the dataset again",
+                                dataset->info.id[0] ? dataset->info.id : dataset->path, index, c, what);
+        }
+    }
+    return SPL_OK;
+}
+
+const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset)
+{
+    return &dataset->dictionary;
+}
+
+const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset)
+{
+    return dataset->chunk_textures;
+}
+
+size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t index)
+{
+    spl_assert(index < dataset->info.pages);
+    return dataset->textures[index] ? dataset->textures[index]->bytes : 0;
+}
+
+int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err)
+{
+    const struct spl_section *section = dataset->textures[index];
+    int rc = section ? spl_dataset_read(dataset, section->offset, out, section->bytes, err) : SPL_OK;
+    if (rc || !section)
+        return rc;
+    if (!dataset->verified)
+        return judge_page(dataset, index, out, err);
+    return XXH3_64bits(out, section->bytes) == section->hash
+               ? SPL_OK
+               : spl_fail(
+                     err, SPL_E_CORRUPT,
+                     "%s: the textures of page %u were overwritten while in use; put the dataset back under another "
+                     "name and rename it",
+                     dataset->info.id, index);
+}
+
+/* Calls `visit` with the textures of one page after another. */
+static int for_each_page(const struct spl_dataset *dataset,
+                         int (*visit)(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words,
+                                      void *context, struct spl_error *err),
+                         void *context, struct spl_error *err)
+{
+    size_t most = 0;
+    for (uint32_t page = 0; page < dataset->info.pages; page++)
+        most = dataset->textures[page]->bytes > most ? dataset->textures[page]->bytes : most;
+    uint32_t *words = spl_alloc_raw(most, 1, err);
+    int rc = words ? SPL_OK : SPL_E_NOMEM;
+    for (uint32_t page = 0; page < dataset->info.pages && !rc; page++) {
+        rc = spl_dataset_read_textures(dataset, page, words, err);
+        if (!rc)
+            rc = visit(dataset, page, words, context, err);
+    }
+    free(words);
+    return rc;
+}
+
+static int judge(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,
+                 struct spl_error *err)
+{
+    (void)context;
+    return judge_page(dataset, index, words, err);
+}
+
+int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *err)
+{
+    return dataset->dictionary.count ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
+}
+
+static int count_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,
+                      struct spl_error *err)
+{
+    (void)err;
+    uint64_t *histogram = context;
+    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
+        const struct spl_node *node = &dataset->nodes[n];
+        for (uint32_t c = node->first_chunk; node->page == index && c < node->first_chunk + node->chunk_count; c++) {
+            uint32_t first = dataset->chunk_textures[c];
+            if (first == SPL_TEXTURE_NONE)
+                histogram[0] += dataset->chunks[c].count;
+            else
+                spl_texture_count(words + first, dataset->chunks[c].count, histogram);
+        }
+    }
+    return SPL_OK;
+}
+
+int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogram, struct spl_error *err)
+{
+    if (dataset->dictionary.count)
+        return for_each_page(dataset, count_page, histogram, err);
+    histogram[0] += dataset->info.splats;
+    return SPL_OK;
+}
