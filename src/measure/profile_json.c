@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 
 #define FORMAT "splatd-profile"
@@ -315,34 +316,6 @@ json_t *spl_profile_to_json(const struct spl_profile *profile)
                      (int)profile->width, "height", (int)profile->height, "points", points);
 }
 
-static int write_bytes(const char *path, const char *bytes, size_t length, struct spl_error *err)
-{
-    char *part = NULL;
-    if (asprintf(&part, "%s.XXXXXX", path) < 0)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of '%s'", path);
-    int rc = 0, fd = mkostemp(part, O_CLOEXEC);
-    mode_t mask = umask(0);
-    umask(mask);
-    if (fd < 0) {
-        rc = spl_fail_errno(err, errno, "cannot make a file beside '%s'", path);
-        goto done;
-    }
-    FILE *file = fdopen(fd, "w");
-    bool written =
-        file && fwrite(bytes, 1, length, file) == length && !fflush(file) && !fsync(fd) && !fchmod(fd, 0666 & ~mask);
-    if (!written || rename(part, path)) {
-        rc = spl_fail_errno(err, errno, "cannot write '%s'", path);
-        unlink(part);
-    }
-    if (file)
-        fclose(file);
-    else
-        close(fd);
-done:
-    free(part);
-    return rc;
-}
-
 int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)
 {
     struct spl_profile copy = *profile, again = {0};
@@ -368,7 +341,7 @@ int spl_profile_save(const char *path, const struct spl_profile *profile, struct
     if (!text)
         spl_fail(err, SPL_E_NOMEM, "out of memory for the profile '%s'", path);
     else if (!(rc = check(&copy, path, err)) && !(rc = spl_profile_parse(text, strlen(text), path, &again, err)))
-        rc = write_bytes(path, text, strlen(text), err);
+        rc = spl_file_replace(path, text, strlen(text), err);
     spl_profile_finish(&again);
     json_decref(json);
     free(text);

@@ -12,6 +12,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
+
 int spl_output_open(struct spl_output *out, const char *directory, const char *name, const char *extension,
                     struct spl_error *err)
 {
@@ -32,15 +34,8 @@ int spl_output_open(struct spl_output *out, const char *directory, const char *n
 
 int spl_output_write(struct spl_output *out, const void *bytes, size_t count, struct spl_error *err)
 {
-    for (const char *from = bytes; count;) {
-        ssize_t wrote = write(out->fd, from, count);
-        if (wrote < 0 && errno != EINTR)
-            return spl_fail_errno(err, errno, "writing %s", out->temporary);
-        if (wrote > 0) {
-            from += wrote;
-            count -= (size_t)wrote;
-        }
-    }
+    if (spl_write_all(out->fd, bytes, count))
+        return spl_fail_errno(err, errno, "writing %s", out->temporary);
     return 0;
 }
 

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 
 /* No driver's cache of a dozen kernels comes near this; a file beyond it is not one. */
@@ -145,20 +146,10 @@ void vk_cache_save(struct vk_gpu *gpu)
     if (!gpu->cache || !gpu->cache_path[0] || vkGetPipelineCacheData(gpu->device, gpu->cache, &bytes, NULL) < 0 ||
         bytes == gpu->cache_loaded || bytes > CACHE_BYTES_MAX)
         return;
-    char temporary[sizeof gpu->cache_path + 32];
     void *data = spl_alloc_raw(bytes, 1, NULL);
-    FILE *file = NULL;
-    bool written = false;
     if (data && vkGetPipelineCacheData(gpu->device, gpu->cache, &bytes, data) == VK_SUCCESS) {
         make_folders(gpu->cache_path);
-        snprintf(temporary, sizeof temporary, "%s.%ld", gpu->cache_path, (long)getpid());
-        file = fopen(temporary, "wb");
-    }
-    if (file) {
-        written = fwrite(data, 1, bytes, file) == bytes;
-        written = !fclose(file) && written;
-        if (!written || rename(temporary, gpu->cache_path))
-            unlink(temporary);
+        spl_file_replace(gpu->cache_path, data, bytes, NULL);
     }
     free(data);
 }

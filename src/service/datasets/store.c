@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "measure/profile.h"
 
 static const char prefix[] = ".incoming-";
@@ -116,26 +117,10 @@ done:
 
 int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err)
 {
-    for (size_t done = 0; done < length;) {
-        ssize_t wrote = write(incoming->fd, (const char *)data + done, length - done);
-        if (wrote < 0 && errno == EINTR)
-            continue;
-        if (wrote < 0)
-            return fail(incoming, err, "write");
-        done += (size_t)wrote;
-        incoming->bytes += (size_t)wrote;
-    }
+    if (spl_write_all(incoming->fd, data, length))
+        return fail(incoming, err, "write");
+    incoming->bytes += length;
     return 0;
-}
-
-static int sync_folder_of(const char *path)
-{
-    char *folder = folder_of(path);
-    int fd = folder ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1, rc = fd < 0 ? -1 : fsync(fd);
-    if (fd >= 0)
-        close(fd);
-    free(folder);
-    return rc;
 }
 
 int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
@@ -154,7 +139,7 @@ int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struc
         spl_incoming_abort(incoming);
         return spl_fail(err, rc, "%s", message);
     }
-    if (rename(incoming->path, target) || sync_folder_of(target))
+    if (rename(incoming->path, target) || spl_file_sync_folder(target))
         return fail(incoming, err, "put in place");
     spl_incoming_abort(incoming); // what is left: the folder
     struct spl_catalog_files files = {0};

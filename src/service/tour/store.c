@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 #include "service/tour/tour.h"
 
@@ -19,51 +20,18 @@ bool spl_tour_name_is_valid(const char *name)
     return strlen(name) == SPL_TOUR_NAME && strspn(name, "0123456789abcdef") == SPL_TOUR_NAME;
 }
 
-static int write_all(int fd, const uint8_t *bytes, size_t length)
-{
-    while (length) {
-        ssize_t written = write(fd, bytes, length);
-        if (written < 0 && errno == EINTR)
-            continue;
-        if (written < 0)
-            return -1;
-        bytes += written;
-        length -= (size_t)written;
-    }
-    return 0;
-}
-
 int spl_tour_store_write(const char *directory, const char *name, const char *file, const void *bytes, size_t length,
                          struct spl_error *err)
 {
-    char path[4096], temporary[4096];
-    int rc = 0;
-    if (snprintf(path, sizeof path, "%s/%s/%s", directory, name, file) >= (int)sizeof path ||
-        snprintf(temporary, sizeof temporary, "%s/%s/.%s", directory, name, file) >= (int)sizeof temporary)
+    char path[4096];
+    if (snprintf(path, sizeof path, "%s/%s/%s", directory, name, file) >= (int)sizeof path)
         return spl_fail(err, SPL_E_USAGE, "the path of the tours' folder is too long");
-    char *slash = strrchr(temporary, '/');
+    char *slash = strrchr(path, '/');
     *slash = '\0';
-    if (mkdir(temporary, 0777) && errno != EEXIST)
-        return spl_fail_errno(err, errno, "%s: cannot be made", temporary);
+    if (mkdir(path, 0777) && errno != EEXIST)
+        return spl_fail_errno(err, errno, "%s: cannot be made", path);
     *slash = '/';
-    int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (fd < 0)
-        return spl_fail_errno(err, errno, "%s: cannot be written", path);
-    bool failed = write_all(fd, bytes, length) || fdatasync(fd);
-    int why = errno;
-    if (close(fd) && !failed) {
-        failed = true;
-        why = errno;
-    }
-    if (!failed && rename(temporary, path)) {
-        failed = true;
-        why = errno;
-    }
-    if (failed) {
-        rc = spl_fail_errno(err, why, "%s: cannot be written", path);
-        unlink(temporary);
-    }
-    return rc;
+    return spl_file_replace(path, bytes, length, err);
 }
 
 int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,

@@ -1,0 +1,141 @@
+/* Files as a whole or not at all: what is read after success and after every failure, what lies beside, many writers.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/file.h"
+
+enum { LONG = 300000, WRITERS = 4, ROUNDS = 20 };
+
+static char folder[] = "/tmp/splatd-file-XXXXXX";
+static char path[sizeof folder + 16];
+
+static size_t read_back(char *bytes, size_t most)
+{
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    size_t got = fread(bytes, 1, most, file);
+    fclose(file);
+    return got;
+}
+
+static int count_files(void)
+{
+    int count = 0;
+    DIR *dir = opendir(folder);
+    for (struct dirent *item; (item = readdir(dir));)
+        count += strcmp(item->d_name, ".") && strcmp(item->d_name, "..");
+    closedir(dir);
+    return count;
+}
+
+static void replaces_as_a_whole(void **state)
+{
+    (void)state;
+    char got[64];
+    mode_t mask = umask(027);
+    assert_int_equal(spl_file_replace(path, "first, and longer", 17, NULL), 0);
+    umask(mask);
+    struct stat status;
+    assert_int_equal(stat(path, &status), 0);
+    assert_int_equal(status.st_mode & 0777, 0640);
+    assert_int_equal(spl_file_replace(path, "second", 6, NULL), 0);
+    assert_int_equal(read_back(got, sizeof got), 6);
+    assert_memory_equal(got, "second", 6);
+    assert_int_equal(spl_file_replace(path, "", 0, NULL), 0);
+    assert_int_equal(read_back(got, sizeof got), 0);
+    assert_int_equal(count_files(), 1);
+    assert_int_equal(spl_file_sync_folder(path), 0);
+}
+
+static void a_failure_leaves_what_was_there(void **state)
+{
+    (void)state;
+    static char much[LONG];
+    char got[64];
+    struct spl_error err = {0};
+    assert_int_equal(spl_file_replace(path, "kept", 4, NULL), 0);
+
+    struct rlimit limit, small = {.rlim_cur = 1000};
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    small.rlim_max = limit.rlim_max;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0); /* the disk is full */
+    int rc = spl_file_replace(path, much, sizeof much, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    assert_int_not_equal(rc, 0);
+    assert_non_null(strstr(err.message, path));
+    assert_int_equal(read_back(got, sizeof got), 4);
+    assert_int_equal(count_files(), 1);
+
+    assert_int_not_equal(spl_file_replace(folder, "x", 1, &err), 0); /* a directory */
+    err = (struct spl_error){0};
+    assert_int_not_equal(spl_file_replace("/tmp/no-such-folder-of-splatd/x", "x", 1, &err), 0);
+    assert_non_null(strstr(err.message, "/tmp/no-such-folder-of-splatd/x"));
+    errno = 0;
+    assert_int_equal(spl_file_sync_folder("/tmp/no-such-folder-of-splatd/x"), -1);
+    assert_int_equal(errno, ENOENT);
+}
+
+static void *write_own_letter(void *letter)
+{
+    char *bytes = malloc(LONG);
+    memset(bytes, *(char *)letter, LONG);
+    for (int i = 0; i < ROUNDS; i++)
+        if (spl_file_replace(path, bytes, LONG, NULL))
+            break;
+    free(bytes);
+    return NULL;
+}
+
+static void writers_never_mix(void **state)
+{
+    (void)state;
+    pthread_t threads[WRITERS];
+    char letters[WRITERS], *got = malloc(LONG + 1);
+    assert_int_equal(spl_file_replace(path, "", 0, NULL), 0);
+    for (int i = 0; i < WRITERS; i++) {
+        letters[i] = (char)('a' + i);
+        assert_int_equal(pthread_create(&threads[i], NULL, write_own_letter, &letters[i]), 0);
+    }
+    for (int i = 0; i < ROUNDS; i++) {
+        size_t length = read_back(got, LONG + 1);
+        assert_true(length == 0 || length == LONG);
+        for (size_t k = 1; k < length; k++)
+            assert_int_equal(got[k], got[0]);
+    }
+    for (int i = 0; i < WRITERS; i++)
+        pthread_join(threads[i], NULL);
+    assert_int_equal(count_files(), 1);
+    free(got);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(replaces_as_a_whole),
+        cmocka_unit_test(a_failure_leaves_what_was_there),
+        cmocka_unit_test(writers_never_mix),
+    };
+    if (!mkdtemp(folder))
+        return 1;
+    snprintf(path, sizeof path, "%s/file", folder);
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    unlink(path);
+    rmdir(folder);
+    return failed;
+}
