@@ -76,18 +76,15 @@ static int set_extrinsic(struct spl_camera *camera, const double e[16], struct s
     return 0;
 }
 
-static int read_open3d_frame(struct spl_path_reader *reader, const json_t *frame, struct spl_error *err)
+int spl_path_get_open3d(const json_t *frame, struct spl_camera *camera, struct spl_error *err)
 {
     const json_t *intrinsic = json_object_get(frame, "intrinsic");
     double size[2], k[9], extrinsic[16];
-    struct spl_camera camera;
     int rc;
     if ((rc = spl_path_get_number(intrinsic, "width", &size[0], err)) ||
         (rc = spl_path_get_number(intrinsic, "height", &size[1], err)) ||
         (rc = spl_path_get_numbers(intrinsic, "intrinsic_matrix", 9, k, err)) ||
         (rc = spl_path_get_numbers(frame, "extrinsic", 16, extrinsic, err)))
-        return rc;
-    if (!reader->width && (rc = spl_path_set_size(reader, size[0], size[1], err)))
         return rc;
     for (int i = 0; i < 2; i++)
         if (!(size[i] >= 1 && size[i] <= 1e6 && size[i] == floor(size[i])))
@@ -95,14 +92,27 @@ static int read_open3d_frame(struct spl_path_reader *reader, const json_t *frame
     if (k[1] != 0 || k[2] != 0 || k[3] != 0 || k[5] != 0 || k[8] != 1)
         return spl_fail_field(err, SPL_E_INPUT, "intrinsic_matrix",
                               "intrinsic_matrix must be fx 0 0 0 fy 0 cx cy 1: by columns, without skew");
-    if ((rc = spl_path_set_fov(reader, NAN, &camera, err)) || (rc = set_extrinsic(&camera, extrinsic, err)))
+    if ((rc = set_extrinsic(camera, extrinsic, err)))
         return rc;
-    camera.width = (uint32_t)size[0];
-    camera.height = (uint32_t)size[1];
-    camera.fx = k[0];
-    camera.fy = k[4];
-    camera.cx = k[6] + 0.5; // Open3D's first pixel centre is (0, 0)
-    camera.cy = k[7] + 0.5;
+    camera->width = (uint32_t)size[0];
+    camera->height = (uint32_t)size[1];
+    camera->fx = k[0];
+    camera->fy = k[4];
+    camera->cx = k[6] + 0.5; // Open3D's first pixel centre is (0, 0)
+    camera->cy = k[7] + 0.5;
+    return 0;
+}
+
+/* The first camera's size is the path's. */
+static int read_open3d_frame(struct spl_path_reader *reader, const json_t *frame, struct spl_error *err)
+{
+    struct spl_camera camera = {0}, lens;
+    int rc = spl_path_get_open3d(frame, &camera, err);
+    if (rc || (!reader->width && (rc = spl_path_set_size(reader, camera.width, camera.height, err))) ||
+        (rc = spl_path_set_fov(reader, NAN, &lens, err)))
+        return rc;
+    camera.near = lens.near;
+    camera.far = lens.far;
     return spl_path_take(reader, &camera, NAN, err);
 }
 

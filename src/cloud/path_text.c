@@ -129,7 +129,7 @@ int spl_path_read_colmap(struct spl_path_reader *reader, const json_t *json, str
             rc = spl_source_open_bytes(&sources[i], names[i], json_string_value(text), json_string_length(text), err);
     }
     if (!rc)
-        rc = spl_view_list_read_colmap(&views, &sources[0], &sources[1], NULL, err);
+        rc = spl_view_list_read_colmap(&views, &sources[0], &sources[1], NULL, NULL, err);
     if (!rc)
         rc = spl_path_read_views(reader, &views, err);
     spl_view_list_finish(&views);

@@ -1,4 +1,5 @@
-/* Between the readers of view lists and the list itself. Inside src/cloud only. */
+/* Between the readers of view lists and the list itself. Inside src/cloud only. `photographs` NULL: views to be drawn,
+ * which are pinholes. */
 #ifndef SPL_CLOUD_VIEW_LIST_H
 #define SPL_CLOUD_VIEW_LIST_H
 
@@ -14,15 +15,45 @@ extern const struct spl_camera_limits spl_view_list_limits;
 int spl_view_list_add(struct spl_view_list *list, const char *path, const char *name, const struct spl_camera *camera,
                       const char *photograph, struct spl_error *err);
 
+/* Appends the view of image file `name`, and is called after it: without the extension, '/' as '_'. `distortion` may be
+ * NULL. `folder` NULL: no photograph is looked for. */
+int spl_view_list_add_image(struct spl_view_list *list, const char *path, const char *name,
+                            const struct spl_camera *camera, const struct spl_distortion *distortion,
+                            const char *folder, const struct spl_photograph_options *photographs,
+                            struct spl_error *err);
+
+/* Where image file `name` of the model in `folder` lies, as views.h says; the caller frees it. NULL: SPL_E_NOMEM. */
+char *spl_view_list_find(const char *folder, const char *name, const struct spl_photograph_options *photographs,
+                         struct spl_error *err);
+
+/* What becomes of the fault `why` of one view: 0 when the caller of the list goes on without it, else rc. */
+int spl_view_list_refuse(const struct spl_photograph_options *photographs, int rc, const struct spl_error *why,
+                         struct spl_error *err);
+
 /* `format` printed into memory that the caller frees; NULL and SPL_E_NOMEM on failure. */
 char *spl_view_list_print(struct spl_error *err, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-int spl_view_list_load_json(struct spl_view_list *list, const char *path, struct spl_error *err);
-int spl_view_list_load_colmap(struct spl_view_list *list, const char *folder, struct spl_error *err);
-
-/* cameras.txt and images.txt from open sources, which stay the caller's. `folder` NULL: no photographs are looked for.
- */
+/* views_colmap.c: cameras.txt and images.txt from open sources, which stay the caller's. */
+int spl_view_list_load_colmap(struct spl_view_list *list, const char *folder,
+                              const struct spl_photograph_options *photographs, struct spl_error *err);
 int spl_view_list_read_colmap(struct spl_view_list *list, struct spl_source *cameras, struct spl_source *images,
-                              const char *folder, struct spl_error *err);
+                              const char *folder, const struct spl_photograph_options *photographs,
+                              struct spl_error *err);
+
+/* views_colmap_bin.c */
+int spl_view_list_load_colmap_bin(struct spl_view_list *list, const char *folder,
+                                  const struct spl_photograph_options *photographs, struct spl_error *err);
+
+/* views_json.c: ours, transforms.json, Open3D's. */
+int spl_view_list_load_json(struct spl_view_list *list, const char *path,
+                            const struct spl_photograph_options *photographs, struct spl_error *err);
+int spl_view_list_read_transforms(struct spl_view_list *list, const char *path, const json_t *document,
+                                  const struct spl_photograph_options *photographs, struct spl_error *err);
+int spl_view_list_read_open3d(struct spl_view_list *list, const char *path, const json_t *document,
+                              const struct spl_photograph_options *photographs, struct spl_error *err);
+
+/* views_poses.c */
+int spl_view_list_load_poses(struct spl_view_list *list, const char *folder,
+                             const struct spl_photograph_options *photographs, struct spl_error *err);
 
 #endif

@@ -1,4 +1,4 @@
-/* The list of views, and its JSON.
+/* The list of views, and which reader a file or a folder belongs to.
  *
  * Names become parts of file names (DIR/truth/NAME.color.png), so that they are checked here, once, for every reader:
  * nothing that reaches a caller can leave a folder or hide a file. Duplicates are found by sorting when the list is
@@ -11,13 +11,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include <jansson.h>
-
 #include "base/memory.h"
-#include "cloud/source.h"
 #include "cloud/view_list.h"
-
-enum { json_bytes_max = 64 << 20 };
 
 const struct spl_camera_limits spl_view_list_limits = {.side_px = 65535, .pixels = 64 << 20};
 
@@ -91,105 +86,92 @@ static int check_names(const struct spl_view_list *list, const char *path, struc
     return rc;
 }
 
-static int add_json(struct spl_view_list *list, const char *path, json_t *view, struct spl_error *err)
+int spl_view_list_refuse(const struct spl_photograph_options *photographs, int rc, const struct spl_error *why,
+                         struct spl_error *err)
 {
-    static const char *const others[] = {"name", "photograph", "camera", NULL};
-    const json_t *name = json_object_get(view, "name"), *photograph = json_object_get(view, "photograph");
-    struct spl_camera camera;
-    struct spl_error why = {0};
-    if (json_is_object(view) && !json_is_string(name))
-        return spl_fail_field(err, SPL_E_INPUT, "name", "%s: view %zu: name must be text, not %s", path,
-                              list->count + 1, spl_json_type_name(name));
-    if (photograph && !json_is_string(photograph))
-        return spl_fail_field(err, SPL_E_INPUT, "photograph", "%s: view %zu: photograph must be text, not %s", path,
-                              list->count + 1, spl_json_type_name(photograph));
-    int rc = spl_camera_from_json(view, others, NULL, &spl_view_list_limits, &camera, &why);
-    if (rc)
-        return spl_fail_field(err, rc, why.field, "%s: view %zu%s%.100s%s: %s", path, list->count + 1,
-                              name ? " ('" : "", name ? json_string_value(name) : "", name ? "')" : "", why.message);
-    const char *text = photograph ? json_string_value(photograph) : NULL, *slash = strrchr(path, '/');
-    char *full = NULL;
-    if (text && text[0] != '/' && slash) {
-        full = spl_view_list_print(err, "%.*s/%s", (int)(slash - path), path, text);
-        if (!full)
-            return SPL_E_NOMEM;
-        text = full;
-    }
-    rc = spl_view_list_add(list, path, json_string_value(name), &camera, text, err);
-    free(full);
-    return rc;
+    if (!rc || !photographs || !photographs->refuse || rc == SPL_E_NOMEM)
+        return rc ? spl_fail_field(err, rc, why->field, "%s", why->message) : SPL_OK;
+    photographs->refuse(photographs->context, why);
+    return SPL_OK;
 }
 
-/* jansson reads streams too, but not with a limit on what it takes in. */
-static int read_all(const char *path, char **text, size_t *length, struct spl_error *err)
-{
-    struct spl_source source;
-    int rc = spl_source_open(&source, path, err);
-    if (rc)
-        return rc;
-    if (source.size > json_bytes_max) {
-        rc = spl_source_fail(&source, SPL_E_LIMIT, "", err, "%llu bytes; a list of views has at most %d",
-                             (unsigned long long)source.size, json_bytes_max);
-        goto done;
-    }
-    *text = spl_alloc_raw(source.size, 1, err);
-    if (!*text) {
-        rc = SPL_E_NOMEM;
-        goto done;
-    }
-    for (*length = 0; *length < source.size;) {
-        const uint8_t *bytes;
-        size_t available = 0, left = source.size - *length;
-        rc = spl_source_peek(&source, left < SPL_SOURCE_WINDOW ? left : SPL_SOURCE_WINDOW, &bytes, &available, err);
-        if (rc < 0 || !available)
-            break;
-        available = available < left ? available : left;
-        memcpy(*text + *length, bytes, available);
-        spl_source_take(&source, available);
-        *length += available;
-    }
-    rc = rc < 0 ? rc : SPL_OK;
-done:
-    spl_source_close(&source);
-    return rc;
-}
-
-int spl_view_list_load_json(struct spl_view_list *list, const char *path, struct spl_error *err)
-{
-    char *text = NULL;
-    size_t length = 0;
-    json_t *document = NULL, *views;
-    json_error_t where;
-    int rc = read_all(path, &text, &length, err);
-    if (rc)
-        goto done;
-    document = json_loadb(text, length, JSON_REJECT_DUPLICATES, &where);
-    views = json_object_get(document, "views");
-    if (!document) {
-        rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", path, where.line, where.column,
-                      where.text);
-        goto done;
-    }
-    if (!json_is_array(views)) {
-        rc = spl_fail_field(err, SPL_E_INPUT, "views",
-                            "%s: a list of views is {\"views\": [{\"name\": …, \"camera\": {…}}]}; views is %s", path,
-                            spl_json_type_name(views));
-        goto done;
-    }
-    for (size_t i = 0; !rc && i < json_array_size(views); i++)
-        rc = add_json(list, path, json_array_get(views, i), err);
-done:
-    json_decref(document);
-    free(text);
-    return rc;
-}
-
-int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_error *err)
+static bool is_file(const char *path)
 {
     struct stat status;
-    bool folder = !stat(path, &status) && S_ISDIR(status.st_mode);
+    return !stat(path, &status) && S_ISREG(status.st_mode);
+}
+
+char *spl_view_list_find(const char *folder, const char *name, const struct spl_photograph_options *photographs,
+                         struct spl_error *err)
+{
+    static const char *const places[] = {"images/", "../images/", "../../images/", ""};
+    const char *images = photographs ? photographs->images : NULL, *last = strrchr(name, '/');
+    char *path = NULL;
+    for (int i = 0; images && i < 2; i++) {
+        free(path);
+        path = spl_view_list_print(err, "%s/%s", images, i && last ? last + 1 : name);
+        if (!path || is_file(path))
+            return path;
+    }
+    free(path);
+    for (int i = 0; i < 4 && !images; i++) {
+        path = spl_view_list_print(err, "%s/%s%s", folder, places[i], name);
+        if (!path || is_file(path))
+            return path;
+        free(path);
+    }
+    return spl_view_list_print(err, "%s/%s%s", images ? images : folder, images ? "" : places[0], name);
+}
+
+int spl_view_list_add_image(struct spl_view_list *list, const char *path, const char *name,
+                            const struct spl_camera *camera, const struct spl_distortion *distortion,
+                            const char *folder, const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    char *photograph = NULL, *view = NULL;
+    int rc = SPL_E_NOMEM;
+    while (!strncmp(name, "./", 2))
+        name += 2;
+    if ((folder && !(photograph = spl_view_list_find(folder, name, photographs, err))) ||
+        !(view = spl_view_list_print(err, "%s", name)))
+        goto done;
+    char *dot = strrchr(view, '.'), *slash = strrchr(view, '/');
+    if (dot && dot > (slash ? slash + 1 : view))
+        *dot = 0;
+    for (char *c = view; *c; c++)
+        *c = *c == '/' ? '_' : *c;
+    rc = spl_view_list_add(list, path, view, camera, photograph, err);
+    if (!rc && distortion)
+        list->views[list->count - 1].distortion = *distortion;
+done:
+    free(photograph);
+    free(view);
+    return rc;
+}
+
+static bool has(const char *folder, const char *name)
+{
+    char path[4096];
+    return snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path && is_file(path);
+}
+
+static int load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *photographs,
+                struct spl_error *err)
+{
+    struct stat status;
+    if (stat(path, &status) || !S_ISDIR(status.st_mode))
+        return spl_view_list_load_json(list, path, photographs, err);
+    if (has(path, "cameras.bin"))
+        return spl_view_list_load_colmap_bin(list, path, photographs, err);
+    if (has(path, "camera-intrinsics.txt"))
+        return spl_view_list_load_poses(list, path, photographs, err);
+    return spl_view_list_load_colmap(list, path, photographs, err);
+}
+
+int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
+                                   const struct spl_photograph_options *options, struct spl_error *err)
+{
     *list = (struct spl_view_list){0};
-    int rc = folder ? spl_view_list_load_colmap(list, path, err) : spl_view_list_load_json(list, path, err);
+    int rc = load(list, path, options, err);
     if (!rc && !list->count)
         rc = spl_fail_field(err, SPL_E_INPUT, "views", "%s holds no view", path);
     if (!rc)
@@ -197,6 +179,11 @@ int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_
     if (rc)
         spl_view_list_finish(list);
     return rc;
+}
+
+int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_error *err)
+{
+    return spl_view_list_load_photographs(list, path, NULL, err);
 }
 
 void spl_view_list_finish(struct spl_view_list *list)

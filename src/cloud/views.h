@@ -7,9 +7,19 @@
  * Each camera must give its pose and its intrinsics; `near` is 0.01 and `far` infinite where they are left out.
  * `photograph` may be left out; its path is taken from the JSON file's folder.
  *
- * COLMAP: a folder with cameras.txt (SIMPLE_PINHOLE, PINHOLE; those with distortion are taken when it is 0) and
- * images.txt. A view is called after its image without the extension, '/' becoming '_'. Its photograph is NAME in the
- * first of FOLDER/images, FOLDER/../images and FOLDER/../../images that has it, otherwise FOLDER/images/NAME. */
+ * COLMAP: a folder with cameras.bin and images.bin, or cameras.txt and images.txt. A view is called after its image
+ * without the extension, '/' becoming '_'. Its photograph is NAME in the first of FOLDER/images, FOLDER/../images and
+ * FOLDER/../../images that has it, otherwise FOLDER/images/NAME.
+ *
+ * transforms.json of nerfstudio and instant-ngp: frames[].file_path (beside the JSON) and transform_matrix, camera to
+ * world, OpenGL axes; lenses for all or by frame; an applied_transform is not undone: the scan must lie in the poses'
+ * coordinates. Open3D's PinholeCameraTrajectory: photographs are the images of its folder's color, image, rgb or images
+ * (or of `images`), in the order of their names, one a camera.
+ *
+ * Pose folders: camera-intrinsics.txt (3 x 3; the first pixel's centre is (0, 0)), NAME.pose.txt (4 x 4, camera to
+ * world, z forward) beside NAME.color.jpg or .png; the photographs say their own size.
+ *
+ * A view is drawn as a pinhole: those with distortion are taken when it is 0. Photographs keep their lens. */
 #ifndef SPL_CLOUD_VIEWS_H
 #define SPL_CLOUD_VIEWS_H
 
@@ -18,6 +28,7 @@
 #include <splatd/camera.h>
 
 #include "base/error.h"
+#include "geom/distortion.h"
 
 enum {
     SPL_VIEW_NAME_MAX = 100,  /* bytes */
@@ -27,7 +38,8 @@ enum {
 struct spl_named_view {
     char *name; /* unique; part of file names: no '/', no control character, no '.' in front */
     struct spl_camera camera;
-    char *photograph; /* path; may be NULL */
+    struct spl_distortion distortion; /* NONE but for photographs */
+    char *photograph;                 /* path; may be NULL */
 };
 
 struct spl_view_list {
@@ -40,6 +52,20 @@ struct spl_view_list {
  * name file, view and field; SPL_E_IO or SPL_E_NOT_FOUND for files that cannot be read. Any thread; blocks for the
  * reading. */
 int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_error *err);
+
+struct spl_photograph_options {
+    const char *images; /* folder that NAME, or its last part, is looked for in instead; may be NULL */
+    /* The size of an image file, for poses that come without; may be NULL: those are refused. */
+    int (*get_size)(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err);
+    /* Called for each photograph whose pose or lens is at fault, which is then left out; NULL: the first one fails. */
+    void (*refuse)(void *context, const struct spl_error *why);
+    void *context;
+};
+
+/* The same list as photographs with their lenses: each view has its path, which may not exist, and COLMAP's models
+ * SIMPLE_PINHOLE to FULL_OPENCV, SIMPLE_RADIAL_FISHEYE and RADIAL_FISHEYE are taken. */
+int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
+                                   const struct spl_photograph_options *options, struct spl_error *err);
 
 /* Takes NULL and zeroed lists. */
 void spl_view_list_finish(struct spl_view_list *list);

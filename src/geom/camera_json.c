@@ -56,7 +56,7 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
     int choice = axes ? axes_from_name(text) : spl_colmap_model_from_name(text);
     if (choice < 0)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, text,
-                              axes ? "opengl, opencv" : "SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV");
+                              axes ? "opengl, opencv" : spl_colmap_model_names);
     value->n[0] = choice;
     return 0;
 }

@@ -10,6 +10,7 @@
 #include <splatd/camera.h>
 
 #include "base/error.h"
+#include "geom/distortion.h"
 
 enum spl_value_kind {
     SPL_KIND_NUMBER,
@@ -83,9 +84,15 @@ int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], con
 int spl_camera_from_json(json_t *view, const char *const *others, const struct spl_camera_defaults *defaults,
                          const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
-/* COLMAP's models by number, -1 for an unknown name; their parameters to fx, fy, cx, cy. Distortion other than 0 is
- * refused. */
+/* COLMAP's models by its own number, -1 for a name that is not taken; `names` lists those that are. */
 int spl_colmap_model_from_name(const char *name);
-int spl_colmap_apply(int model, const struct spl_value *params, struct spl_camera *camera, struct spl_error *err);
+extern const char spl_colmap_model_names[];
+
+/* The name of a model, taken or not, and how many parameters it has; NULL for a number that is not known. */
+const char *spl_colmap_model_from_id(int64_t id, unsigned *count);
+
+/* Parameters to fx, fy, cx, cy and the lens. `distortion` NULL: a lens that is no pinhole is refused. */
+int spl_colmap_apply(int model, const struct spl_value *params, struct spl_camera *camera,
+                     struct spl_distortion *distortion, struct spl_error *err);
 
 #endif

@@ -72,7 +72,7 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
                 return conflict(pinhole[i], SPL_CAMERA_params, err);
         if (given(v, SPL_CAMERA_fov))
             return conflict(SPL_CAMERA_fov, SPL_CAMERA_params, err);
-        return spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, err);
+        return spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, NULL, err);
     }
     if (given(v, SPL_CAMERA_fov) && given(v, SPL_CAMERA_fx))
         return conflict(SPL_CAMERA_fov, SPL_CAMERA_fx, err);

@@ -1,0 +1,222 @@
+/* Photographs of nerfstudio, instant-ngp and Open3D.
+ *
+ * Their matrices go through spl_camera_set_matrix(), so that mirrored and scaled poses are refused by name. Any thread;
+ * no state. */
+#include <dirent.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "cloud/path_reader.h"
+#include "cloud/view_list.h"
+
+/* A lens value of the frame, or of all frames. */
+static const json_t *get(const json_t *document, const json_t *frame, const char *name)
+{
+    const json_t *own = json_object_get(frame, name);
+    return own ? own : json_object_get(document, name);
+}
+
+static int get_real(const json_t *document, const json_t *frame, const char *name, double otherwise, double *out,
+                    struct spl_error *err)
+{
+    const json_t *json = get(document, frame, name);
+    if (json && !json_is_number(json))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be a number, not %s", name, spl_json_type_name(json));
+    *out = json ? json_number_value(json) : otherwise;
+    return SPL_OK;
+}
+
+/* COLMAP's names are nerfstudio's; instant-ngp says is_fisheye instead. */
+static int get_model(const json_t *document, const json_t *frame, struct spl_distortion *distortion,
+                     struct spl_error *err)
+{
+    const json_t *json = get(document, frame, "camera_model");
+    const char *name = json_is_string(json) ? json_string_value(json) : "OPENCV";
+    static const char *const kinds[][2] = {{"OPENCV_FISHEYE", "fisheye"}, {"OPENCV", "radial"}};
+    if (json_is_true(get(document, frame, "is_fisheye")))
+        name = kinds[0][0];
+    if (json && !json_is_string(json))
+        return spl_fail_field(err, SPL_E_INPUT, "camera_model", "camera_model must be text, not %s",
+                              spl_json_type_name(json));
+    distortion->kind = !strcmp(name, kinds[0][0]) ? SPL_DISTORTION_FISHEYE : SPL_DISTORTION_RADIAL;
+    if (distortion->kind == SPL_DISTORTION_FISHEYE || spl_colmap_model_from_name(name) >= 0)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_UNSUPPORTED, "camera_model", "camera_model '%.32s' is not known; known are %s",
+                          name, spl_colmap_model_names);
+}
+
+static int get_lens(const json_t *document, const json_t *frame, struct spl_camera *camera,
+                    struct spl_distortion *distortion, struct spl_error *err)
+{
+    static const char *const k[] = {"k1", "k2", "k3", "k4"}, *const p[] = {"p1", "p2"};
+    double w = 0, h = 0, angle = NAN;
+    int rc;
+    if ((rc = get_real(document, frame, "w", 0, &w, err)) || (rc = get_real(document, frame, "h", 0, &h, err)) ||
+        (rc = get_real(document, frame, "camera_angle_x", NAN, &angle, err)))
+        return rc;
+    const double limit = spl_view_list_limits.side_px, size[2] = {w, h};
+    for (int i = 0; i < 2; i++)
+        if (!(size[i] >= 1 && size[i] <= limit && size[i] == floor(size[i])) ||
+            w * h > (double)spl_view_list_limits.pixels)
+            return spl_fail_field(err, SPL_E_INPUT, i ? "h" : "w", "an image of w %g and h %g pixels", w, h);
+    camera->width = (uint32_t)w;
+    camera->height = (uint32_t)h;
+    if ((rc = get_real(document, frame, "fl_x", w / 2 / tan(angle / 2), &camera->fx, err)) ||
+        (rc = get_real(document, frame, "fl_y", camera->fx, &camera->fy, err)) ||
+        (rc = get_real(document, frame, "cx", w / 2, &camera->cx, err)) ||
+        (rc = get_real(document, frame, "cy", h / 2, &camera->cy, err)))
+        return rc;
+    if (isnan(camera->fx))
+        return spl_fail_field(err, SPL_E_INPUT, "fl_x", "neither fl_x nor camera_angle_x says the focal length");
+    if ((rc = get_model(document, frame, distortion, err)))
+        return rc;
+    for (int i = 0; !rc && i < 4; i++)
+        rc = get_real(document, frame, k[i], 0, &distortion->k[i], err);
+    for (int i = 0; !rc && i < 2; i++)
+        rc = get_real(document, frame, p[i], 0, &distortion->p[i], err);
+    if (!rc && distortion->kind == SPL_DISTORTION_RADIAL && distortion->k[3] != 0)
+        rc =
+            spl_fail_field(err, SPL_E_UNSUPPORTED, "k4", "k4 %g of a lens that is no OPENCV_FISHEYE", distortion->k[3]);
+    return rc ? rc : spl_distortion_init(distortion, err);
+}
+
+static int get_matrix(const json_t *frame, double matrix[16], struct spl_error *err)
+{
+    const json_t *rows = json_object_get(frame, "transform_matrix");
+    for (size_t i = 0; i < 16; i++) {
+        const json_t *number = json_array_get(json_array_get(rows, i / 4), i % 4);
+        if (!json_is_number(number) || json_array_size(rows) != 4 || json_array_size(json_array_get(rows, i / 4)) != 4)
+            return spl_fail_field(err, SPL_E_INPUT, "transform_matrix",
+                                  "transform_matrix must be 4 rows of 4 numbers; row %zu, column %zu is %s", i / 4 + 1,
+                                  i % 4 + 1, spl_json_type_name(number));
+        matrix[i] = json_number_value(number);
+    }
+    return SPL_OK;
+}
+
+/* Blender's exporter leaves the extension out. */
+static int add_frame(struct spl_view_list *list, const char *path, const char *folder, const json_t *document,
+                     const json_t *frame, const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    struct spl_distortion distortion = {0};
+    struct spl_error why = {0};
+    double matrix[16];
+    const char *file = json_string_value(json_object_get(frame, "file_path"));
+    int rc;
+    if (!file || !*file)
+        return spl_fail_field(err, SPL_E_INPUT, "file_path", "file_path must be text, not %s",
+                              file ? "empty" : spl_json_type_name(json_object_get(frame, "file_path")));
+    if ((rc = get_lens(document, frame, &camera, &distortion, err)) || (rc = get_matrix(frame, matrix, err)))
+        return rc;
+    if ((rc = spl_camera_set_matrix(&camera, matrix, SPL_AXES_OPENGL, &why)))
+        return spl_fail_field(err, rc, "transform_matrix", "transform_matrix: %s", why.message);
+    if (!photographs && distortion.kind != SPL_DISTORTION_NONE)
+        return spl_fail_field(err, SPL_E_INPUT, "k1", "the lens is distorted; only pinholes are drawn");
+    if ((rc = spl_camera_check(&camera, err)))
+        return rc;
+    const char *slash = strrchr(file, '/'), *dot = strrchr(file, '.');
+    char *whole = spl_view_list_print(err, "%s%s", file, dot && dot > (slash ? slash : file) ? "" : ".png");
+    rc = whole ? spl_view_list_add_image(list, path, whole, &camera, &distortion, folder, photographs, err)
+               : SPL_E_NOMEM;
+    free(whole);
+    return rc;
+}
+
+static char *folder_of(const char *path, struct spl_error *err)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? spl_view_list_print(err, "%.*s", (int)(slash - path) + (slash == path), path)
+                 : spl_view_list_print(err, ".");
+}
+
+int spl_view_list_read_transforms(struct spl_view_list *list, const char *path, const json_t *document,
+                                  const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    const json_t *frames = json_object_get(document, "frames");
+    if (!json_is_array(frames))
+        return spl_fail_field(err, SPL_E_INPUT, "frames", "%s: frames must be an array, not %s", path,
+                              spl_json_type_name(frames));
+    char *folder = folder_of(path, err);
+    int rc = folder ? SPL_OK : SPL_E_NOMEM;
+    for (size_t i = 0; !rc && i < json_array_size(frames); i++) {
+        struct spl_error why = {0}, place = {0};
+        if (!(rc = add_frame(list, path, folder, document, json_array_get(frames, i), photographs, &why)))
+            continue;
+        spl_fail_field(&place, rc, why.field, "%s: frames[%zu]: %s", path, i, why.message);
+        rc = spl_view_list_refuse(photographs, rc, &place, err);
+    }
+    free(folder);
+    return rc;
+}
+
+static int is_image(const struct dirent *entry)
+{
+    const char *dot = strrchr(entry->d_name, '.');
+    return entry->d_name[0] != '.' && dot &&
+           (!strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".png"));
+}
+
+/* The images that belong to a trajectory: of `images`, else of the folder that has its customary name. */
+static int list_images(const char *folder, const struct spl_photograph_options *photographs, char **found,
+                       struct dirent ***entries, int *count, struct spl_error *err)
+{
+    static const char *const places[] = {"/color", "/image", "/rgb", "/images"};
+    *count = -1;
+    for (int i = 0; i < 4 && *count < 0; i++) {
+        free(*found);
+        *found = photographs && photographs->images ? spl_view_list_print(err, "%s", photographs->images)
+                                                    : spl_view_list_print(err, "%s%s", folder, places[i]);
+        if (!*found)
+            return SPL_E_NOMEM;
+        *count = scandir(*found, entries, is_image, alphasort);
+    }
+    return *count >= 0
+               ? SPL_OK
+               : spl_fail(err, SPL_E_NOT_FOUND,
+                          "%s: a trajectory names no photographs, and there is no folder of them: name it", *found);
+}
+
+static int add_open3d(struct spl_view_list *list, const char *path, const char *folder, const char *image,
+                      const json_t *frame, const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    struct spl_photograph_options here = photographs ? *photographs : (struct spl_photograph_options){0};
+    int rc = spl_path_get_open3d(frame, &camera, err);
+    if (!rc)
+        rc = spl_camera_check(&camera, err);
+    if (!rc && (uint64_t)camera.width * camera.height > spl_view_list_limits.pixels)
+        rc = spl_fail_field(err, SPL_E_LIMIT, "width", "%u x %u pixels; the limit is %llu", camera.width, camera.height,
+                            (unsigned long long)spl_view_list_limits.pixels);
+    here.images = folder;
+    return rc ? rc : spl_view_list_add_image(list, path, image, &camera, NULL, folder, &here, err);
+}
+
+int spl_view_list_read_open3d(struct spl_view_list *list, const char *path, const json_t *document,
+                              const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    const json_t *frames = json_object_get(document, "parameters");
+    char *folder = folder_of(path, err), *found = NULL;
+    struct dirent **entries = NULL;
+    int count = 0, rc = folder ? list_images(folder, photographs, &found, &entries, &count, err) : SPL_E_NOMEM;
+    if (!rc && (!json_is_array(frames) || json_array_size(frames) != (size_t)count))
+        rc = spl_fail_field(err, SPL_E_INPUT, "parameters",
+                            "%s: parameters is %s of %zu cameras; %s holds %d photographs, and they must be as many",
+                            path, spl_json_type_name(frames), json_array_size(frames), found, count);
+    for (int i = 0; !rc && i < count; i++) {
+        struct spl_error why = {0}, place = {0};
+        if (!(rc = add_open3d(list, path, found, entries[i]->d_name, json_array_get(frames, (size_t)i), photographs,
+                              &why)))
+            continue;
+        spl_fail_field(&place, rc, why.field, "%s: parameters[%d]: %s", path, i, why.message);
+        rc = spl_view_list_refuse(photographs, rc, &place, err);
+    }
+    for (int i = 0; entries && i < count; i++)
+        free(entries[i]);
+    free(entries);
+    free(found);
+    free(folder);
+    return rc;
+}
