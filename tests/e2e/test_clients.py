@@ -149,28 +149,31 @@ def test_tokens():
                 assert error.status == 401
 
 
-def test_the_examples_of_the_readme():
-    text = (CLIENTS / "README.md").read_text()
-    [program] = re.findall(r"```python\n(.*?)```", text, re.S)
-    assert program.count("\n") < 15
-    with Daemon(REAL) as d, tempfile.TemporaryDirectory() as folder:
-        program = (
-            program.replace("http://127.0.0.1:8080", url(d))
-            .replace('"hall"', '"wall"')
-            .replace("1280", "64")
-            .replace("720", "48")
-        )
-        subprocess.run(
-            [sys.executable, "-c", program],
-            check=True,
-            cwd=folder,
-            timeout=120,
-            env={**os.environ, "PYTHONPATH": str(CLIENTS)},
-        )
-        views = {file.read_bytes() for file in pathlib.Path(folder).glob("view*.jpg")}
-        assert len(views) == 36 and all(view.startswith(JPEG) for view in views)
-        for address in re.findall(r'src="http://127\.0\.0\.1:8080(/[^"#]*)', text):
-            assert d.ask(address.replace("hall", "wall")).status == 200, address
+def test_the_examples_of_the_readmes():
+    with Daemon(REAL) as d, tempfile.TemporaryDirectory() as client:
+        served = d.ask("/clients/splatd.py")
+        (pathlib.Path(client) / "splatd.py").write_bytes(served.body)
+        for readme in (CLIENTS / "README.md", CLIENTS.parents[1] / "README.md"):
+            text = readme.read_text()
+            [program] = re.findall(r"```python\n(.*?)```", text, re.S)
+            assert program.count("\n") < 15
+            for there, here in ("http://127.0.0.1:8080", url(d)), ('"hall"', '"wall"'), ("1280", "64"), ("720", "48"):
+                assert there in program, (readme, there)
+                program = program.replace(there, here)
+            with tempfile.TemporaryDirectory() as folder:
+                subprocess.run(
+                    [sys.executable, "-c", program],
+                    check=True,
+                    cwd=folder,
+                    timeout=120,
+                    env={**os.environ, "PYTHONPATH": client},
+                )
+                views = {file.read_bytes() for file in pathlib.Path(folder).glob("view*.jpg")}
+            assert len(views) == 36 and all(view.startswith(JPEG) for view in views), readme
+            images = re.findall(r'src="http://127\.0\.0\.1:8080(/[^"#]*)', text)
+            assert images
+            for address in images:
+                assert d.ask(address.replace("hall", "wall")).status == 200, address
 
 
 def test_notebook_and_dashboard():
