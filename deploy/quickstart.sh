@@ -41,7 +41,7 @@ dir=$(cd "$dir" && pwd)
 build=$dir/build splatd=$dir/build/src/splatd scan=$dir/scan dataset=$dir/courtyard.spld
 
 say "packages"
-"$top/deploy/install-packages.sh" build run
+"$top/deploy/install-packages.sh" build run quickstart
 
 say "build"
 [ -f "$build/build.ninja" ] || meson setup "$build" "$top" -Dtests=false >"$dir/setup.log" 2>&1 ||

@@ -80,10 +80,10 @@ sanitiser_runs() {
     gcc -fsanitize="$sanitiser" "$out/probe.c" -o "$out/probe" && "$@" "$out/probe" >/dev/null 2>&1
 }
 
-deploy/install-packages.sh build run test
+deploy/install-packages.sh build run quickstart test
 
 if build normal gcc $strict; then
-    suites normal rules unit gpu golden fuzz http e2e fault stability
+    suites normal rules unit gpu golden fuzz http deploy e2e fault stability
 fi
 if [ "$mode" = --quick ]; then
     finish

@@ -115,7 +115,8 @@ static void print_tours(FILE *out, const struct spl_tours *tours)
     unsigned count[SPL_TOUR_FAILED + 1] = {0};
     const struct spl_tour *tour;
     if (tours) {
-        TAILQ_FOREACH(tour, &tours->all, link) {
+        TAILQ_FOREACH(tour, &tours->all, link)
+        {
             count[tour->state]++;
         }
     }
