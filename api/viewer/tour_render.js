@@ -49,7 +49,17 @@ export function renderTours(tour, say) {
 
   $("render").addEventListener("click", async () => {
     const {layer, method, lod, supersample} = tour.stage.settings; // one setting for all frames: no budget
-    const settings = {layer, method, lod: Number(lod), supersample: Number(supersample), format: "jpeg"};
+    const [width, height] = [$("tour-width"), $("tour-height")];
+    if (![width, height].every((input) => input.reportValidity())) return;
+    const settings = {
+      layer,
+      method,
+      lod: Number(lod),
+      supersample: Number(supersample),
+      format: "jpeg",
+      width: Number(width.value),
+      height: Number(height.value),
+    };
     const body = JSON.stringify({path: tour.document(), settings, video: $("video").value === "mp4"});
     try {
       const reply = await ask(`${tour.stage.dataset.uri}/tours`, {

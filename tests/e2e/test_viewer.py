@@ -435,8 +435,20 @@ def test_the_service_renders_tours():
             moved(tab, start)
             tab.press_on("#add")
             tab.choose("#keyframes li:first-child input", "0.3")
+            assert [tab.run(f"document.querySelector('#tour-{side}').value") for side in ("width", "height")] == ["1280", "720"]
+            for side, value in (("width", "9000"), ("height", "")):
+                before = tab.run(f"document.querySelector('#tour-{side}').value")
+                tab.choose(f"#tour-{side}", value)
+                tab.press_on("#render")
+                assert tab.run("document.activeElement.id") == f"tour-{side}", "what is wrong is pointed at"
+                tab.choose(f"#tour-{side}", before)
+            assert not d.ask("/v1/tours").json()["tours"]
+            tab.choose("#tour-width", "320")
+            tab.choose("#tour-height", "180")
             tab.press_on("#render")
             tab.until("!document.querySelector('#result').hidden")
+            [made] = d.ask("/v1/tours").json()["tours"]
+            assert (made["width"], made["height"]) == (320, 180)
             frames = int(re.fullmatch(r"(\d+) frames are ready", tab.text("#far")).group(1))
             assert 9 <= frames <= 10 and tab.run("document.querySelector('#progress').hidden")
             tab.press_on("#result")
