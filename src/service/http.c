@@ -1,11 +1,13 @@
 /* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer,
  * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
- * Limits: the connection pool bounds request line and headers together; the request line has its own, smaller bound, so
- * that our 414 answers it. Bodies past body_max are read and dropped up to drain_max, because a client that is cut off
- * while sending seldom reads the reply. Phases of a connection have time limits of their own, which trickling bytes
- * does not extend. A PUT is routed before its body, which change_route.c takes whatever its size. Invariant: a
- * suspended request is in `waiting`, or has a change. Owned by the loop's thread. */
+ * Limits: the connection pool bounds request line, headers and the reply's headers together; the first two have smaller
+ * bounds, so that our 414 and 431 answer them. libmicrohttpd writes zeros over the whole pool between requests, so all
+ * of it is resident on every idle connection and costs time with every request: it is small. Bodies past body_max are
+ * read and dropped up to drain_max, because a client that is cut off while sending seldom reads the reply. Phases of a
+ * connection have time limits of their own, which trickling bytes does not extend. A PUT is routed before its body,
+ * which change_route.c takes whatever its size. Invariant: a suspended request is in `waiting`, or has a change. Owned
+ * by the loop's thread. */
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,8 +21,10 @@
 #include "service/state.h"
 
 enum {
-    connection_memory = 128 * 1024,
-    parameters_max = 256,
+    connection_memory = 14 * 1024,
+    value_memory = 64,       /* of the pool, for each header, parameter and cookie beside its text */
+    reply_memory = 2 * 1024, /* of the pool, for a reply's headers */
+    parameters_max = 64,
     drain_max = 8 * body_max,
     idle_s = 30,
     slow_sweep_ms = 500,
@@ -70,29 +74,51 @@ static void on_connection(void *context, struct MHD_Connection *handle, void **s
     *socket_context = connection;
 }
 
-/* libmicrohttpd 0.9.75 falls silent when the parameters of a query do not fit its pool, so a request with more than any
- * view has is answered past it, right on the socket, and the connection ended. */
-static bool refuse_many_parameters(struct request *request, const char *uri)
+/* libmicrohttpd 0.9.75 falls silent when the parameters of a query, or a reply's headers, do not fit what is left of
+ * its pool, so such a request is answered past it, right on the socket, and the connection ended. `detail` needs no
+ * quoting.
+ */
+static void refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
 {
-    static const char body[] =
-        "{\"type\": \"urn:splatd:error:limit\", \"title\": \"URI Too Long\", \"status\": 414, \"detail\": "
-        "\"the URL has too many parameters\", \"instance\": \"urn:splatd:request:%s\", \"field\": \"url\"}";
-    unsigned count = 0;
-    for (; *uri && count <= parameters_max; uri++)
-        count += *uri == '&';
-    if (count <= parameters_max)
-        return false;
-    char text[sizeof body + sizeof request->id], reply[sizeof text + 256];
-    int length = snprintf(text, sizeof text, body, request->id);
+    char text[512], reply[sizeof text + 256];
+    const char *title = MHD_get_reason_phrase_for(status);
+    int length =
+        snprintf(text, sizeof text,
+                 "{\"type\": \"urn:splatd:error:limit\", \"title\": \"%s\", \"status\": %u, \"detail\": \"%s\", "
+                 "\"instance\": \"urn:splatd:request:%s\", \"field\": \"%s\"}",
+                 title, status, detail, request->id, field);
     length = snprintf(reply, sizeof reply,
-                      "HTTP/1.1 414 URI Too Long\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
+                      "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
                       "X-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
-                      request->id, length, text);
-    request->status = MHD_HTTP_URI_TOO_LONG;
+                      status, title, request->id, length, text);
+    request->status = status;
+    request->abandoned = true;
     if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
         spl_count(&request->service->counters, replies_4xx);
     shutdown(request->connection->fd, SHUT_RDWR);
-    return true;
+}
+
+static void refuse_many_parameters(struct request *request, const char *uri)
+{
+    unsigned count = 0;
+    for (; *uri && count <= parameters_max; uri++)
+        count += *uri == '&';
+    if (count > parameters_max)
+        refuse_on_socket(request, MHD_HTTP_URI_TOO_LONG, "url", "the URL has too many parameters");
+}
+
+/* Once the headers are there. Cookies lie in the pool twice. */
+static void refuse_many_headers(struct request *request)
+{
+    struct MHD_Connection *handle = request->handle;
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    const char *cookie = MHD_lookup_connection_value(handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_COOKIE);
+    int kinds = MHD_HEADER_KIND | MHD_GET_ARGUMENT_KIND | MHD_COOKIE_KIND;
+    int values = MHD_get_connection_values(handle, (enum MHD_ValueKind)kinds, NULL, NULL);
+    size_t used = (info ? info->header_size : 0) + value_memory * (size_t)values + (cookie ? strlen(cookie) : 0);
+    if (used > connection_memory - reply_memory)
+        refuse_on_socket(request, MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE, "headers",
+                         "URL and headers are larger than 12 KiB together; POST takes long views");
 }
 
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
@@ -124,7 +150,7 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     spl_request_set_id(request, NULL);
     enter(request->connection, PHASE_READING);
     service->requests_open++;
-    request->abandoned = refuse_many_parameters(request, uri);
+    refuse_many_parameters(request, uri);
     return request;
 }
 
@@ -252,6 +278,9 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         request->started = true;
         snprintf(request->method, sizeof request->method, "%s", method);
         spl_request_set_id(request, MHD_lookup_connection_value(handle, MHD_HEADER_KIND, "X-Request-Id"));
+        refuse_many_headers(request);
+        if (request->abandoned)
+            return MHD_NO;
         return answer_headers(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {

@@ -1,6 +1,6 @@
 """The figures of RESULTS.md, one subcommand each, on the scan of a vault (11.6 M points) that lies beside the checkout.
 
-usage: measure.py frames|scaling|http|views|pack|size|planner|tours [FRAMES]
+usage: measure.py frames|scaling|http|pack|size|planner; service.py has those of the service under load
 
 Prints what was measured and, where a figure has a bound, how it stands to it; exit 1 beyond a bound, 77 without the data.
 Frame times are bounded in units of the calibrator that 'splatd bench' runs beside each frame, so a slow or busy machine
@@ -207,126 +207,6 @@ def serve():
     bound("GET above the frame, median", statistics.median(above), 15, "ms")
 
 
-def status_of(port):
-    return json.loads(get(port, "/v1/status")[2])
-
-
-def wrk(port, pid, path, *headers):
-    """Over 16 connections that stay, medians of three times 5 s: requests a second, and microseconds of the daemon's
-    processor time a request, which a busy machine changes less."""
-    rates, costs = [], []
-    for _ in range(3):
-        command = ["wrk", "-t", "1", "-c", "16", "-d", "5s", *headers, f"http://127.0.0.1:{port}{path}"]
-        used = processor_s(pid)
-        said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-        used = processor_s(pid) - used
-        if "Non-2xx" in said or "Socket errors" in said:
-            sys.exit(f"wrk {path}: {said}")
-        rates.append(float(re.search(r"Requests/sec:\s+([\d.]+)", said)[1]))
-        costs.append(1e6 * used / int(re.search(r"(\d+) requests in", said)[1]))
-    return statistics.median(rates), statistics.median(costs)
-
-
-def rendering_s(ops):
-    """Seconds that the gpu thread has spent on views since start."""
-    name = 'splatd_frame_duration_seconds_sum{route="/v1/datasets/{id}/view"} '
-    lines = get(ops, "/metrics")[2].decode().splitlines()
-    return float(next(line for line in lines if line.startswith(name))[len(name):])
-
-
-def saturate(port, ops, clients, count):
-    """How much of the time the device has nothing to do while that many clients wait."""
-    views, lock = iter(range(count)), threading.Lock()
-
-    def work():
-        while True:
-            with lock:
-                i = next(views, None)
-            if i is None:
-                return
-            status = get(port, f"{view_query(i / count)}&margin=1.000001")[0]
-            if status != 200:
-                sys.exit(f"a view failed with {status}")
-    before, begin, threads = rendering_s(ops), time.monotonic(), [threading.Thread(target=work) for _ in range(clients)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    seconds = time.monotonic() - begin
-    busy = rendering_s(ops) - before
-    print(f"{count} views of 1280x720 for {clients} clients in {seconds:.1f} s, {busy:.1f} of them on the gpu thread")
-    bound("the gpu thread idles while requests wait", 100 * (1 - busy / seconds), 5, "%")
-
-
-def overload(port, seconds):
-    """Views that no cache holds at four times the rate that they are made at."""
-    small = view_query(0.3).replace("width=1280&height=720", "width=640&height=360")
-    fresh = (f"{small}&margin={1 + n * 1e-6:.6f}" for n in range(1, 1000000))
-    alone = []
-    for _ in range(20):
-        begin = time.monotonic()
-        if get(port, next(fresh))[0] != 200:
-            sys.exit("a view failed without load")
-        alone.append(time.monotonic() - begin)
-    gap, replies, threads = statistics.median(alone) / 4, [], []
-
-    def ask(path):
-        try:
-            status, headers, _, ms = get(port, path)
-            timing = re.search(r"frame;dur=([\d.]+)", headers.get("Server-Timing", ""))
-            replies.append((status, headers.get("Retry-After"), ms, timing and float(timing[1])))
-        except OSError as fault:
-            replies.append((0, str(fault), 0, None))
-    before, begin, asked = status_of(port)["memory"]["resident_bytes"], time.monotonic(), 0
-    while time.monotonic() - begin < seconds:
-        threads.append(threading.Thread(target=ask, args=(next(fresh),)))
-        threads[-1].start()
-        asked += 1
-        time.sleep(max(0, begin + asked * gap - time.monotonic()))
-    for thread in threads:
-        thread.join()
-    after = status_of(port)
-    good = sorted(ms for status, _, ms, _ in replies if status == 200)
-    other = [r for r in replies if r[0] != 200 and not (r[0] == 503 and r[1])]
-    frame = statistics.mean(ms for *_, ms in replies if ms)  # the queue is as long as its frames together
-    queue = after["queues"]["render"]["capacity"]
-    print(f"{asked} requests in {seconds} s, 4 times what a view alone allows "
-          f"({1e3 * statistics.median(alone):.0f} ms): {len(good)} times 200, {len(replies) - len(good)} "
-          f"times 503; frame under load {frame:.0f} ms; resident "
-          f"{before >> 20} MiB before, {after['memory']['resident_bytes'] >> 20} after")
-    bound("neither 200 nor 503 with Retry-After", len(other), 0, f"replies {other[:3]}")
-    bound("p99 of the 200s", good[int(0.99 * len(good))] / frame, queue + 2, "frame times")
-    bound("memory grown under overload", (after["memory"]["resident_bytes"] - before) / 2**20, 32, "MiB")
-
-
-def views():
-    """What is not rendered: hits, 304s, and refusals under overload."""
-    dataset, port, ops = packed(scan(), "grenoble"), free_port(), free_port()
-    daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", f"127.0.0.1:{ops}",
-                               "--quiet", dataset])
-    try:
-        while True:
-            try:
-                status, headers, body, _ = get(port, view_query(0))
-                break
-            except OSError:
-                time.sleep(0.05)
-        small = view_query(0).replace("width=1280&height=720", "width=320&height=180")
-        size = len(get(port, small)[2])
-        print(f"a view of 1280x720 has {len(body)} bytes, one of 320x180 {size}")
-        for what, (rate, cost), least in (
-                ("304s", wrk(port, daemon.pid, view_query(0), "-H", f"If-None-Match: {headers['ETag']}"), 20000),
-                ("hits of 320x180", wrk(port, daemon.pid, small), 15000),
-                ("hits of 1280x720", wrk(port, daemon.pid, view_query(0)), 15000)):
-            print(f"{what}: {rate:.0f}/s, {1e6 / cost:.0f} a second of processor time; wanted {least}")
-            bound(f"{what}, processor time a request", cost, 1e6 / least, "us")
-        saturate(port, ops, 4, 60)
-        overload(port, 60)
-    finally:
-        daemon.send_signal(signal.SIGTERM)
-        daemon.wait(60)
-
-
 def pack():
     source, out = scan(), CACHE / "pack-bench.spld"
     points = int(re.search(rb"element vertex (\d+)", source.open("rb").read(2000))[1])
@@ -483,91 +363,9 @@ def planner():
         daemon.wait(30)
 
 
-def tour_body(frames):
-    """From the overview to the close view of the scan."""
-    views = json.loads((DATA / "cameras.json").read_text())["grenoble"]
-    keys = [{"camera": {**{k: v[k] for k in ("eye", "target", "up")}, "fov": v["vfov_deg"]}}
-            for v in (views["overview"], views["close"])]
-    return {"path": {"keyframes": keys}, "frames": frames, "settings": {"width": 1280, "height": 720, "lod": 2}}
-
-
-def processor_s(pid):
-    """Of a process that lives: user and system time."""
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def served_tour(port, pid, body):
-    """Seconds a frame from the first frame on disk to the last, as the tour's events say; and of processor time."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
-    connection.request("POST", "/v1/datasets/grenoble/tours", json.dumps(body))
-    uri = json.loads(connection.getresponse().read())["uri"]
-    connection.request("GET", uri + "/events")
-    events, first, done = connection.getresponse(), None, 0
-    for line in events:
-        if line.startswith(b"data: "):
-            status, now = json.loads(line[6:]), time.monotonic()
-            if status["frames_done"] and first is None:
-                first, begun, used = status["frames_done"], now, processor_s(pid)
-            if status["frames_done"] > done:
-                done, last, spent = status["frames_done"], now, processor_s(pid)
-    if status["state"] != "done":
-        sys.exit(f"the tour has failed: {status['error']}")
-    connection.request("DELETE", uri)
-    connection.getresponse().read()
-    return (last - begun) / (done - first), (spent - used) / (done - first)
-
-
-def bare_tour(dataset, body, folder):
-    """The same in one process: render, encode, write, one after the other. What one frame takes is the start's."""
-    path, seconds, used = pathlib.Path(folder) / "path.json", [], []
-    path.write_text(json.dumps(body["path"]))
-    for frames in (1, body["frames"]):
-        process = subprocess.Popen([SPLATD, "tour", dataset, "--no-verify", "--path", path, "--frames", str(frames), "--size",
-                                    "1280x720", "--lod", "2", "-o", pathlib.Path(folder) / "bare"], stderr=subprocess.PIPE,
-                                   text=True)
-        said = process.stderr.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        if status:
-            sys.exit("splatd tour failed: " + said)
-        seconds.append(float(re.search(r"in ([\d.]+) s", said)[1]))  # from the first frame on
-        used.append(usage.ru_utime + usage.ru_stime)
-    return seconds[1] / (body["frames"] - 1), (used[1] - used[0]) / (body["frames"] - 1)
-
-
-def tours():
-    frames = int(sys.argv[2]) if len(sys.argv) > 2 else 300
-    dataset, port, body, ratios = packed(scan(), "grenoble"), free_port(), tour_body(frames), [[], []]
-    with tempfile.TemporaryDirectory() as folder:
-        for turn in range(5):
-            daemon = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--tours", folder + "/tours",
-                                       "--quiet", "--ops-listen", f"127.0.0.1:{free_port()}", dataset])
-            try:
-                while True:
-                    try:
-                        if get(port, "/v1/tours")[0] == 200:
-                            break
-                    except OSError:
-                        time.sleep(0.05)
-                served = served_tour(port, daemon.pid, body)
-            finally:
-                daemon.send_signal(signal.SIGTERM)
-                daemon.wait(30)
-            bare = bare_tour(dataset, body, folder)
-            for i in range(2):
-                ratios[i].append(served[i] / bare[i])
-            print(f"turn {turn + 1}: a frame of the tour {1000 * served[0]:.1f} ms, a bare one {1000 * bare[0]:.1f} ms; "
-                  f"of processor time {1000 * served[1]:.1f} and {1000 * bare[1]:.1f} ms")
-    for what, values in zip(("time", "processor time"), ratios):
-        print(f"ratios of {what}: " + ", ".join(f"{r:.3f}" for r in values))
-    print(f"processor time, median: {statistics.median(ratios[1]):.3f} times")
-    bound(f"{frames} frames of a tour against as many bare ones", statistics.median(ratios[0]), 1.05, "times")
-
-
 if __name__ == "__main__":
-    figures = {"frames": frames, "scaling": scaling, "http": serve, "views": views, "pack": pack, "size": size, "planner": planner,
-               "tours": tours}
-    if not 2 <= len(sys.argv) <= (3 if sys.argv[1:2] == ["tours"] else 2) or sys.argv[1] not in figures:
+    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner}
+    if len(sys.argv) != 2 or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)
     if sys.argv[1] != "planner":
