@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -246,6 +247,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     service->options = options;
     service->listen_fd = service->ops_fd = -1;
     service->started_ns = spl_now_ns();
+    service->started_unix_s = (double)time(NULL);
     raise_descriptor_limit(options);
     int rc = init_loop(service, err);
     if (rc)

@@ -105,6 +105,7 @@ struct spl_service {
     struct spl_latencies latencies;
     struct spl_access_log access_log;
     uint64_t started_ns;
+    double started_unix_s; /* the same by the clock on the wall, read once */
     char url[192];
     int listen_fd; /* -1 once MHD has it */
     int ops_fd;    /* passed by the supervisor; -1 = none, or once MHD has it */

@@ -69,6 +69,8 @@ def test_metrics_count_what_happens():
         assert got["process_resident_memory_bytes"] > 1e6 and got["process_cpu_seconds_total"] > 0
         assert 3 < got["process_open_fds"] < got["process_max_fds"]
         assert abs(got["process_start_time_seconds"] - time.time()) < 600
+        time.sleep(0.3)  # a start that moves would be a restart to Prometheus
+        assert metrics(d)["process_start_time_seconds"] == got["process_start_time_seconds"]
         for which, count in (("request", 4), ("queue", 3), ("frame", 3), ("encode", 3)):
             name, route = f"splatd_{which}_duration_seconds", 'route="/v1/datasets/{id}/view"'
             buckets = [value for sample, value in got.items() if sample.startswith(f"{name}_bucket{{{route}")]

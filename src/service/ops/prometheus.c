@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -89,7 +88,7 @@ static void print_process(FILE *out, struct spl_service *service)
               seconds(usage.ru_utime) + seconds(usage.ru_stime));
     gauge(out, "process_resident_memory_bytes", "Memory in use.", (double)spl_resident_bytes());
     gauge(out, "process_start_time_seconds", "When the process began, by the clock on the wall.",
-          (double)time(NULL) - (double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S);
+          service->started_unix_s);
 }
 
 /* One series a dataset: as many as the operator has put there, never what a client asks for. */
