@@ -53,6 +53,10 @@ def test_request_ids():
         eventually(lambda: any("id=mine method=GET path=/v1/datasets/wall/view status=400 " in line for line in d.lines))
         pairs = d.ask(VIEW + "?" + "a&" * 300)  # answered past libmicrohttpd
         assert pairs.status == 414 and pairs.json()["instance"].endswith(pairs.headers["X-Request-Id"])
+        large = d.ask(SMALL, headers={"X-Request-Id": "much", "X-Much": "y" * 13000})
+        assert large.status == 431 and large.json()["instance"] == "urn:splatd:request:much" and large.json()["field"] == "headers"
+        eventually(lambda: [line for line in d.lines if "id=much method=GET path=/v1/datasets/wall/view status=431 " in line
+                            and "end=" not in line])
 
 
 def test_clients_that_leave_are_in_the_log():

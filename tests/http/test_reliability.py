@@ -192,10 +192,11 @@ def test_a_dataset_that_is_cut_or_overwritten_while_served():
             a, b = (os.path.join(folder, name) for name in ("a.spld", "b.spld"))
             shutil.copy(WALL, a)
             shutil.copy(WALL_2, b)
-            with Daemon(REAL, "--watch", "0", "--cache", "0", datasets=[a, b], SPLATD_INJECT_LOSS_AFTER="2") as d:
+            with Daemon(REAL, "--watch", "0", "--cache", "0", datasets=[a, b], SPLATD_INJECT_LOSS_AFTER="3") as d:
                 def view(name, **kw):
                     return d.ask(f"/v1/datasets/{name}/view?width=16&height=16", **kw)
                 whole = view("a").body
+                pick = "/v1/datasets/a/pick?eye=3,0,0.5&target=0,0,0.5&fov=50&width=64&height=48&x=32.5&y=24.5"
                 with open(a, "r+b") as file:
                     if damage == "cut":
                         file.truncate(300)
@@ -203,6 +204,8 @@ def test_a_dataset_that_is_cut_or_overwritten_while_served():
                         file.seek(-4000, os.SEEK_END)
                         file.write(b"\xff" * 4000)
                 assert view("a").body == whole, "what is on the device is as good as before"
+                found = d.ask(pick)  # its class is read from the file
+                assert found.status == 200 and found.json()["position"] and found.json()["splat"] is not None, found.body
                 assert view("b").status == 503  # the device is lost, so that pages must be read anew
                 eventually(lambda: d.ops("/readyz").status == 200)
                 assert view("b").status == 200

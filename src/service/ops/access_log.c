@@ -80,7 +80,8 @@ void spl_access_log_write(struct request *request, enum MHD_RequestTerminationCo
     size_t count = 6;
     if (request->cache)
         fields[count++] = (struct spl_log_field){"cache", request->cache, 0};
-    if (end != MHD_REQUEST_TERMINATED_COMPLETED_OK)
+    bool answered = request->abandoned && request->status; // past libmicrohttpd
+    if (end != MHD_REQUEST_TERMINATED_COMPLETED_OK && !answered)
         fields[count++] = (struct spl_log_field){"end", request->abandoned ? "client-left" : ends[end], 0};
     spl_log_fields(SPL_LOG_INFO, "request", fields, count);
 }
