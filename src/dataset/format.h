@@ -33,7 +33,7 @@ struct spl_file_header {          /* at offset 0 */
 #define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')  /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
 #define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')    /* struct spl_atoms_header, scales, texels */
-#define SPL_SECTION_CHUNK_TEXTURES SPL_FOURCC('C', 'T', 'E', 'X') /* uint32_t[chunks]: word in the page's TEXP, or ~0 */
+#define SPL_SECTION_CHUNK_TEXTURES SPL_FOURCC('C', 'T', 'E', 'X') /* uint32_t[chunks], see below */
 #define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's number */
 
 struct spl_section {
@@ -92,18 +92,20 @@ struct spl_atoms_header {
     uint32_t reserved[2];         /* 0 */
 };
 
-/* A chunk's codes in TEXP, words: SPL_TEXTURE_*
- *   the number of planes, 1..8
+/* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
+ * from this bit on the number of planes, 1..8. */
+#define SPL_CHUNK_TEXTURE_PLANES 28
+
+/* A chunk's codes in TEXP, words:
  *   for each plane a header and a mask: bit i of its 4 words says whether splat i has this plane's atom
  *   for each plane the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits; the
  *   next plane starts on a word
- * Plane t's mask holds no splat that plane t - 1's does not. The weight's code is signed. */
+ * Plane t's mask holds no splat that plane t - 1's does not. The weight's code is signed. Header: */
 #define SPL_TEXTURE_PLANE_WORDS (1 + SPL_CHUNK_SPLATS / 32)
 #define SPL_TEXTURE_INDEX_BITS 0   /* 0..4, 0..16 */
 #define SPL_TEXTURE_WEIGHT_BITS 5  /* 5..8, 1..8 */
 #define SPL_TEXTURE_STEP 9         /* 9..16, of spl_code_step() */
 #define SPL_TEXTURE_OFFSET 17      /* 17..31, of the plane's codes, words from the chunk's first */
-#define SPL_TEXTURE_NONE 0xffffffffu
 
 /* r = 2 sqrt(area of a splat's share / pi): on a square grid of spacing h, eq. 20 gives r = 1.128 h. */
 #define SPL_RADIUS_SPACING 1.128379f

@@ -18,7 +18,7 @@ struct pass {
     uint32_t *page;      /* of the old one */
     uint32_t page_index; /* UINT32_MAX = none yet */
     uint32_t *words;     /* of the node's chunks */
-    uint32_t *texture_words, *chunk_word;
+    uint32_t *texture_words, *chunk_texture;
 };
 
 static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
@@ -50,7 +50,7 @@ static int write_node(struct pass *p, struct spl_node *node, struct spl_error *e
 {
     struct spl_chunk *chunks = p->chunks + node->first_chunk;
     const struct spl_dictionary *dictionary = p->what->dictionary;
-    struct spl_node_textures textures = {.words = p->texture_words, .chunk_word = p->chunk_word};
+    struct spl_node_textures textures = {.words = p->texture_words, .chunk_texture = p->chunk_texture};
     size_t used = 0;
     int rc = load_page(p, node->page, err);
     for (uint32_t i = 0; i < node->chunk_count && !rc; i++) {
@@ -65,7 +65,7 @@ static int write_node(struct pass *p, struct spl_node *node, struct spl_error *e
             break;
         spl_assert(code.splats == chunks[i].count);
         count = spl_texture_encode(&code, p->texture_words + textures.word_count);
-        p->chunk_word[i] = count ? (uint32_t)textures.word_count : SPL_TEXTURE_NONE;
+        p->chunk_texture[i] = count ? (uint32_t)textures.word_count | code.planes << SPL_CHUNK_TEXTURE_PLANES : 0;
         textures.word_count += count;
     }
     return rc ? rc
@@ -95,8 +95,8 @@ static int allocate(struct pass *p, uint32_t node_count, uint32_t chunk_count, s
     p->chunks = spl_alloc_raw(chunk_count, sizeof *p->chunks, err);
     p->words = spl_alloc_raw(most * SPL_CHUNK_WORDS_MAX, sizeof *p->words, err);
     p->texture_words = spl_alloc_raw(texture_words, sizeof *p->texture_words, err);
-    p->chunk_word = spl_alloc_raw(most, sizeof *p->chunk_word, err);
-    if (!p->chunks || !p->words || !p->texture_words || !p->chunk_word)
+    p->chunk_texture = spl_alloc_raw(most, sizeof *p->chunk_texture, err);
+    if (!p->chunks || !p->words || !p->texture_words || !p->chunk_texture)
         return SPL_E_NOMEM;
     memcpy(p->chunks, chunks, chunk_count * sizeof *chunks);
     return SPL_OK;
@@ -137,6 +137,6 @@ done:
     free(p.page);
     free(p.words);
     free(p.texture_words);
-    free(p.chunk_word);
+    free(p.chunk_texture);
     return rc;
 }

@@ -51,14 +51,11 @@ static void write_code(uint32_t *words, uint32_t at, uint32_t width, uint32_t va
 uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words)
 {
     spl_assert(code->splats >= 1 && code->splats <= SPL_CHUNK_SPLATS && code->planes <= SPL_ATOMS_MAX);
-    if (!code->planes)
-        return 0;
-    uint32_t used = 1 + code->planes * SPL_TEXTURE_PLANE_WORDS;
+    uint32_t used = code->planes * SPL_TEXTURE_PLANE_WORDS;
     memset(words, 0, used * sizeof *words);
-    words[0] = code->planes;
     for (uint32_t t = 0; t < code->planes; t++) {
         const struct spl_code_plane *plane = &code->plane[t];
-        uint32_t *header = words + 1 + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1, at = 0;
+        uint32_t *header = words + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1, at = 0;
         uint32_t width = plane->index_bits + plane->weight_bits;
         int half = 1 << plane->weight_bits >> 1;
         spl_assert(plane->index_bits <= 16 && plane->weight_bits >= 1 && plane->weight_bits <= 8);
@@ -88,7 +85,7 @@ uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words)
 static const char *judge_plane(const uint32_t *words, size_t count, uint32_t t, uint32_t splats, uint32_t atoms,
                                uint32_t *used)
 {
-    const uint32_t *header = words + 1 + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1;
+    const uint32_t *header = words + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1;
     uint32_t index_bits = part(*header, SPL_TEXTURE_INDEX_BITS, 5),
              weight_bits = part(*header, SPL_TEXTURE_WEIGHT_BITS, 4), length = count_mask(mask);
     if (index_bits > 16 || weight_bits < 1 || weight_bits > 8)
@@ -114,9 +111,9 @@ static const char *judge_plane(const uint32_t *words, size_t count, uint32_t t, 
     return NULL;
 }
 
-const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t splats, uint32_t atoms)
+const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t planes, uint32_t splats, uint32_t atoms)
 {
-    uint32_t planes = count ? words[0] : 0, used = 1 + planes * SPL_TEXTURE_PLANE_WORDS;
+    uint32_t used = planes * SPL_TEXTURE_PLANE_WORDS;
     if (planes < 1 || planes > SPL_ATOMS_MAX || used > count)
         return "has no planes, more than 8, or more than the section holds";
     const char *what = NULL;
@@ -125,13 +122,13 @@ const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t spla
     return what;
 }
 
-void spl_texture_decode(const uint32_t *words, uint32_t splats, struct spl_chunk_code *code)
+void spl_texture_decode(const uint32_t *words, uint32_t planes, uint32_t splats, struct spl_chunk_code *code)
 {
     memset(code, 0, sizeof *code);
     code->splats = splats;
-    code->planes = words[0];
+    code->planes = planes;
     for (uint32_t t = 0; t < code->planes; t++) {
-        const uint32_t *header = words + 1 + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1;
+        const uint32_t *header = words + t * SPL_TEXTURE_PLANE_WORDS, *mask = header + 1;
         struct spl_code_plane *plane = &code->plane[t];
         plane->index_bits = (uint8_t)part(*header, SPL_TEXTURE_INDEX_BITS, 5);
         plane->weight_bits = (uint8_t)part(*header, SPL_TEXTURE_WEIGHT_BITS, 4);
@@ -151,13 +148,13 @@ void spl_texture_decode(const uint32_t *words, uint32_t splats, struct spl_chunk
     }
 }
 
-void spl_texture_count(const uint32_t *words, uint32_t splats, uint64_t histogram[SPL_ATOMS_MAX + 1])
+void spl_texture_count(const uint32_t *words, uint32_t planes, uint32_t splats, uint64_t histogram[SPL_ATOMS_MAX + 1])
 {
     uint32_t before = splats;
-    for (uint32_t t = 0; t < words[0]; t++) {
-        uint32_t count = count_mask(words + 2 + t * SPL_TEXTURE_PLANE_WORDS);
+    for (uint32_t t = 0; t < planes; t++) {
+        uint32_t count = count_mask(words + 1 + t * SPL_TEXTURE_PLANE_WORDS);
         histogram[t] += before - count;
         before = count;
     }
-    histogram[words[0]] += before;
+    histogram[planes] += before;
 }

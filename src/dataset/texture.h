@@ -10,21 +10,31 @@
 #include "sparse/code.h"
 
 /* Largest number of words a chunk's codes can need. */
-enum { SPL_TEXTURE_WORDS_MAX = 1 + SPL_ATOMS_MAX * (SPL_TEXTURE_PLANE_WORDS + SPL_CHUNK_SPLATS * 24 / 32) };
+enum { SPL_TEXTURE_WORDS_MAX = SPL_ATOMS_MAX * (SPL_TEXTURE_PLANE_WORDS + SPL_CHUNK_SPLATS * 24 / 32) };
+
+static inline uint32_t spl_texture_word(uint32_t chunk_texture)
+{
+    return chunk_texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1);
+}
+
+static inline uint32_t spl_texture_planes(uint32_t chunk_texture)
+{
+    return chunk_texture >> SPL_CHUNK_TEXTURE_PLANES;
+}
 
 /* Writes `code` to `words` (room for SPL_TEXTURE_WORDS_MAX) with the widths that its planes state, and returns the
- * number of words: spl_chunk_code_bits() / 32, 0 where no splat has an atom. Codes that do not fit their widths are an
+ * number of words; with the one that CTEX has, spl_chunk_code_bits() / 32. Codes that do not fit their widths are an
  * assertion. */
 uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words);
 
-/* What is wrong with the codes of a chunk of `splats` splats at words[0 .. count), for a dictionary of `atoms` atoms;
- * NULL where all of it decodes. */
-const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t splats, uint32_t atoms);
+/* What is wrong with the codes of a chunk of `splats` splats and `planes` planes (> 0) at words[0 .. count), for a
+ * dictionary of `atoms` atoms; NULL where all of it decodes. */
+const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t planes, uint32_t splats, uint32_t atoms);
 
-/* Decodes what spl_texture_judge() has passed. */
-void spl_texture_decode(const uint32_t *words, uint32_t splats, struct spl_chunk_code *code);
+/* Decodes what spl_texture_judge() has passed, or a chunk of 0 planes. */
+void spl_texture_decode(const uint32_t *words, uint32_t planes, uint32_t splats, struct spl_chunk_code *code);
 
 /* Adds the chunk's splats to histogram[number of atoms]. */
-void spl_texture_count(const uint32_t *words, uint32_t splats, uint64_t histogram[SPL_ATOMS_MAX + 1]);
+void spl_texture_count(const uint32_t *words, uint32_t planes, uint32_t splats, uint64_t histogram[SPL_ATOMS_MAX + 1]);
 
 #endif

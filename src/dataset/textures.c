@@ -68,12 +68,13 @@ static int judge_page(const struct spl_dataset *dataset, uint32_t index, const u
         if (node->page != index)
             continue;
         for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
-            uint32_t first = dataset->chunk_textures[c];
-            if (first == SPL_TEXTURE_NONE)
+            uint32_t texture = dataset->chunk_textures[c], first = spl_texture_word(texture);
+            if (!texture)
                 continue;
-            const char *what = first < count ? spl_texture_judge(words + first, count - first, dataset->chunks[c].count,
-                                                                 dataset->dictionary.count)
-                                             : "starts beyond the end of the section";
+            const char *what = first < count
+                                   ? spl_texture_judge(words + first, count - first, spl_texture_planes(texture),
+                                                       dataset->chunks[c].count, dataset->dictionary.count)
+                                   : "starts beyond the end of the section";
             if (what)
                 return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %u %s; pack the dataset again",
                                 dataset->info.id[0] ? dataset->info.id : dataset->path, index, c, what);
@@ -155,11 +156,9 @@ static int count_page(const struct spl_dataset *dataset, uint32_t index, const u
     for (uint32_t n = 0; n < dataset->info.nodes; n++) {
         const struct spl_node *node = &dataset->nodes[n];
         for (uint32_t c = node->first_chunk; node->page == index && c < node->first_chunk + node->chunk_count; c++) {
-            uint32_t first = dataset->chunk_textures[c];
-            if (first == SPL_TEXTURE_NONE)
-                histogram[0] += dataset->chunks[c].count;
-            else
-                spl_texture_count(words + first, dataset->chunks[c].count, histogram);
+            uint32_t texture = dataset->chunk_textures[c];
+            spl_texture_count(words + spl_texture_word(texture), spl_texture_planes(texture), dataset->chunks[c].count,
+                              histogram);
         }
     }
     return SPL_OK;

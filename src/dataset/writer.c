@@ -212,8 +212,8 @@ static int add_textures(struct spl_dataset_writer *writer, const struct spl_node
     if (reserve(to, textures->word_count, err) || reserve(of, chunk_count, err))
         return SPL_E_NOMEM;
     for (size_t i = 0; i < chunk_count; i++) {
-        uint32_t word = textures->chunk_word[i];
-        of->at[of->used++] = word == SPL_TEXTURE_NONE ? word : word + (uint32_t)to->used;
+        uint32_t texture = textures->chunk_texture[i];
+        of->at[of->used++] = texture ? texture + (uint32_t)to->used : 0;
     }
     memcpy(to->at + to->used, textures->words, textures->word_count * sizeof *to->at);
     to->used += textures->word_count;

@@ -30,7 +30,7 @@ int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const s
 struct spl_node_textures {
     const uint32_t *words;
     size_t word_count;
-    const uint32_t *chunk_word;  /* where each chunk's start in `words`, or SPL_TEXTURE_NONE */
+    const uint32_t *chunk_texture; /* each chunk's word of CTEX, with the place in `words` */
 };
 
 /* add_node for a file with textures. Nodes must come in the order of their chunks. */

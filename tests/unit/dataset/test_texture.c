@@ -53,26 +53,26 @@ static void test_codes(void **state)
         struct spl_chunk_code code, back;
         make_code(&dictionary, round % 10 % 9, 7, round, splats, &code);
         uint32_t words[SPL_TEXTURE_WORDS_MAX], used = spl_texture_encode(&code, words);
-        assert_int_equal(32 * (uint64_t)used, spl_chunk_code_bits(&code));
+        assert_int_equal(used ? 32 * (uint64_t)used + 32 : 0, spl_chunk_code_bits(&code));
         if (!used)
             continue;
-        assert_null(spl_texture_judge(words, used, splats, dictionary.count));
-        spl_texture_decode(words, splats, &back);
+        assert_null(spl_texture_judge(words, used, code.planes, splats, dictionary.count));
+        spl_texture_decode(words, code.planes, splats, &back);
         same_code(&code, &back);
         uint64_t histogram[SPL_ATOMS_MAX + 1] = {0}, wanted[SPL_ATOMS_MAX + 1] = {0};
-        spl_texture_count(words, splats, histogram);
+        spl_texture_count(words, code.planes, splats, histogram);
         for (uint32_t i = 0; i < splats; i++)
             wanted[code.splat[i].count]++;
         assert_memory_equal(histogram, wanted, sizeof wanted);
-        assert_non_null(spl_texture_judge(words, used - 1, splats, dictionary.count));
+        assert_non_null(spl_texture_judge(words, used - 1, code.planes, splats, dictionary.count));
         for (int flip = 0; flip < 40; flip++) {
             random = random * 1664525u + 1013904223u;
             uint32_t *damaged = malloc((used + SPL_PAGE_TAIL_WORDS) * sizeof *damaged);
             memset(damaged + used, 0, SPL_PAGE_TAIL_WORDS * sizeof *damaged);
             memcpy(damaged, words, used * sizeof *damaged);
             damaged[random % used] ^= 1u << (random >> 27);
-            if (!spl_texture_judge(damaged, used, splats, dictionary.count)) {
-                spl_texture_decode(damaged, splats, &back);
+            if (!spl_texture_judge(damaged, used, code.planes, splats, dictionary.count)) {
+                spl_texture_decode(damaged, code.planes, splats, &back);
                 for (uint32_t i = 0; i < splats; i++)
                     for (uint32_t t = 0; t < back.splat[i].count; t++)
                         assert_true(back.splat[i].atom[t] < dictionary.count);
@@ -95,26 +95,27 @@ static void test_judge(void **state)
         uint32_t word, flip;
         const char *part;
     } rows[] = {
-        {0, 2, "has no planes"},       {0, 9, "has no planes"},
-        {0, 1 << 20, "has no planes"}, {1, 17 ^ 5, "of a width"},
-        {1, 4 << 5, "of a width"},     {1, (9 ^ 4) << 5, "of a width"},
-        {1, 1 << 17, "do not follow"}, {3, 1 << 8, "that does not exist"},
-        {4, 1, "that does not exist"}, {7, 1, "lacks the atom before"},
+        {0, 17 ^ 5, "of a width"},       {0, 4 << 5, "of a width"},          {0, (9 ^ 4) << 5, "of a width"},
+        {0, 1 << 17, "do not follow"},   {2, 1 << 8, "that does not exist"}, {3, 1, "that does not exist"},
+        {6, 1, "lacks the atom before"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         memcpy(words, good, sizeof words);
         words[rows[i].word] ^= rows[i].flip;
-        const char *what = spl_texture_judge(words, used, 40, 32);
+        const char *what = spl_texture_judge(words, used, 2, 40, 32);
         if (!what || !strstr(what, rows[i].part))
             fail_msg("row %zu: expected '%s', got '%s'", i, rows[i].part, what);
     }
-    assert_non_null(strstr(spl_texture_judge(good, used, 40, 20), "names an atom"));
-    assert_null(spl_texture_judge(good, used, 40, 21));
-    assert_non_null(strstr(spl_texture_judge(good, used - 1, 40, 32), "beyond the end"));
-    assert_non_null(spl_texture_judge(good, 0, 40, 32));
+    assert_non_null(strstr(spl_texture_judge(good, used, 2, 40, 20), "names an atom"));
+    assert_null(spl_texture_judge(good, used, 2, 40, 21));
+    assert_non_null(strstr(spl_texture_judge(good, used - 1, 2, 40, 32), "beyond the end"));
+    static const uint32_t planes[] = {0, 9, 15};
+    for (int i = 0; i < 3; i++)
+        assert_non_null(strstr(spl_texture_judge(good, used, planes[i], 40, 32), "has no planes"));
+    assert_non_null(strstr(spl_texture_judge(good, 9, 2, 40, 32), "has no planes"));
     memcpy(words, good, sizeof words);
-    words[7] = words[8] = 0;
-    assert_non_null(strstr(spl_texture_judge(words, used, 40, 32), "a plane without atoms"));
+    words[6] = words[7] = 0;
+    assert_non_null(strstr(spl_texture_judge(words, used, 2, 40, 32), "a plane without atoms"));
 }
 
 static void test_expand(void **state)
@@ -274,13 +275,11 @@ static void test_retexture(void **state)
         for (uint32_t c = 0; c < chunk_count; c++) {
             struct spl_chunk_code code, back = {0};
             make_code(&dictionary, 8, 5, c, chunks[c].count, &code);
-            uint32_t word = spl_dataset_get_chunk_textures(to)[c];
-            assert_int_equal(word == SPL_TEXTURE_NONE, code.planes == 0);
-            if (code.planes) {
-                spl_texture_decode(words + word, chunks[c].count, &back);
-                same_code(&code, &back);
-            }
-            bits += spl_chunk_code_bits(&code) + 32;
+            uint32_t texture = spl_dataset_get_chunk_textures(to)[c];
+            assert_int_equal(spl_texture_planes(texture), code.planes);
+            spl_texture_decode(words + spl_texture_word(texture), code.planes, chunks[c].count, &back);
+            same_code(&code, &back);
+            bits += code.planes ? spl_chunk_code_bits(&code) : 32;
             for (uint32_t i = 0; i < code.splats; i++)
                 wanted[code.splat[i].count]++;
         }
@@ -402,10 +401,11 @@ static void test_bad_files(void **state)
         {SPL_SECTION_ATOMS, 2, 1, "section ATOM has a size of textures or a reserved"},
         {SPL_SECTION_ATOMS, 4, 0x7f800000, "section ATOM has a scale"},
         {SPL_SECTION_ATOMS, 5, 0xbf800000, "section ATOM has a scale"},
-        {SPL_SECTION_CHUNK_TEXTURES, 0, 0xfffffffe, "section TEXP 0: chunk 0 starts beyond"},
-        {SPL_SECTION_CHUNK_TEXTURES, 0, 2, "section TEXP 0: chunk 0 "},
-        {SPL_SECTION_TEXTURES, 0, 9, "section TEXP 0: chunk 0 has no planes"},
-        {SPL_SECTION_TEXTURES, 1, 0xffffffff, "section TEXP 0: chunk 0 has indices"},
+        {SPL_SECTION_CHUNK_TEXTURES, 0, 0x1ffffffe, "section TEXP 0: chunk 0 starts beyond"},
+        {SPL_SECTION_CHUNK_TEXTURES, 0, 0x40000002, "section TEXP 0: chunk 0 "},
+        {SPL_SECTION_CHUNK_TEXTURES, 0, 0x90000000, "section TEXP 0: chunk 0 has no planes"},
+        {SPL_SECTION_CHUNK_TEXTURES, 0, 5, "section TEXP 0: chunk 0 has no planes"},
+        {SPL_SECTION_TEXTURES, 0, 0xffffffff, "section TEXP 0: chunk 0 has indices"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct file f = load();
@@ -432,13 +432,13 @@ static void test_bad_files(void **state)
 
     /* Opened without a look at the pages: a bad code is found when it is read. */
     f = load();
-    f.bytes[find(&f, SPL_SECTION_TEXTURES)->offset] = 9;
+    f.bytes[find(&f, SPL_SECTION_TEXTURES)->offset] |= 31;
     store(&f, false);
     assert_int_equal(spl_dataset_open(path, false, &dataset, NULL), SPL_OK);
     uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, 0));
     struct spl_error err = {0};
     assert_int_equal(spl_dataset_read_textures(dataset, 0, words, &err), SPL_E_CORRUPT);
-    assert_non_null(strstr(err.message, "section TEXP 0: chunk 0 has no planes"));
+    assert_non_null(strstr(err.message, "section TEXP 0: chunk 0 has indices"));
     spl_dataset_close(dataset);
     /* Overwritten in place after it was verified: found as well. */
     store(&good, false);
