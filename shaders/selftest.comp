@@ -63,6 +63,7 @@ void put_frame()
     put(frame.background);
     put(frame.inverse_fx), put(frame.inverse_fy), put(frame.inverse_low_pass_squared);
     put(frame.output_word);
+    put(frame.texture_size);
 }
 
 void put_chunk(spl_draw_chunk c)
@@ -78,6 +79,8 @@ void put_chunk(spl_draw_chunk c)
     put(c.normal_u), put(c.normal_v), put(c.normal_step);
     put(c.first_id);
     put(c.count);
+    put(c.texture);
+    put(c.texture_scale);
 }
 
 void main()

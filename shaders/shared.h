@@ -38,9 +38,11 @@
 #define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
 #define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
-/* The occlusion kernels use two of them otherwise. */
+/* The occlusion kernels use two of them otherwise, and so does the shade pass of splats with textures. */
 #define SPL_BIND_BOUNDS SPL_BIND_DRAW  /* struct spl_chunk_bounds[], parallel to the chunks */
 #define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
+#define SPL_BIND_TEXTURES SPL_BIND_OUTPUT /* uint[], one page's section TEXP as it lies in the file */
+#define SPL_BIND_ATOMS SPL_BIND_ID     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
 
 /* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */
 #define SPL_SUMS_COLOR 0
@@ -69,8 +71,24 @@
  * normal. The blend margin grows with it, up to this much. */
 #define SPL_MARGIN_SLANT 4.0f
 
-/* The coarsest level of a texture that is drawn has this many texels a side. */
+/* The coarsest level of a texture that is drawn has this many texels a side; a splat has so many atoms at most. */
 #define SPL_TEXTURE_SIDE_MIN 4
+#define SPL_TEXTURE_ATOMS 8
+
+/* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
+ * from this bit on the number of planes, 1..8. */
+#define SPL_CHUNK_TEXTURE_PLANES 28
+
+/* A chunk's codes in TEXP, words:
+ *   for each plane a header and a mask: bit i of its 4 words says whether splat i has this plane's atom
+ *   for each plane the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits; the
+ *   next plane starts on a word
+ * Plane t's mask holds no splat that plane t - 1's does not. The weight's code is signed. Header: */
+#define SPL_TEXTURE_PLANE_WORDS (1 + SPL_CHUNK_SPLATS / 32)
+#define SPL_TEXTURE_INDEX_BITS 0   /* 0..4, 0..16 */
+#define SPL_TEXTURE_WEIGHT_BITS 5  /* 5..8, 1..8 */
+#define SPL_TEXTURE_STEP 9         /* 9..16, of spl_code_step() */
+#define SPL_TEXTURE_OFFSET 17      /* 17..31, of the plane's codes, words from the chunk's first */
 
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
@@ -87,6 +105,8 @@ struct spl_draw_chunk {
     SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
     SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
     SPL_U32 count;                        /* SPL_COUNT_*: splats of the chunk that are drawn, and the window of the tile */
+    SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
+    SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -142,12 +162,13 @@ struct spl_frame_params {
     SPL_U32 background;                   /* RGBA8 */
     SPL_F32 inverse_fx, inverse_fy, inverse_low_pass_squared;
     SPL_U32 output_word;                  /* resolve: where the layer's pixels start in the output buffer */
+    SPL_U32 texture_size;                 /* texels of a side of the dataset's textures */
 };
 
 #ifndef SPL_GLSL
-_Static_assert(sizeof(struct spl_draw_chunk) == 64, "spl_draw_chunk is 64 bytes on both sides");
+_Static_assert(sizeof(struct spl_draw_chunk) == 72, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(sizeof(struct spl_frame_params) == 124, "spl_frame_params is 124 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 128, "spl_frame_params is 128 bytes on both sides");
 #endif
 
 #endif

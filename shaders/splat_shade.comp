@@ -3,20 +3,29 @@
  *   color   r g b w
  *   depth   low high - w    of w * offset, where offset counts 2^-18 of the pushed depth in front of it: low = bits 0..8
  *   normal  x y z w         of w * (127 n + 127.5)
- *   id      least dataset index among the discs that set the depth, in the id buffer */
+ *   id      least dataset index among the discs that set the depth, in the id buffer
+ * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture there. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
 #extension GL_EXT_shader_atomic_int64 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #endif
+#ifdef SPL_TEXTURED
+#include "common/texture.glsl"
+#else
 #include "common/disc.glsl"
+#endif
 
 layout(local_size_x = SPL_WORKGROUP) in;
+#ifdef SPL_TEXTURED
+const uint GROUP = SPL_SUMS_COLOR;
+#else
 layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
+layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
+#endif
 
 layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
-layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
 
 /* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves both. */
 #ifdef SPL_ATOMICS_64
@@ -39,11 +48,13 @@ void add(uint pair, uint a, uint b)
 /* One fragment: view depth z within the margin in front of `first`, the sample's pushed depth. */
 void shade(uint at, float first, float z, float distance, float pushed, uvec3 value, uint id)
 {
+#ifndef SPL_TEXTURED
     if (GROUP == SPL_SUMS_ID) {
         if (pushed == first)
             atomicMin(ids[at], id);
         return;
     }
+#endif
     precise float share = (1.0 - distance) * float(frame.weight_max);
     uint weight = max(uint(share + 0.5), 1u);
     if (GROUP == SPL_SUMS_DEPTH) {
@@ -67,13 +78,21 @@ void draw(splat_run run, splat s)
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s, run.low, run.high);
+#ifdef SPL_TEXTURED
+    splat_texture t = load_texture(run.chunk, s, value);
+#endif
     ivec2 sample_at = d.first;
     while (sample_at.y <= d.last.y) {
         float z;
-        float distance = disc_sample(d, sample_at, z);
+        vec3 offset;
+        float distance = disc_sample(d, sample_at, z, offset);
         uint at = sample_index(sample_at);
         if (distance < 1.0) {
             float first = uintBitsToFloat(depth[at]);
+#ifdef SPL_TEXTURED
+            if (z <= first)
+                value = sample_texture(t, offset);
+#endif
             if (z <= first)
                 shade(at, first, z, distance, z + d.margin, value, run.chunk.first_id + s.index);
         }

@@ -31,8 +31,8 @@ struct spl_dataset_info {
     char id[128];              /* the file's stem */
     uint64_t version;          /* XXH3 over the section table: changes whenever any content does */
     uint64_t file_bytes;
-    uint64_t page_bytes;       /* bytes of pages and textures that become resident on the GPU when everything is */
-    uint64_t dictionary_bytes; /* the same of the textures' atoms, expanded with their mips; 0 = no textures */
+    uint64_t page_bytes;       /* bytes that become resident on the GPU when everything is */
+    uint64_t dictionary_bytes; /* of them: the textures' atoms, expanded with their mips */
     uint64_t points;           /* read from the sources, before duplicates were dropped */
     uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
     uint64_t splats;           /* leaf splats plus those of the inner levels */

@@ -29,11 +29,12 @@ struct spl_view {
     double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size and
                                    enlarged */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
+    uint32_t atoms;             /* of a splat's texture that are drawn at most, 0..8; 0 = its mean colour */
     double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
-/* Fills everything but the camera with defaults: splat, color, lod 1, supersample 1, opaque black. */
+/* Fills everything but the camera with defaults: splat, color, lod 1, supersample 1, all atoms, opaque black. */
 void spl_view_init(struct spl_view *view);
 
 /* Checks ranges; the field at fault is named as in the HTTP interface. */
@@ -90,8 +91,8 @@ void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset
  * without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when it does not fit. */
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* The same in steps, for a renderer that has frames to make in between: loads page `page` (0, 1, …); *more: go on with the
- * next. */
+/* The same in steps, for a renderer that has frames to make in between: loads page `page` (0, 1, …; textures
+ * follow); *more: go on with the next. */
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
                               bool *more, struct spl_error *err);
 

@@ -83,8 +83,9 @@ void next_sample(disc d, inout ivec2 at)
     at = ivec2(wrap ? d.first.x : at.x, at.y + int(wrap));
 }
 
-/* Squared distance to the centre (covered below 1) and view depth at sample `at`. */
-float disc_sample(disc d, ivec2 at, out float z)
+/* Squared distance to the centre (covered below 1), view depth at sample `at`, and how far it lies off the centre in radii,
+ * view space. */
+float disc_sample(disc d, ivec2 at, out float z, out vec3 offset)
 {
     precise vec2 uv = vec2(at) + (0.5 - d.center);
     precise float near_center = (uv.x * uv.x + uv.y * uv.y) * frame.inverse_low_pass_squared;
@@ -95,7 +96,14 @@ float disc_sample(disc d, ivec2 at, out float z)
     precise float distance = q.x * q.x + q.y * q.y + fall * fall;
     precise float along = d.depth * (1.0 + clamp(w, -d.reach, d.reach));
     z = along;
+    offset = vec3(q, fall);
     return min(distance, near_center);
+}
+
+float disc_sample(disc d, ivec2 at, out float z)
+{
+    vec3 offset;
+    return disc_sample(d, at, z, offset);
 }
 
 #endif

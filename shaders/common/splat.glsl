@@ -11,6 +11,7 @@ layout(std430, binding = SPL_BIND_PAGE) readonly buffer page_buffer { uint page_
 struct splat {
     vec3 position; /* view space */
     vec3 normal;   /* view space, unit */
+    vec3 world_normal;
     float radius;
     uint index;    /* within the chunk */
 };
@@ -128,6 +129,7 @@ splat load_splat(spl_draw_chunk chunk, uint index, bool position_only)
     s.position = vec3(chunk.origin_x, chunk.origin_y, chunk.origin_z) +
                  offset;
     s.normal = vec3(0.0);
+    s.world_normal = vec3(0.0);
     s.radius = 0.0;
     if (position_only)
         return s;
@@ -137,7 +139,8 @@ splat load_splat(spl_draw_chunk chunk, uint index, bool position_only)
     vec3 n = octahedral_decode(e);
     uint axis = bitfieldExtract(widths, SPL_GEOMETRY_AXIS, 2);
     n = axis == 0u ? n.zxy : axis == 1u ? n.yzx : n;
-    s.normal = rotate_to_view(bitfieldExtract(widths, SPL_GEOMETRY_AXIS + 2, 1) != 0u ? -n : n);
+    s.world_normal = bitfieldExtract(widths, SPL_GEOMETRY_AXIS + 2, 1) != 0u ? -n : n;
+    s.normal = rotate_to_view(s.world_normal);
     precise float radius = chunk.radius_min + chunk.radius_step *
                            float(take(run, nr));
     s.radius = radius;

@@ -2,6 +2,7 @@
 #include "cmd/drawing.h"
 
 #include "cmd/options.h"
+#include "shared.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -43,6 +44,10 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
         return spl_cmd_parse_color("--background", text, d->view.background, err);
     case SPL_CMD_MARGIN:
         return spl_cmd_parse_real("--margin", text, 0, 16, &d->view.margin, err);
+    case SPL_CMD_ATOMS:
+        rc = spl_cmd_parse_count("--atoms", text, 0, SPL_TEXTURE_ATOMS, &count, err);
+        d->view.atoms = (uint32_t)count;
+        return rc;
     case SPL_CMD_FORMAT:
         return parse_name(command, "--format", text, spl_format_from_name, &d->format, err);
     case SPL_CMD_QUALITY:

@@ -25,7 +25,7 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
 /* Ids of the shared options; a command's own begin at SPL_CMD_OWN. */
 enum spl_cmd_drawing_id {
     SPL_CMD_SIZE = 256, SPL_CMD_METHOD, SPL_CMD_LAYER, SPL_CMD_LOD, SPL_CMD_SUPERSAMPLE, SPL_CMD_BACKGROUND, SPL_CMD_MARGIN,
-    SPL_CMD_FORMAT, SPL_CMD_QUALITY, SPL_CMD_DEPTH_SCALE, SPL_CMD_DEVICE, SPL_CMD_REQUIRE_GPU, SPL_CMD_MEMORY_LIMIT,
+    SPL_CMD_ATOMS,     SPL_CMD_FORMAT, SPL_CMD_QUALITY, SPL_CMD_DEPTH_SCALE, SPL_CMD_DEVICE, SPL_CMD_REQUIRE_GPU, SPL_CMD_MEMORY_LIMIT,
     SPL_CMD_NO_VERIFY, SPL_CMD_OWN,
 };
 
@@ -36,6 +36,7 @@ enum spl_cmd_drawing_id {
         {"supersample", required_argument, NULL, SPL_CMD_SUPERSAMPLE},                                                 \
         {"background", required_argument, NULL, SPL_CMD_BACKGROUND},                                                   \
         {"margin", required_argument, NULL, SPL_CMD_MARGIN}, {"format", required_argument, NULL, SPL_CMD_FORMAT},      \
+        {"atoms", required_argument, NULL, SPL_CMD_ATOMS},                                                             \
         {"quality", required_argument, NULL, SPL_CMD_QUALITY},                                                         \
         {"depth-scale", required_argument, NULL, SPL_CMD_DEPTH_SCALE},                                                 \
         {"device", required_argument, NULL, SPL_CMD_DEVICE}, {"require-gpu", no_argument, NULL, SPL_CMD_REQUIRE_GPU},  \

@@ -47,6 +47,7 @@ static void usage(FILE *out)
             "  --layer LAYER            color, depth (along the viewing axis), range (along the ray), normal, id,\n"
             "                           coverage (color)\n"
             "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
+            "  --atoms N                of a splat's texture at most, 0 to 8; 0 = its mean colour (8)\n"
             "  --supersample N          samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge (1)\n"
             "  --background COLOUR      #rrggbb, #rrggbbaa or transparent (#000000)\n"
             "  --margin M               depth behind the first surface that is blended, in splat radii (1)\n"

@@ -92,20 +92,7 @@ struct spl_atoms_header {
     uint32_t reserved[2];         /* 0 */
 };
 
-/* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
- * from this bit on the number of planes, 1..8. */
-#define SPL_CHUNK_TEXTURE_PLANES 28
-
-/* A chunk's codes in TEXP, words:
- *   for each plane a header and a mask: bit i of its 4 words says whether splat i has this plane's atom
- *   for each plane the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits; the
- *   next plane starts on a word
- * Plane t's mask holds no splat that plane t - 1's does not. The weight's code is signed. Header: */
-#define SPL_TEXTURE_PLANE_WORDS (1 + SPL_CHUNK_SPLATS / 32)
-#define SPL_TEXTURE_INDEX_BITS 0   /* 0..4, 0..16 */
-#define SPL_TEXTURE_WEIGHT_BITS 5  /* 5..8, 1..8 */
-#define SPL_TEXTURE_STEP 9         /* 9..16, of spl_code_step() */
-#define SPL_TEXTURE_OFFSET 17      /* 17..31, of the plane's codes, words from the chunk's first */
+/* CTEX is a uint32_t for each chunk, TEXP words that they name: SPL_CHUNK_TEXTURE_*, SPL_TEXTURE_* of shared.h. */
 
 /* r = 2 sqrt(area of a splat's share / pi): on a square grid of spacing h, eq. 20 gives r = 1.128 h. */
 #define SPL_RADIUS_SPACING 1.128379f

@@ -6,6 +6,8 @@
 
 #include <string.h>
 
+_Static_assert(SPL_TEXTURE_ATOMS == SPL_ATOMS_MAX, "as many atoms drawn as coded");
+
 enum { mask_words = SPL_CHUNK_SPLATS / 32 };
 
 static uint32_t part(uint32_t word, unsigned shift, unsigned bits)

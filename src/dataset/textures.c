@@ -52,6 +52,7 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
     info->atoms = header->count;
     info->texture_size = header->size;
     info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);
+    info->page_bytes += info->dictionary_bytes;
     info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY] = 8 * bytes;
     info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * dataset->chunk_textures_section->bytes;
     for (uint32_t page = 0; page < info->pages; page++)

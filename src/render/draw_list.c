@@ -32,6 +32,17 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
     return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
+static uint32_t planes(const struct spl_draw_chunk *chunk)
+{
+    return chunk->texture >> SPL_CHUNK_TEXTURE_PLANES;
+}
+
+/* Which row of the table of batches: one for each number of planes and phase. */
+static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
+{
+    return 2 * planes(&list->chunks[chunk]) + (chunk >= list->first_back_chunk);
+}
+
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = 0;
@@ -71,13 +82,13 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
         if (2 * before >= list->listed_splats && list->first_back_chunk == list->chunk_count)
             list->first_back_chunk = i;
         before += splats(&list->chunks[i]);
-        bool back = i >= list->first_back_chunk;
-        uint32_t *batch = &batch_of_page[(back ? pages : 0) + list->page_of_chunk[i]];
+        uint32_t row = row_of(list, i), *batch = &batch_of_page[row * pages + list->page_of_chunk[i]];
         if (*batch == UINT32_MAX) {
             if (grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err))
                 return SPL_E_NOMEM;
             *batch = (uint32_t)list->batch_count;
-            list->batches[list->batch_count++] = (struct spl_draw_batch){.page = list->page_of_chunk[i], .back = back};
+            list->batches[list->batch_count++] = (struct spl_draw_batch){
+                .page = list->page_of_chunk[i], .planes = (uint8_t)(row / 2), .back = row % 2};
         }
         list->batches[*batch].entries += runs(&list->chunks[i]);
     }
@@ -86,12 +97,13 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
 
 int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err)
 {
-    uint32_t *batch_of_page = spl_alloc_raw((size_t)pages * 2, sizeof *batch_of_page, err);
+    enum { rows = 2 * (SPL_TEXTURE_ATOMS + 1) };
+    uint32_t *batch_of_page = spl_alloc_raw((size_t)pages * rows, sizeof *batch_of_page, err);
     int rc = batch_of_page
                  ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)
                  : SPL_E_NOMEM;
     if (!rc) {
-        memset(batch_of_page, 0xff, (size_t)pages * 2 * sizeof *batch_of_page);
+        memset(batch_of_page, 0xff, (size_t)pages * rows * sizeof *batch_of_page);
         rc = count_batches(list, batch_of_page, pages, err);
     }
     uint32_t first = 0;
@@ -101,8 +113,7 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl
         list->batches[i].entries = 0;
     }
     for (size_t i = 0; i < list->chunk_count && !rc; i++) {
-        bool back = i >= list->first_back_chunk;
-        struct spl_draw_batch *batch = &list->batches[batch_of_page[(back ? pages : 0) + list->page_of_chunk[i]]];
+        struct spl_draw_batch *batch = &list->batches[batch_of_page[row_of(list, i) * pages + list->page_of_chunk[i]]];
         for (uint32_t run = 0; run < runs(&list->chunks[i]); run++)
             list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_RUN_BITS | run;
     }

@@ -10,10 +10,11 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page and phase: what one dispatch works off. The front phase is the nearer half of the
+/* The draw-list entries of one page, phase and number of planes of atoms: what one dispatch works off. The front phase is the nearer half of the
  * splats, whose depth occludes chunks of the back phase. */
 struct spl_draw_batch {
     uint32_t page;
+    uint8_t planes; /* 0 = no textures */
     bool back;
     uint32_t first_entry, entries;
 };

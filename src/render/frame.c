@@ -34,14 +34,24 @@ struct frame_job {
     struct spl_error page_error; /* why a page could not be loaded, unless it was only the limit */
 };
 
-static bool ask_page(void *context, uint32_t page)
+static bool ask_slot(struct frame_job *job, uint32_t slot)
 {
-    struct frame_job *job = context;
     struct spl_error why = {0};
-    int rc = spl_residency_ask(&job->renderer->residency, job->resident, page, &why);
+    int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, &why);
     if (rc && rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
         spl_fail(&job->page_error, rc, "%s", why.message);
     return rc == SPL_OK;
+}
+
+static bool ask_page(void *context, uint32_t page)
+{
+    return ask_slot(context, page);
+}
+
+static bool ask_textures(void *context, uint32_t page)
+{
+    struct frame_job *job = context;
+    return ask_slot(job, spl_dictionary_slot(job->resident)) && ask_slot(job, spl_textures_slot(job->resident, page));
 }
 
 static void fill_params(struct spl_tile *tile)
@@ -64,6 +74,7 @@ static void fill_params(struct spl_tile *tile)
         .inverse_fx = 1 / (float)camera->fx,
         .inverse_fy = 1 / (float)camera->fy,
         .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
+        .texture_size = spl_dataset_get_info(tile->resident->dataset)->texture_size,
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
     };
     for (int row = 0; row < 3; row++)
@@ -81,6 +92,8 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         .low_pass = tile->params.low_pass,
         .points = job->view->method == SPL_METHOD_POINTS,
         .resident = ask_page,
+        .atoms = spl_view_is_textured(job->view) ? job->view->atoms : 0,
+        .textured = ask_textures,
         .context = job,
     };
     spl_residency_begin_frame(&r->residency);

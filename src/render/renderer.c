@@ -69,14 +69,14 @@ int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_da
     *more = false;
     if (!resident)
         return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
-    if (page >= resident->page_count || (page > 0 && !spl_residency_has_room(&renderer->residency, resident, page)))
+    if (page >= resident->slot_count || (page > 0 && !spl_residency_has_room(&renderer->residency, resident, page)))
         return SPL_OK; /* the rest comes as views need it */
     spl_residency_begin_frame(&renderer->residency);
     struct spl_error why = {0};
     int rc = spl_residency_ask(&renderer->residency, resident, page, &why);
     if (page > 0 && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM))
         return SPL_OK;
-    *more = !rc && page + 1 < resident->page_count;
+    *more = !rc && page + 1 < resident->slot_count;
     return rc ? spl_fail(err, rc, "%s", why.message) : SPL_OK;
 }
 

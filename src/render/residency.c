@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "dataset/dictionary.h"
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -23,7 +24,7 @@ static void drop_page(struct spl_residency *residency, struct spl_resident_page 
 
 static void drop_dataset(struct spl_residency *residency, struct spl_resident_dataset *resident)
 {
-    for (uint32_t i = 0; i < resident->page_count; i++)
+    for (uint32_t i = 0; i < resident->slot_count; i++)
         drop_page(residency, &resident->pages[i]);
     free(resident->pages);
 }
@@ -50,9 +51,10 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
         residency->datasets = larger;
         residency->dataset_capacity = capacity;
     }
-    struct spl_resident_dataset resident = {.dataset = dataset,
-                                            .page_count = spl_dataset_get_info(dataset)->pages};
-    resident.pages = spl_alloc(resident.page_count, sizeof *resident.pages, err);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    struct spl_resident_dataset resident = {.dataset = dataset, .page_count = info->pages};
+    resident.slot_count = info->atoms ? 2 * info->pages + 1 : info->pages;
+    resident.pages = spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
         return SPL_E_NOMEM;
     residency->datasets[residency->dataset_count++] = resident;
@@ -86,7 +88,7 @@ static bool evict_one(struct spl_residency *residency)
     struct spl_resident_page *oldest = NULL;
     for (size_t i = 0; i < residency->dataset_count; i++) {
         struct spl_resident_dataset *resident = &residency->datasets[i];
-        for (uint32_t p = 0; p < resident->page_count; p++) {
+        for (uint32_t p = 0; p < resident->slot_count; p++) {
             struct spl_resident_page *page = &resident->pages[p];
             if (page->buffer && page->last_frame < residency->frame && (!oldest || page->last_frame < oldest->last_frame))
                 oldest = page;
@@ -112,9 +114,33 @@ int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buff
     }
 }
 
-static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_buffer *target,
-                                const struct spl_dataset *dataset, uint32_t page, size_t bytes, struct spl_error *err)
+/* What the file has of a slot; of a page the device takes a word more: a zero-width field at its very end still loads its
+ * word. */
+static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t slot)
 {
+    size_t bytes;
+    if (slot >= spl_dictionary_slot(resident))
+        return spl_dataset_get_info(resident->dataset)->dictionary_bytes;
+    if (slot >= resident->page_count)
+        return spl_dataset_get_texture_bytes(resident->dataset, slot - resident->page_count);
+    spl_dataset_get_page(resident->dataset, slot, &bytes);
+    return bytes + 4;
+}
+
+static int read_slot(const struct spl_resident_dataset *resident, uint32_t slot, void *out, struct spl_error *err)
+{
+    if (slot < resident->page_count)
+        return spl_dataset_read_page(resident->dataset, slot, out, err);
+    if (slot < spl_dictionary_slot(resident))
+        return spl_dataset_read_textures(resident->dataset, slot - resident->page_count, out, err);
+    spl_dictionary_expand(spl_dataset_get_dictionary(resident->dataset), out);
+    return SPL_OK;
+}
+
+static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_buffer *target,
+                                const struct spl_resident_dataset *resident, uint32_t slot, struct spl_error *err)
+{
+    size_t bytes = bytes_of(resident, slot);
     if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) < bytes) {
         spl_gpu_buffer_destroy(residency->gpu, residency->staging);
         residency->staging = NULL;
@@ -125,7 +151,7 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
     if (rc)
         return rc;
     uint64_t ticket;
-    if (!(rc = spl_dataset_read_page(dataset, page, spl_gpu_buffer_map(residency->staging), err)))
+    if (!(rc = read_slot(resident, slot, spl_gpu_buffer_map(residency->staging), err)))
         rc = spl_gpu_begin(residency->gpu, err);
     if (rc)
         return rc;
@@ -133,14 +159,6 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
     spl_gpu_barrier(residency->gpu);
     rc = spl_gpu_submit(residency->gpu, &ticket, err);
     return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
-}
-
-/* A word more than the page has: a zero-width field at its very end still loads its word. */
-static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t page)
-{
-    size_t bytes;
-    spl_dataset_get_page(resident->dataset, page, &bytes);
-    return bytes + 4;
 }
 
 bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
@@ -155,7 +173,7 @@ bool spl_residency_has_room(const struct spl_residency *residency, const struct 
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
 {
     uint64_t bytes = 0;
-    for (uint32_t page = 0; page < resident->page_count; page++)
+    for (uint32_t page = 0; page < resident->slot_count; page++)
         bytes += resident->pages[page].buffer ? bytes_of(resident, page) : 0;
     return bytes;
 }
@@ -167,17 +185,15 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     slot->last_frame = residency->frame;
     if (slot->buffer)
         return SPL_OK;
-    size_t bytes;
-    spl_dataset_get_page(resident->dataset, page, &bytes);
     bool software = spl_gpu_get_device(residency->gpu)->software;
     int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE,
                                        bytes_of(resident, page), &slot->buffer, err);
     if (rc)
         return rc;
     if (software)
-        rc = spl_dataset_read_page(resident->dataset, page, spl_gpu_buffer_map(slot->buffer), err);
+        rc = read_slot(resident, page, spl_gpu_buffer_map(slot->buffer), err);
     else
-        rc = fill_through_staging(residency, slot->buffer, resident->dataset, page, bytes, err);
+        rc = fill_through_staging(residency, slot->buffer, resident, page, err);
     if (rc)
         drop_page(residency, slot);
     else

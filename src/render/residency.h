@@ -15,11 +15,23 @@ struct spl_resident_page {
     uint64_t last_frame;           /* when it was last asked for */
 };
 
+/* A dataset's slots: its pages; where it has textures, as many of their codes by page, and one of the dictionary. Each comes
+ * and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
-    struct spl_resident_page *pages;
-    uint32_t page_count;
+    struct spl_resident_page *pages;    /* slot_count of them */
+    uint32_t page_count, slot_count;
 };
+
+static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)
+{
+    return resident->page_count + page;
+}
+
+static inline uint32_t spl_dictionary_slot(const struct spl_resident_dataset *resident)
+{
+    return 2 * resident->page_count;
+}
 
 struct spl_residency {
     struct spl_gpu *gpu;
@@ -39,11 +51,11 @@ void spl_residency_remove(struct spl_residency *residency, const struct spl_data
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
 
-/* Is page `page` resident, or does it fit without evicting another? */
+/* Is slot `page` resident, or does it fit without evicting another? */
 bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
                             uint32_t page);
 
-/* Bytes of the pages of `resident` that are on the device. */
+/* Bytes of the slots of `resident` that are on the device. */
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident);
 
 /* Starts a frame: what was asked for before may be evicted again. */
@@ -53,7 +65,7 @@ void spl_residency_begin_frame(struct spl_residency *residency);
 int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
                               struct spl_gpu_buffer **out, struct spl_error *err);
 
-/* Makes page `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
+/* Makes slot `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
 int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
                       struct spl_error *err);
 

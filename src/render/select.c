@@ -21,6 +21,7 @@ struct walk {
     struct spl_draw_list *list;
     const struct spl_node *nodes;
     const struct spl_chunk *chunks;
+    const uint32_t *textures; /* words of CTEX, NULL = none */
     double focal; /* larger of fx, fy */
     struct spl_occupancy occupancy;
 };
@@ -87,6 +88,24 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
+/* The chunk's word of CTEX with the planes that are drawn; 0 where its textures, no part of which is nearer than `near`,
+ * are less than so many samples wide that their mean colours show all there is. */
+static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
+{
+    enum { samples = 2 };
+    const struct spl_select_params *params = w->params;
+    uint32_t texture = params->atoms && w->textures ? w->textures[chunk - w->chunks] : 0;
+    if (!texture || 2 * chunk->radius_mean * w->focal < samples * fmax(near, params->camera->near))
+        return 0;
+    if (!params->textured(params->context, page)) {
+        w->list->complete = false;
+        return 0;
+    }
+    uint32_t planes = texture >> SPL_CHUNK_TEXTURE_PLANES;
+    planes = planes < params->atoms ? planes : params->atoms;
+    return (texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1)) | planes << SPL_CHUNK_TEXTURE_PLANES;
+}
+
 static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
                       double radius_share, struct spl_error *err)
 {
@@ -129,6 +148,8 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
         .normal_step = chunk->normal_step,
         .first_id = chunk->first_id,
         .count = count,
+        .texture = drawn_texture(w, chunk, page, near),
+        .texture_scale = (float)scale,
     };
     float *view[3] = {&out.origin_x, &out.origin_y, &out.origin_z};
     for (int i = 0; i < 3; i++) {
@@ -232,6 +253,7 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
         .list = list,
         .nodes = spl_dataset_get_nodes(params->dataset, &node_count),
         .chunks = spl_dataset_get_chunks(params->dataset, &chunk_count),
+        .textures = spl_dataset_get_chunk_textures(params->dataset),
         .focal = fmax(params->camera->fx, params->camera->fy),
     };
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);

@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include <splatd/camera.h>
+#include <splatd/render.h>
 
 #include "base/error.h"
 #include "dataset/dataset.h"
@@ -25,8 +25,17 @@ struct spl_select_params {
     double low_pass;                  /* samples */
     bool points;                      /* splats have no extent: chunks are never drawn by windows */
     bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
+    uint32_t atoms;                   /* of a splat's texture at most; 0 = none */
+    bool (*textured)(void *context, uint32_t page); /* may the page's textures be drawn? may load them; may be NULL where
+                                                       atoms is 0 */
     void *context;
 };
+
+/* Does the view draw textures where there are any: colours, by splats, with atoms? */
+static inline bool spl_view_is_textured(const struct spl_view *view)
+{
+    return view->method == SPL_METHOD_SPLAT && view->atoms && view->layers >> SPL_LAYER_COLOR & 1;
+}
 
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);

@@ -13,6 +13,10 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
         return "occlusion_tiles";
     if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
         return "occlusion_chunks";
+    if (slot >= SPL_KERNEL_SPLAT_TEXTURE && slot < SPL_KERNEL_POINTS) {
+        constants[(*count)++] = slot - SPL_KERNEL_SPLAT_TEXTURE + 1;
+        return wide ? "splat_texture64" : "splat_texture";
+    }
     if (slot < SPL_KERNEL_POINTS) {
         constants[(*count)++] = slot - SPL_KERNEL_SPLAT_SHADE;
         return wide ? "splat_shade64" : "splat_shade";
@@ -67,7 +71,7 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
     bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
 }
 
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases,
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases, int planes,
                              struct spl_error *err)
 {
     enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
@@ -77,9 +81,14 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)))
+        if (!(phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || (planes >= 0 && planes != batch->planes))
             continue;
         bindings[SPL_BIND_PAGE].buffer = tile->resident->pages[batch->page].buffer;
+        if (planes > 0) {
+            bindings[SPL_BIND_TEXTURES].buffer =
+                tile->resident->pages[spl_textures_slot(tile->resident, batch->page)].buffer;
+            bindings[SPL_BIND_ATOMS].buffer = tile->resident->pages[spl_dictionary_slot(tile->resident)].buffer;
+        }
         for (uint32_t done = 0; done < batch->entries;) {
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "shared.h"
 
 enum { side_max = 32768 };
 #define PIXELS_MAX (1ull << 28)
@@ -35,6 +36,7 @@ void spl_view_init(struct spl_view *view)
         .lod = 1,
         .supersample = 1,
         .background = {0, 0, 0, 255},
+        .atoms = SPL_TEXTURE_ATOMS,
         .margin = -1,
         .deadline_ns = UINT64_MAX,
     };
@@ -62,6 +64,9 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     double side = view->supersample;
     if (side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
+    if (view->atoms > SPL_TEXTURE_ATOMS)
+        return spl_fail_field(err, SPL_E_USAGE, "atoms", "atoms %u is not within 0 and %d", view->atoms,
+                              SPL_TEXTURE_ATOMS);
     if (!(view->margin <= 16))
         return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not a number up to 16", view->margin);
     return SPL_OK;

@@ -49,7 +49,7 @@ def test_requests_that_mean_the_same_share_an_etag():
             assert tag(same) == plain, same
         for other in ["lod=2", "quality=91", "format=png", "method=points", "background=000001", "layer=depth",
                       "near=0.5",
-                      "up=0,1,0", "cx=32.5", "supersample=2", "margin=1.5", "transparent=true"]:
+                      "up=0,1,0", "cx=32.5", "supersample=2", "margin=1.5", "atoms=3", "transparent=true"]:
             assert tag("eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&" + other) != plain, other
         assert d.status()["counters"]["frames"] == 0
 

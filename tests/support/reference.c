@@ -9,6 +9,9 @@
 #include "base/memory.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "dataset/dictionary.h"
+#include "dataset/texture.h"
+#include "geom/tangent.h"
 #include "render/occupancy.h"
 #include "render/select.h"
 
@@ -30,6 +33,11 @@ struct scene {
     struct sample *samples;
     uint32_t weight_max;
     float margin;
+    uint32_t *atoms;            /* the dictionary, expanded */
+    uint32_t *textures;         /* of page textures_page */
+    uint32_t textures_page;
+    const struct spl_chunk *coded; /* whose codes `code` has; NULL = none */
+    struct spl_chunk_code code;
 };
 
 struct disc {
@@ -37,6 +45,10 @@ struct disc {
     uint32_t id;
     uint8_t color[3];
     uint32_t window;      /* of the tile that it is drawn to; 0 = all of it */
+    float world[3], texture_scale; /* with atoms: its normal, and its radius over that of its texture */
+    uint32_t planes;      /* atoms that are drawn at most; 0 = plain */
+    const struct spl_chunk_code *code;
+    const struct spl_splat_code *atoms; /* its own, of `code` */
 };
 
 static bool always(void *context, uint32_t page)
@@ -95,7 +107,9 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
     }
 }
 
-static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z)
+/* Squared distance to the centre; `offset` from it, radii, in view space; view depth. */
+static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z,
+                      float offset[3])
 {
     float ox = (float)x + (0.5f - center[0]), oy = (float)y + (0.5f - center[1]);
     float near_center = (ox * ox + oy * oy) * (1 / (SPL_LOW_PASS * SPL_LOW_PASS));
@@ -109,14 +123,65 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float k = 1.0f / (divisor > 1e-6f ? divisor : 1e-6f), w = k - 1, fall = scale * w;
     float qx = rx * scale * w + ifx * scale * ox * k, qy = ry * scale * w + ify * scale * oy * k;
     float distance = qx * qx + qy * qy + fall * fall;
+    memcpy(offset, (float[]){qx, qy, fall}, 3 * sizeof *offset);
     *z = p[2] * (1 + (w < -reach ? -reach : w > reach ? reach : w));
     return distance < near_center ? distance : near_center;
+}
+
+/* A channel of an atom's texel, + 128, at the level of `side` texels. */
+static uint32_t texel_of(const struct scene *s, uint32_t atom, int channel, int column, int row, int side)
+{
+    int size = (int)spl_dataset_get_dictionary(s->dataset)->size;
+    const uint32_t *level = s->atoms + (size_t)atom * spl_dictionary_atom_words((uint32_t)size) + 1;
+    for (; size > side; size /= 2)
+        level += size * size;
+    return level[row * side + column] >> (16 - 8 * channel) & 255;
+}
+
+/* The colour of the splat's texture at `offset`. The level's texels are half a sample to a sample wide and the nearest one
+ * counts; where the finest are wider than a sample, they are interpolated in steps of a 16th. */
+static void sample_texture(const struct scene *s, const struct disc *d, const float offset[3], uint32_t color[3])
+{
+    const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
+    int size = (int)dictionary->size, side = SPL_TEXTURE_SIDE_MIN;
+    float diameter = 2 * d->radius / d->texture_scale * (float)s->camera.fx / d->p[2], u[3], v[3], uv[3], vv[3];
+    while (side < size && (float)side <= diameter)
+        side *= 2;
+    spl_tangent_frame(d->world, u, v);
+    to_view(&s->camera, u, uv);
+    to_view(&s->camera, v, vv);
+    float scale = 0.5f * (float)side * d->texture_scale, at[2] = {0.5f * (float)side, 0.5f * (float)side};
+    for (int i = 0; i < 3; i++) {
+        at[0] += offset[i] * (uv[i] * scale);
+        at[1] += offset[i] * (vv[i] * scale);
+    }
+    bool magnified = diameter > (float)size;
+    int corner[2], part[2];
+    for (int i = 0; i < 2; i++) {
+        float most = (float)side - (magnified ? 1 : 0.5f), value = fminf(fmaxf(at[i] - (magnified ? 0.5f : 0), 0), most);
+        corner[i] = (int)value;
+        corner[i] -= magnified && corner[i] == side - 1;
+        part[i] = magnified ? (int)((value - (float)corner[i]) * 16 + 0.5f) : 0;
+    }
+    for (int c = 0; c < 3; c++) {
+        double sum = d->color[c];
+        for (uint32_t t = 0; t < d->atoms->count && t < d->planes; t++) {
+            uint32_t atom = d->atoms->atom[t];
+            double weight = 255.0 * spl_code_weight(&d->code->plane[t], d->atoms->weight[t]) * dictionary->scale[atom];
+            uint32_t texel = 0;
+            for (int k = 0; k < (magnified ? 4 : 1); k++)
+                texel += texel_of(s, atom, c, corner[0] + k % 2, corner[1] + k / 2, side) *
+                         (uint32_t)((k % 2 ? part[0] : 16 - part[0]) * (k / 2 ? part[1] : 16 - part[1]));
+            sum += weight * (texel / 256.0 - 128);
+        }
+        color[c] = (uint32_t)fmin(fmax(sum + 0.5, 0), 255.5);
+    }
 }
 
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 {
     int first[2], last[2];
-    float center[2], z;
+    float center[2], z, from_center[3];
     footprint(s, d, first, last, center);
     float pixel = SPL_LOW_PASS * d->p[2] / (float)s->camera.fx;
     float inverse = 1.0f / d->p[2], rx = d->p[0] * inverse, ry = d->p[1] * inverse;
@@ -125,7 +190,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     float margin = s->margin * (d->radius > pixel ? d->radius : pixel) * slant;
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {
-            float distance = coverage(s, d, center, x, y, &z);
+            float distance = coverage(s, d, center, x, y, &z, from_center);
             if (!(distance < 1))
                 continue;
             struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
@@ -144,8 +209,11 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
             uint32_t offset = (uint32_t)((at->first - z) / at->first * 262144.0f + 0.5f);
             at->weight += weight;
             at->depth += (uint64_t)weight * (offset > 262143 ? 262143 : offset);
+            uint32_t color[3] = {d->color[0], d->color[1], d->color[2]};
+            if (d->planes)
+                sample_texture(s, d, from_center, color);
             for (int i = 0; i < 3; i++) {
-                at->color[i] += (uint64_t)weight * d->color[i];
+                at->color[i] += (uint64_t)weight * color[i];
                 at->normal[i] += (uint64_t)weight * (uint32_t)(d->n[i] * 127.0f + 127.5f);
             }
         }
@@ -171,6 +239,27 @@ static void point(struct scene *s, const struct disc *d)
     }
 }
 
+/* The codes of a chunk into s->code. */
+static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *chunk, uint32_t index)
+{
+    if (s->coded == chunk)
+        return;
+    if (!s->atoms) {
+        s->atoms = spl_alloc_raw(spl_dataset_get_info(s->dataset)->dictionary_bytes, 1, NULL);
+        spl_assert(s->atoms);
+        spl_dictionary_expand(spl_dataset_get_dictionary(s->dataset), s->atoms);
+    }
+    if (!s->coded || s->textures_page != page) {
+        free(s->textures);
+        s->textures = spl_alloc_raw(spl_dataset_get_texture_bytes(s->dataset, page), 1, NULL);
+        spl_assert(s->textures && !spl_dataset_read_textures(s->dataset, page, s->textures, NULL));
+        s->textures_page = page;
+    }
+    uint32_t texture = spl_dataset_get_chunk_textures(s->dataset)[index];
+    spl_texture_decode(s->textures + spl_texture_word(texture), spl_texture_planes(texture), chunk->count, &s->code);
+    s->coded = chunk;
+}
+
 static void for_each_disc(struct scene *s, bool shade)
 {
     uint32_t chunk_count;
@@ -194,6 +283,14 @@ static void for_each_disc(struct scene *s, bool shade)
             spl_chunk_decode(&local, page, index, &splat);
             struct disc d = {.radius = splat.radius, .id = draw->first_id + index, .window = draw->count >> SPL_COUNT_BITS};
             memcpy(d.color, splat.color, sizeof d.color);
+            memcpy(d.world, splat.normal, sizeof d.world);
+            d.texture_scale = draw->texture_scale;
+            d.planes = spl_texture_planes(draw->texture);
+            if (d.planes) {
+                load_code(s, batch->page, chunk, (uint32_t)(chunk - chunks));
+                d.code = &s->code;
+                d.atoms = &s->code.splat[index];
+            }
             to_view(&s->camera, splat.position, d.p);
             to_view(&s->camera, splat.normal, d.n);
             d.p[0] += draw->origin_x;
@@ -303,7 +400,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.margin = view->margin < 0 ? 1 : (float)view->margin;
     struct spl_select_params params = {
         .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = SPL_LOW_PASS, .resident = always,
-        .points = view->method == SPL_METHOD_POINTS};
+        .points = view->method == SPL_METHOD_POINTS, .textured = always,
+        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
     int rc = spl_select(&params, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
@@ -332,6 +430,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                 resolve_pixel(&s, x, y, frame);
     }
     free(s.samples);
+    free(s.textures);
+    free(s.atoms);
     spl_draw_list_finish(&s.list);
     if (rc)
         spl_frame_finish(frame);

@@ -85,6 +85,7 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (rc || (rc = resolve_layers(values, out, err)))
         return rc;
     view->supersample = get(values, PARAM_supersample, 1);
+    view->atoms = (uint32_t)fmin(get(values, PARAM_atoms, view->atoms), UINT32_MAX);
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)
             view->background[i] = (uint8_t)values->v[PARAM_background].n[i];

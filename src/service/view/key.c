@@ -93,7 +93,7 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
     add_number(&form, view->margin < 0 ? 1 : view->margin);
-    add(&form, view->layers & 1u << SPL_LAYER_COLOR ? background : 0);
+    add(&form, view->layers & 1u << SPL_LAYER_COLOR ? (uint64_t)view->atoms << 32 | background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {
         add_camera(&form, &request->pick.camera);

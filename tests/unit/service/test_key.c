@@ -89,6 +89,7 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
         "layer=id",
         "layer=coverage",
         "supersample=2",
+        "atoms=0",
         "supersample=0.5",
         "margin=0",
         "margin=1.5",

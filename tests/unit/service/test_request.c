@@ -51,7 +51,7 @@ static void every_parameter_arrives(void **state)
     struct spl_error err;
     assert_int_equal(
         query("eye=1,-2,3e0&target=0,0,0&up=0,1,0&fx=500&fy=510&cx=300&cy=200.5&width=640&height=480&near=0.5&"
-              "far=90&method=points&lod=2&layer=depth&supersample=2&margin=1.5&background=%23102030&"
+              "far=90&method=points&lod=2&layer=depth&supersample=2&atoms=5&margin=1.5&background=%23102030&"
               "transparent=true&format=npy&quality=77&depth_scale=5000",
               &r, &err),
         0);
@@ -61,6 +61,7 @@ static void every_parameter_arrives(void **state)
     assert_int_equal(r.view.method, SPL_METHOD_POINTS);
     assert_int_equal(r.view.layers, 1 << SPL_LAYER_DEPTH);
     assert_int_equal(r.view.supersample, 2);
+    assert_int_equal(r.view.atoms, 5);
     assert_true(r.view.lod == 2 && r.view.margin == 1.5);
     static const uint8_t background[] = {16, 32, 48, 0};
     assert_memory_equal(r.view.background, background, 4);
@@ -236,6 +237,9 @@ static void queries_are_refused_by_name(void **state)
         {"lod=65", "lod"},
         {"lod=1;2", "lod"},
         {"supersample=3", "supersample"},
+        {"atoms=9", "atoms"},
+        {"atoms=-1", "atoms"},
+        {"atoms=1e30", "atoms"},
         {"supersample=0", "supersample"},
         {"margin=-1", "margin"},
         {"margin=99", "margin"},

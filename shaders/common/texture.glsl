@@ -1,0 +1,119 @@
+/* A splat's texture: the sum of PLANES atoms at most, read from the codes of src/dataset/texture.c and the dictionary of
+ * src/dataset/dictionary.h. The level is the splat's: texels are between half a sample and a sample wide where the nearest
+ * one is taken, and the finest level is interpolated where its texels are wider than a sample. */
+#ifndef SPL_TEXTURE_GLSL
+#define SPL_TEXTURE_GLSL
+
+#include "common/disc.glsl"
+#include "common/tangent.glsl"
+
+layout(constant_id = 0) const uint PLANES = 1;
+
+layout(std430, binding = SPL_BIND_TEXTURES) readonly buffer texture_buffer { uint texture_words[]; };
+layout(std430, binding = SPL_BIND_ATOMS) readonly buffer atom_buffer { uint atom_words[]; };
+
+struct splat_texture {
+    uint count;                    /* atoms */
+    uint first[SPL_TEXTURE_ATOMS]; /* word of the level's first texel */
+    float weight[SPL_TEXTURE_ATOMS];
+    vec3 base;                     /* what the biased texels' sum is added to, in 255ths */
+    vec3 u, v;                     /* view space; (offset . u, offset . v) + side / 2 are texels */
+    float side;                    /* texels of the level */
+    bool magnified;
+};
+
+/* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; false where it has none. */
+bool load_atom(uint word, uint t, uint index, out uint atom, out float weight)
+{
+    uint header_at = word + t * SPL_TEXTURE_PLANE_WORDS, own = index >> 5, bit = index & 31u;
+    uint header = texture_words[header_at], mask = texture_words[header_at + 1u + own];
+    atom = 0u;
+    weight = 0.0;
+    if ((mask >> bit & 1u) == 0u)
+        return false;
+    uint before = bitCount(mask & ((1u << bit) - 1u));
+    for (uint w = 0u; w < own; w++)
+        before += bitCount(texture_words[header_at + 1u + w]);
+    uint index_bits = bitfieldExtract(header, SPL_TEXTURE_INDEX_BITS, 5);
+    uint weight_bits = bitfieldExtract(header, SPL_TEXTURE_WEIGHT_BITS, 4), width = index_bits + weight_bits;
+    uint at = before * width, code_at = word + (header >> SPL_TEXTURE_OFFSET) + (at >> 5);
+    uint code = funnel(texture_words[code_at], texture_words[code_at + 1u], at & 31u);
+    float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 8)) - 224.0) / 16.0);
+    atom = code & ((1u << index_bits) - 1u);
+    weight = step * (float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5);
+    return true;
+}
+
+/* `color` is the splat's own. */
+splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
+{
+    splat_texture x;
+    float texels = float(frame.texture_size), diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / s.position.z;
+    uint size = frame.texture_size, side = clamp(2u << findMSB(uint(clamp(diameter, 1.0, 64.0))), SPL_TEXTURE_SIDE_MIN, size);
+    uint level = 1u + (4u * (size * size - side * side)) / 3u;
+    uint atom_size = 1u + (4u * size * size - SPL_TEXTURE_SIDE_MIN * SPL_TEXTURE_SIDE_MIN) / 3u;
+    x.magnified = diameter > texels;
+    x.side = float(side);
+    x.count = 0u;
+    uint word = bitfieldExtract(chunk.texture, 0, SPL_CHUNK_TEXTURE_PLANES);
+    float sum = 0.0;
+    for (uint t = 0u; t < PLANES; t++) {
+        uint atom;
+        float weight;
+        x.first[t] = 0u;
+        x.weight[t] = 0.0;
+        if (load_atom(word, t, s.index, atom, weight)) {
+            uint at = atom * atom_size;
+            x.count = t + 1u;
+            x.first[t] = at + level;
+            x.weight[t] = 255.0 * weight * uintBitsToFloat(atom_words[at]);
+            sum += x.weight[t];
+        }
+    }
+    x.base = vec3(color) + 0.5 - 128.0 * sum;
+    vec3 u, v;
+    tangent_frame(s.world_normal, u, v);
+    float scale = 0.5 * x.side * chunk.texture_scale;
+    x.u = rotate_to_view(u) * scale;
+    x.v = rotate_to_view(v) * scale;
+    return x;
+}
+
+vec3 unpack_texel(uint word)
+{
+    return vec3(float(word >> 16), float(word >> 8 & 255u), float(word & 255u));
+}
+
+/* The colour, 8 bit, at `offset` from the splat's centre, in drawn radii. */
+uvec3 sample_texture(splat_texture x, vec3 offset)
+{
+    vec2 at = vec2(dot(offset, x.u), dot(offset, x.v)) + 0.5 * x.side;
+    vec3 color = x.base;
+    uint row = uint(x.side);
+    if (x.magnified) {
+        at = clamp(at - 0.5, vec2(0.0), vec2(x.side - 1.0));
+        vec2 corner = min(floor(at), vec2(x.side - 2.0));
+        uvec2 part = uvec2((at - corner) * 16.0 + 0.5);
+        uint w11 = part.x * part.y, w01 = 16u * part.x - w11, w10 = 16u * part.y - w11, w00 = 256u - w11 - w01 - w10;
+        uint texel = uint(corner.y) * row + uint(corner.x);
+        for (uint t = 0u; t < PLANES; t++) {
+            if (t < x.count) {
+                uint p = x.first[t] + texel;
+                uint a = atom_words[p], b = atom_words[p + 1u], c = atom_words[p + row], e = atom_words[p + row + 1u];
+                /* Two channels a product: the weights add up to 256, so that each fits its half word. */
+                uint rb = (a & 0xff00ffu) * w00 + (b & 0xff00ffu) * w01 + (c & 0xff00ffu) * w10 + (e & 0xff00ffu) * w11;
+                uint g = (a >> 8 & 255u) * w00 + (b >> 8 & 255u) * w01 + (c >> 8 & 255u) * w10 + (e >> 8 & 255u) * w11;
+                color += vec3(float(rb >> 16), float(g), float(rb & 0xffffu)) * (x.weight[t] * (1.0 / 256.0));
+            }
+        }
+    } else {
+        uvec2 cell = uvec2(clamp(at, vec2(0.0), vec2(x.side - 0.5)));
+        uint texel = cell.y * row + cell.x;
+        for (uint t = 0u; t < PLANES; t++)
+            if (t < x.count)
+                color += unpack_texel(atom_words[x.first[t] + texel]) * x.weight[t];
+    }
+    return uvec3(clamp(color, vec3(0.0), vec3(255.5)));
+}
+
+#endif
