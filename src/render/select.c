@@ -22,7 +22,7 @@ struct walk {
     const struct spl_node *nodes;
     const struct spl_chunk *chunks;
     const uint32_t *textures; /* words of CTEX, NULL = none */
-    double focal; /* larger of fx, fy */
+    double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
 };
 
@@ -88,8 +88,8 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
-/* The chunk's word of CTEX with the planes that are drawn; 0 where its textures, no part of which is nearer than `near`,
- * are less than so many samples wide that their mean colours show all there is. */
+/* The chunk's word of CTEX with the planes that are drawn; 0 where its textures, no part of which is nearer than
+ * `near`, are less than so many samples wide that their mean colours show all there is. */
 static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
 {
     enum { samples = 2 };

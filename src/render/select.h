@@ -20,14 +20,14 @@
 
 struct spl_select_params {
     const struct spl_dataset *dataset;
-    const struct spl_camera *camera;  /* of the tile, in samples */
-    double lod;                       /* samples; 0 = leaves in full */
-    double low_pass;                  /* samples */
-    bool points;                      /* splats have no extent: chunks are never drawn by windows */
+    const struct spl_camera *camera;                /* of the tile, in samples */
+    double lod;                                     /* samples; 0 = leaves in full */
+    double low_pass;                                /* samples */
+    bool points;                                    /* splats have no extent: chunks are never drawn by windows */
     bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
-    uint32_t atoms;                   /* of a splat's texture at most; 0 = none */
-    bool (*textured)(void *context, uint32_t page); /* may the page's textures be drawn? may load them; may be NULL where
-                                                       atoms is 0 */
+    uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
+    bool (*textured)(void *context, uint32_t page); /* may the page's textures be drawn? may load them; may be NULL
+                                                       where atoms is 0 */
     void *context;
 };
 

@@ -165,7 +165,7 @@ def test_a_body_says_all_that_a_query_does():
     look = {"eye": [3, 0.2, 1], "target": [0, 0, 1], "up": [0, 0, 1], "fov": 50}
     size, rest = {"width": 64, "height": 48, "near": 0.5, "far": 9}, dict(
         method="points", layer="depth", supersample=2, margin=0.5, background="102030", transparent=True, format="png",
-        lod=2, depth_scale=500)
+        lod=2, depth_scale=500, atoms=2)
     with Daemon(REAL) as d:
         by_query = d.view(eye="3,0.2,1", target="0,0,1", up="0,0,1", fov=50, **size, **{**rest, "transparent": "true"})
         assert by_query.status == 200

@@ -16,10 +16,10 @@
 #include "render/select.h"
 
 struct sample {
-    float first;          /* pushed depth, INFINITY = nothing */
-    float nearest;        /* method points: depth of the winner */
+    float first;   /* pushed depth, INFINITY = nothing */
+    float nearest; /* method points: depth of the winner */
     uint32_t id;
-    uint32_t payload;     /* method points: colour */
+    uint32_t payload; /* method points: colour */
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
@@ -28,13 +28,13 @@ struct sample {
 struct scene {
     const struct spl_dataset *dataset;
     const struct spl_view *view;
-    struct spl_camera camera;   /* in samples */
+    struct spl_camera camera; /* in samples */
     struct spl_draw_list list;
     struct sample *samples;
     uint32_t weight_max;
     float margin;
-    uint32_t *atoms;            /* the dictionary, expanded */
-    uint32_t *textures;         /* of page textures_page */
+    uint32_t *atoms;    /* the dictionary, expanded */
+    uint32_t *textures; /* of page textures_page */
     uint32_t textures_page;
     const struct spl_chunk *coded; /* whose codes `code` has; NULL = none */
     struct spl_chunk_code code;
@@ -44,9 +44,9 @@ struct disc {
     float p[3], n[3], radius;
     uint32_t id;
     uint8_t color[3];
-    uint32_t window;      /* of the tile that it is drawn to; 0 = all of it */
+    uint32_t window;               /* of the tile that it is drawn to; 0 = all of it */
     float world[3], texture_scale; /* with atoms: its normal, and its radius over that of its texture */
-    uint32_t planes;      /* atoms that are drawn at most; 0 = plain */
+    uint32_t planes;               /* atoms that are drawn at most; 0 = plain */
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
 };
@@ -138,8 +138,8 @@ static uint32_t texel_of(const struct scene *s, uint32_t atom, int channel, int 
     return level[row * side + column] >> (16 - 8 * channel) & 255;
 }
 
-/* The colour of the splat's texture at `offset`. The level's texels are half a sample to a sample wide and the nearest one
- * counts; where the finest are wider than a sample, they are interpolated in steps of a 16th. */
+/* The colour of the splat's texture at `offset`. The level's texels are half a sample to a sample wide and the nearest
+ * one counts; where the finest are wider than a sample, they are interpolated in steps of a 16th. */
 static void sample_texture(const struct scene *s, const struct disc *d, const float offset[3], uint32_t color[3])
 {
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
@@ -158,7 +158,8 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
     bool magnified = diameter > (float)size;
     int corner[2], part[2];
     for (int i = 0; i < 2; i++) {
-        float most = (float)side - (magnified ? 1 : 0.5f), value = fminf(fmaxf(at[i] - (magnified ? 0.5f : 0), 0), most);
+        float most = (float)side - (magnified ? 1 : 0.5f),
+              value = fminf(fmaxf(at[i] - (magnified ? 0.5f : 0), 0), most);
         corner[i] = (int)value;
         corner[i] -= magnified && corner[i] == side - 1;
         part[i] = magnified ? (int)((value - (float)corner[i]) * 16 + 0.5f) : 0;
@@ -281,7 +282,8 @@ static void for_each_disc(struct scene *s, bool shade)
             local.radius_step = draw->radius_step;
             struct spl_splat splat;
             spl_chunk_decode(&local, page, index, &splat);
-            struct disc d = {.radius = splat.radius, .id = draw->first_id + index, .window = draw->count >> SPL_COUNT_BITS};
+            struct disc d = {
+                .radius = splat.radius, .id = draw->first_id + index, .window = draw->count >> SPL_COUNT_BITS};
             memcpy(d.color, splat.color, sizeof d.color);
             memcpy(d.world, splat.normal, sizeof d.world);
             d.texture_scale = draw->texture_scale;
@@ -327,14 +329,16 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
 
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
 {
-    uint32_t side = (uint32_t)s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0, width = s->view->camera.width;
+    uint32_t side = (uint32_t)s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0,
+             width = s->view->camera.width;
     float nearest = INFINITY;
     uint64_t color[3] = {0};
     double normal[3] = {0}, depth = 0;
     size_t pixel = (size_t)y * width + x;
     for (uint32_t pass = 0; pass < 2; pass++) {
         for (uint32_t i = 0; i < side * side; i++) {
-            const struct sample *at = &s->samples[(size_t)(y * side + i / side) * s->camera.width + x * side + i % side];
+            const struct sample *at =
+                &s->samples[(size_t)(y * side + i / side) * s->camera.width + x * side + i % side];
             if (at->first == INFINITY)
                 continue;
             if (pass == 1) {
@@ -370,7 +374,8 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
     if (images[SPL_LAYER_DEPTH].pixels)
         ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
     if (images[SPL_LAYER_RANGE].pixels) {
-        double rx = ((x + 0.5) * side - s->camera.cx) / s->camera.fx, ry = ((y + 0.5) * side - s->camera.cy) / s->camera.fy;
+        double rx = ((x + 0.5) * side - s->camera.cx) / s->camera.fx,
+               ry = ((y + 0.5) * side - s->camera.cy) / s->camera.fy;
         ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(z * sqrt(1 + rx * rx + ry * ry));
     }
     if (images[SPL_LAYER_NORMAL].pixels) {
@@ -398,10 +403,14 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
     s.margin = view->margin < 0 ? 1 : (float)view->margin;
-    struct spl_select_params params = {
-        .dataset = dataset, .camera = &s.camera, .lod = view->lod, .low_pass = SPL_LOW_PASS, .resident = always,
-        .points = view->method == SPL_METHOD_POINTS, .textured = always,
-        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
+    struct spl_select_params params = {.dataset = dataset,
+                                       .camera = &s.camera,
+                                       .lod = view->lod,
+                                       .low_pass = SPL_LOW_PASS,
+                                       .resident = always,
+                                       .points = view->method == SPL_METHOD_POINTS,
+                                       .textured = always,
+                                       .atoms = spl_view_is_textured(view) ? view->atoms : 0};
     int rc = spl_select(&params, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
@@ -413,8 +422,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         if (!(view->layers >> i & 1))
             continue;
         struct spl_image *image = &frame->images[i];
-        *image = (struct spl_image){.layer = i, .type = types[i], .width = view->camera.width,
-                                    .height = view->camera.height};
+        *image = (struct spl_image){
+            .layer = i, .type = types[i], .width = view->camera.width, .height = view->camera.height};
         image->pixels = spl_alloc((size_t)image->width * image->height, spl_pixel_bytes(types[i]), err);
         rc = image->pixels ? SPL_OK : SPL_E_NOMEM;
     }
