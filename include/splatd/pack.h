@@ -15,6 +15,24 @@ struct spl_progress {          /* one call about every 100 ms while work runs, f
     double rate;               /* items per second */
 };
 
+/* Colours from photographs with known poses. */
+struct spl_photo_options {
+    const char *cameras;       /* COLMAP's folder, transforms.json, Open3D's trajectory, pose folder, or a list of views */
+    const char *images;        /* folder of the photographs; NULL = where `cameras` says */
+    const char *device;        /* as of struct spl_renderer_options: it draws how far the splats lie from each photograph */
+    uint64_t memory_bytes;     /* of this pass; 0 = 2 GiB */
+    /* Each photograph that cannot be used, and why: the others are still taken. NULL: the first one fails the packing. */
+    void (*refused)(void *context, const struct spl_error *why);
+    void *context;
+};
+
+struct spl_photo_report {
+    uint32_t photographs;      /* whose poses and files could be used */
+    uint32_t refused;
+    uint64_t unseen;           /* splats that none of them shows */
+    double seconds;
+};
+
 struct spl_pack_options {
     const char *const *inputs;
     size_t input_count;
@@ -24,6 +42,7 @@ struct spl_pack_options {
     double position_error;     /* mean, as a share of the splat radius; 0 = 0.016 */
     double normal_error;       /* mean, degrees; 0 = 1 */
     unsigned threads;          /* 0 = all cores */
+    const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
     void *progress_context;
 };
@@ -35,10 +54,12 @@ struct spl_pack_report {
     double position_error;     /* measured mean, share of the radius */
     double normal_error;       /* measured mean, degrees */
     double seconds;
+    struct spl_photo_report photos;
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
- * rename: a crash leaves the old file or none). Blocks; uses options->threads threads and at most about 80 bytes a point.
+ * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed as
+ * soon as it is open again, and then written with their colours. Blocks; uses options->threads threads and at most about 80 bytes a point.
  * `report` may be NULL. Any thread. */
 int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 

@@ -15,43 +15,59 @@
 
 static void usage(FILE *out)
 {
-    fprintf(out,
-            "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
-            "                   [--normal-error DEG] [--threads N]\n\n"
-            "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
-            "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
-            "once.\n\n"
-            "One scan, and what came of it:\n"
-            "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
-            "Several scans of one place, in the same coordinates, into one dataset:\n"
-            "  splatd pack street-*.las -o street.spld\n"
-            "Text whose columns nothing names ('-' skips one):\n"
-            "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
-            "Half the default errors, for a few bits more a splat:\n"
-            "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
-            "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
-            "      --columns LIST       of text inputs: x y z r g b intensity class nx ny nz -\n"
-            "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
-            "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
-            "      --normal-error DEG   mean, degrees (default 1)\n"
-            "      --threads N          default: all cores; the file does not depend on it\n\n"
-            "About 80 bytes of memory a point. Progress and the summary go to stderr.\n");
+    fprintf(
+        out,
+        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
+        "                   [--normal-error DEG] [--threads N] [--cameras MODEL [--images DIR] [--keep-going]]\n\n"
+        "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
+        "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
+        "once.\n\n"
+        "One scan, and what came of it:\n"
+        "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
+        "Several scans of one place, in the same coordinates, into one dataset:\n"
+        "  splatd pack street-*.las -o street.spld\n"
+        "Text whose columns nothing names ('-' skips one):\n"
+        "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
+        "Colours from photographs with poses, by COLMAP here:\n"
+        "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
+        "Half the default errors, for a few bits more a splat:\n"
+        "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
+        "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
+        "      --columns LIST       of text inputs: x y z r g b intensity class nx ny nz -\n"
+        "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
+        "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
+        "      --normal-error DEG   mean, degrees (default 1)\n"
+        "      --cameras MODEL      poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a "
+        "folder\n"
+        "                           of poses, or a list of views; in the scan's coordinates\n"
+        "      --images DIR         where the photographs lie; default: where MODEL says\n"
+        "      --keep-going         photographs that cannot be used are named and left out\n"
+        "      --memory MIB         of the photographs' pass (default 2048)\n"
+        "      --device D           that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name\n"
+        "      --threads N          default: all cores; the file does not depend on it\n\n"
+        "About 80 bytes of memory a point. Progress and the summary go to stderr.\n");
 }
 
-static char part_path[4096];
+static char
+    part_paths[3][4096]; /* of the dataset; of the scan alone while photographs are put onto it, and its own part */
 
 static void remove_part(int signal_number)
 {
-    unlink(part_path);
+    for (int i = 0; i < 3; i++)
+        if (part_paths[i][0])
+            unlink(part_paths[i]);
     signal(signal_number, SIG_DFL);
     raise(signal_number);
 }
 
 static void catch_signals(const char *output)
 {
-    int length = snprintf(part_path, sizeof part_path, "%s.part-%ld", output, (long)getpid());
-    if (length < 0 || (size_t)length >= sizeof part_path)
+    long pid = (long)getpid();
+    int length = snprintf(part_paths[2], sizeof part_paths[2], "%s.part-%ld-scan.part-%ld", output, pid, pid);
+    if (length < 0 || (size_t)length >= sizeof part_paths[2])
         return;
+    snprintf(part_paths[1], sizeof part_paths[1], "%s.part-%ld-scan", output, pid);
+    snprintf(part_paths[0], sizeof part_paths[0], "%s.part-%ld", output, pid);
     struct sigaction action = {.sa_handler = remove_part, .sa_flags = (int)SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
@@ -77,12 +93,32 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
             r->normal_error);
+    if (r->photos.photographs)
+        fprintf(stderr, "%u photographs in %.1f s (%u could not be used); %.1f %% of the splats are on none\n",
+                r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);
     fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
+}
+
+static void name_refused(void *context, const struct spl_error *why)
+{
+    spl_cmd_progress_finish(context);
+    fprintf(stderr, "splatd: left out: %s\n", why->message);
 }
 
 int spl_cmd_pack(int argc, char **argv)
 {
-    enum { opt_columns = 256, opt_neighbours, opt_position, opt_normal, opt_threads };
+    enum {
+        opt_columns = 256,
+        opt_neighbours,
+        opt_position,
+        opt_normal,
+        opt_threads,
+        opt_cameras,
+        opt_images,
+        opt_keep,
+        opt_memory,
+        opt_device
+    };
     static const struct option options[] = {
         {"output", required_argument, NULL, 'o'},
         {"columns", required_argument, NULL, opt_columns},
@@ -90,12 +126,18 @@ int spl_cmd_pack(int argc, char **argv)
         {"position-error", required_argument, NULL, opt_position},
         {"normal-error", required_argument, NULL, opt_normal},
         {"threads", required_argument, NULL, opt_threads},
+        {"cameras", required_argument, NULL, opt_cameras},
+        {"images", required_argument, NULL, opt_images},
+        {"keep-going", no_argument, NULL, opt_keep},
+        {"memory", required_argument, NULL, opt_memory},
+        {"device", required_argument, NULL, opt_device},
         {"help", no_argument, NULL, 'h'},
         {0},
     };
     struct spl_cmd_progress progress = {0};
     struct spl_pack_options o = {.progress = spl_cmd_progress, .progress_context = &progress};
-    struct spl_pack_report report;
+    struct spl_photo_options photos = {.context = &progress};
+    struct spl_pack_report report = {0};
     struct spl_error err = {0};
     uint64_t number = 0;
     int result = 0;
@@ -121,6 +163,22 @@ int spl_cmd_pack(int argc, char **argv)
             result = spl_cmd_parse_count("--threads", optarg, 1, 64, &number, &err);
             o.threads = (unsigned)number;
             break;
+        case opt_cameras:
+            photos.cameras = optarg;
+            break;
+        case opt_images:
+            photos.images = optarg;
+            break;
+        case opt_keep:
+            photos.refused = name_refused;
+            break;
+        case opt_memory:
+            result = spl_cmd_parse_count("--memory", optarg, 64, 1 << 20, &number, &err);
+            photos.memory_bytes = number << 20;
+            break;
+        case opt_device:
+            photos.device = optarg;
+            break;
         case 'h':
             usage(stdout);
             return 0;
@@ -137,6 +195,12 @@ int spl_cmd_pack(int argc, char **argv)
     }
     if (!o.output) {
         fprintf(stderr, "splatd: pack needs a dataset to write: -o NAME.spld\n");
+        return 2;
+    }
+    if (photos.cameras) {
+        o.photos = &photos;
+    } else if (photos.images || photos.refused || photos.memory_bytes || photos.device) {
+        fprintf(stderr, "splatd: photographs need their poses: --cameras MODEL\n");
         return 2;
     }
     o.inputs = (const char *const *)&argv[optind];

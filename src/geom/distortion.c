@@ -47,6 +47,16 @@ int spl_distortion_init(struct spl_distortion *d, struct spl_error *err)
                                          "params has distortion coefficients that fold the middle of the image");
 }
 
+double spl_distortion_invert(const struct spl_distortion *d, double image)
+{
+    double low = 0, high = d->reach;
+    for (int i = 0; i < 60; i++) {
+        double middle = (low + high) / 2;
+        *(image_of(d, middle) < image ? &low : &high) = middle;
+    }
+    return d->kind == SPL_DISTORTION_FISHEYE ? tan(low) : low;
+}
+
 bool spl_distortion_project(const struct spl_camera *camera, const struct spl_distortion *d, const double p[3],
                             double pixel[2], double *depth)
 {

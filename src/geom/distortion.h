@@ -21,6 +21,10 @@ struct spl_distortion {
  * finite, and those that turn the middle of the image inside out (field "params"). */
 int spl_distortion_init(struct spl_distortion *distortion, struct spl_error *err);
 
+/* The r (tangent of the angle off the axis) whose image has the radius `image`; that of `reach` for those beyond.
+ * Without the tangential terms. */
+double spl_distortion_invert(const struct spl_distortion *distortion, double image);
+
 /* As spl_camera_project(), through the lens. False also for points beyond `reach`. */
 bool spl_distortion_project(const struct spl_camera *camera, const struct spl_distortion *distortion, const double p[3],
                             double pixel[2], double *depth);

@@ -12,6 +12,10 @@ int spl_decode_png(FILE *file, const char *path, struct spl_image *out, struct s
 int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 
+/* The headers alone. */
+int spl_inspect_png(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);
+int spl_inspect_jpeg(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);
+
 /* Checks the size, then allocates out->pixels for out->type. */
 int spl_decode_begin(const char *path, uint64_t width, uint64_t height, struct spl_image *out, struct spl_error *err);
 

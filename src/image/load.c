@@ -21,10 +21,12 @@ static const struct {
     size_t magic_bytes;
     unsigned layers; /* bit per enum spl_layer */
     int (*decode)(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
+    int (*inspect)(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err); /* may be NULL */
 } formats[] = {
-    {"PNG", "\x89PNG\r\n\x1a\n", 8, 1 << SPL_LAYER_COLOR | 1 << SPL_LAYER_DEPTH | 1 << SPL_LAYER_RANGE, spl_decode_png},
-    {"JPEG", "\xff\xd8\xff", 3, 1 << SPL_LAYER_COLOR, spl_decode_jpeg},
-    {"NPY", "\x93NUMPY", 6, (1 << SPL_LAYER_COUNT) - 1, spl_decode_npy},
+    {"PNG", "\x89PNG\r\n\x1a\n", 8, 1 << SPL_LAYER_COLOR | 1 << SPL_LAYER_DEPTH | 1 << SPL_LAYER_RANGE, spl_decode_png,
+     spl_inspect_png},
+    {"JPEG", "\xff\xd8\xff", 3, 1 << SPL_LAYER_COLOR, spl_decode_jpeg, spl_inspect_jpeg},
+    {"NPY", "\x93NUMPY", 6, (1 << SPL_LAYER_COUNT) - 1, spl_decode_npy, NULL},
 };
 enum { FORMATS = sizeof formats / sizeof *formats };
 
@@ -43,7 +45,8 @@ int spl_decode_begin(const char *path, uint64_t width, uint64_t height, struct s
     return out->pixels ? SPL_OK : SPL_E_NOMEM;
 }
 
-static int load(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
+/* Which of the formats an open file has; negative on failure. */
+static int find_format(FILE *file, const char *path, struct spl_error *err)
 {
     struct stat status;
     unsigned char magic[8] = {0};
@@ -56,23 +59,50 @@ static int load(FILE *file, const char *path, struct spl_image *out, struct spl_
     while (format < FORMATS &&
            (length < formats[format].magic_bytes || memcmp(magic, formats[format].magic, formats[format].magic_bytes)))
         format++;
-    if (format == FORMATS)
-        return spl_fail(err, SPL_E_INPUT, "%s: is neither PNG nor JPEG nor NPY", path);
+    rewind(file);
+    return format < FORMATS ? format : spl_fail(err, SPL_E_INPUT, "%s: is neither PNG nor JPEG nor NPY", path);
+}
+
+static int load(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
+{
+    int format = find_format(file, path, err);
+    if (format < 0)
+        return format;
     if (!(formats[format].layers & 1u << out->layer))
         return spl_fail_field(err, SPL_E_UNSUPPORTED, "layer", "%s: a %s does not hold layer %s; write it as NPY", path,
                               formats[format].name, spl_layer_name(out->layer));
-    rewind(file);
     return formats[format].decode(file, path, out, err);
+}
+
+static int open_file(const char *path, FILE **file, struct spl_error *err)
+{
+    *file = fopen(path, "rbe");
+    return *file             ? SPL_OK
+           : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path)
+                             : spl_fail_errno(err, errno, "%s: cannot be opened", path);
+}
+
+int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_error *err)
+{
+    FILE *file;
+    *out = (struct spl_image_info){0};
+    int rc = open_file(path, &file, err), format = rc ? rc : find_format(file, path, err);
+    if (!rc && format >= 0 && !formats[format].inspect)
+        format = spl_fail(err, SPL_E_UNSUPPORTED, "%s: a %s is no photograph", path, formats[format].name);
+    rc = format < 0 ? format : formats[format].inspect(file, path, out, err);
+    if (file)
+        fclose(file);
+    return rc;
 }
 
 int spl_image_load(const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err)
 {
+    FILE *file;
     spl_assert((unsigned)layer < SPL_LAYER_COUNT);
     *out = (struct spl_image){.layer = layer, .type = types[layer]};
-    FILE *file = fopen(path, "rbe");
-    int rc = !file && errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path)
-             : !file                  ? spl_fail_errno(err, errno, "%s: cannot be opened", path)
-                                      : load(file, path, out, err);
+    int rc = open_file(path, &file, err);
+    if (!rc)
+        rc = load(file, path, out, err);
     if (file)
         fclose(file);
     if (rc)

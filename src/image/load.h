@@ -20,4 +20,14 @@ enum { SPL_IMAGE_PIXELS_MAX = 64 << 20 };
  * reading. */
 int spl_image_load(const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err);
 
+/* What an image file is, from its header alone. */
+struct spl_image_info {
+    uint32_t width, height;
+    unsigned bits; /* a channel: 1 to 16; 8 for JPEG, 0 for NPY */
+    bool cmyk;
+};
+
+/* As spl_image_load() without its pixels: PNG and JPEG. */
+int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_error *err);
+
 #endif

@@ -82,6 +82,23 @@ int spl_decode_png(FILE *file, const char *path, struct spl_image *out, struct s
     return rc;
 }
 
+int spl_inspect_png(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err)
+{
+    spng_ctx *ctx = spng_ctx_new(0);
+    if (!ctx)
+        return fail_png(path, SPNG_EMEM, err);
+    struct spng_ihdr header;
+    int status = spng_set_png_file(ctx, file);
+    if (!status)
+        status = spng_get_ihdr(ctx, &header);
+    if (!status)
+        *out = (struct spl_image_info){.width = header.width, .height = header.height, .bits = header.bit_depth};
+    if (!status && header.color_type == SPNG_COLOR_TYPE_INDEXED)
+        out->bits = 8; /* of what the indices stand for */
+    spng_ctx_free(ctx);
+    return status ? fail_png(path, status, err) : SPL_OK;
+}
+
 static int decompress(tjhandle handle, const uint8_t *bytes, size_t length, const char *path, struct spl_image *out,
                       struct spl_error *err)
 {
@@ -97,7 +114,24 @@ static int decompress(tjhandle handle, const uint8_t *bytes, size_t length, cons
     return SPL_OK;
 }
 
-int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
+static int inspect(tjhandle handle, const uint8_t *bytes, size_t length, const char *path, struct spl_image_info *out,
+                   struct spl_error *err)
+{
+    int width = 0, height = 0, sampling, colorspace = 0;
+    if (tjDecompressHeader3(handle, bytes, length, &width, &height, &sampling, &colorspace))
+        return spl_fail(err, SPL_E_INPUT, "%s: JPEG: %s", path, tjGetErrorStr2(handle));
+    if (width <= 0 || height <= 0) /* it ends within its header, which is no error to the decoder */
+        return spl_fail(err, SPL_E_INPUT, "%s: JPEG: ends within its header", path);
+    *out = (struct spl_image_info){.width = (uint32_t)width,
+                                   .height = (uint32_t)height,
+                                   .bits = 8,
+                                   .cmyk = colorspace == TJCS_CMYK || colorspace == TJCS_YCCK};
+    return SPL_OK;
+}
+
+/* Either what the file is, or its pixels. */
+static int read_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_image_info *info,
+                     struct spl_error *err)
 {
     struct stat status;
     if (fstat(fileno(file), &status))
@@ -116,9 +150,19 @@ int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct 
     else if (!(handle = tjInitDecompress()))
         rc = spl_fail(err, SPL_E_NOMEM, "%s: out of memory: no JPEG decoder could be made", path);
     else
-        rc = decompress(handle, bytes, length, path, out, err);
+        rc = info ? inspect(handle, bytes, length, path, info, err) : decompress(handle, bytes, length, path, out, err);
     if (handle)
         tjDestroy(handle);
     free(bytes);
     return rc;
+}
+
+int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
+{
+    return read_jpeg(file, path, out, NULL, err);
+}
+
+int spl_inspect_jpeg(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err)
+{
+    return read_jpeg(file, path, NULL, out, err);
 }

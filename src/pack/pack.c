@@ -7,14 +7,17 @@
 #include <splatd/pack.h>
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/emit.h"
+#include "pack/texture/pass.h"
 #include "pack/view.h"
 
 struct pack {
@@ -158,7 +161,8 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
     memcpy(report->attribute_bits, p->emitted.bits, sizeof report->attribute_bits);
 }
 
-int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+static int pack_scan(const struct spl_pack_options *options, const char *output, struct spl_pack_report *report,
+                     struct spl_error *err)
 {
     struct pack p = {.options = options};
     uint64_t begin_ns = spl_now_ns();
@@ -167,7 +171,7 @@ int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *rep
     p.stage.threads = spl_thread_count(options->threads);
     int rc = check_options(&p, err);
     if (!rc)
-        rc = spl_dataset_writer_create(options->output, &p.writer, err);
+        rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
         rc = spl_points_gather(&p.points, options->inputs, options->input_count, options->columns, &p.stage, err);
     if (!rc)
@@ -189,4 +193,43 @@ int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *rep
     spl_tree_finish(&p.tree);
     spl_points_finish(&p.points);
     return rc;
+}
+
+/* The dataset without its name, so that nothing of it is left when the process dies. */
+static int pack_photos(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+{
+    struct spl_stage stage = {.callback = options->progress,
+                              .context = options->progress_context,
+                              .threads = spl_thread_count(options->threads)};
+    struct spl_view_list photographs = {0};
+    struct spl_photo_report photos = {0};
+    struct spl_dataset *dataset = NULL;
+    char *path = NULL;
+    int rc = spl_photos_load(options->photos, &photographs, &photos, err);
+    if (!rc && asprintf(&path, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
+        path = NULL;
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
+    }
+    if (!rc && !(rc = pack_scan(options, path, report, err))) {
+        rc = spl_dataset_open(path, false, &dataset, err);
+        unlink(path);
+    }
+    if (!rc)
+        rc = spl_photos_apply(options->photos, &photographs, dataset, options->output, &stage, &photos, err);
+    spl_dataset_close(dataset);
+    dataset = NULL;
+    if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
+        memcpy(report->attribute_bits, spl_dataset_get_info(dataset)->attribute_bits, sizeof report->attribute_bits);
+        report->photos = photos;
+        report->seconds += photos.seconds;
+    }
+    spl_dataset_close(dataset);
+    spl_view_list_finish(&photographs);
+    free(path);
+    return rc;
+}
+
+int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+{
+    return options->photos ? pack_photos(options, report, err) : pack_scan(options, options->output, report, err);
 }

@@ -122,8 +122,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         put(files[0][0], data, size);
     }
     snprintf(path, sizeof path, kind ? "%s" : "%s/views.json", folder);
-    check(&list, spl_view_list_load(&list, path, &err), &err, false);
-    err = (struct spl_error){0};
+    if (kind % 3 == 0 && size % 2) { /* one of both: reading costs more than all else */
+        check(&list, spl_view_list_load(&list, path, &err), &err, false);
+        return 0;
+    }
     const struct spl_photograph_options options = {
         .images = "/nowhere", .get_size = some_size, .refuse = count, .context = &refused};
     check(&list, spl_view_list_load_photographs(&list, path, &options, &err), &err, true);

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <cmocka.h>
+#include <turbojpeg.h>
 
 #include "base/memory.h"
 #include "image/load.h"
@@ -267,16 +268,53 @@ static int remove_file(void **state)
     return remove(path);
 }
 
+static void headers_say_what_a_photograph_is(void **state)
+{
+    (void)state;
+    struct spl_image_info info;
+    struct spl_error err = {0};
+    static uint8_t pixels[6 * 5 * 4];
+    struct spl_image image = {.type = SPL_PIXEL_RGBA8, .width = 6, .height = 5, .pixels = pixels};
+    struct spl_encoded encoded = put_encoded(&image, SPL_FORMAT_JPEG);
+    assert_int_equal(spl_image_get_info(path, &info, NULL), 0);
+    assert_true(info.width == 6 && info.height == 5 && info.bits == 8 && !info.cmyk);
+    put(encoded.bytes, 20); /* cut within its header */
+    assert_int_equal(spl_image_get_info(path, &info, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, path));
+    spl_encoded_finish(&encoded);
+    encoded = put_encoded(&image, SPL_FORMAT_PNG);
+    assert_int_equal(spl_image_get_info(path, &info, NULL), 0);
+    assert_true(info.width == 6 && info.height == 5 && info.bits == 8 && !info.cmyk);
+    spl_encoded_finish(&encoded);
+    static float depths[30];
+    struct spl_image depth = {
+        .layer = SPL_LAYER_DEPTH, .type = SPL_PIXEL_F32, .width = 6, .height = 5, .pixels = depths};
+    encoded = put_encoded(&depth, SPL_FORMAT_PNG);
+    assert_int_equal(spl_image_get_info(path, &info, NULL), 0);
+    assert_int_equal(info.bits, 16);
+    spl_encoded_finish(&encoded);
+    encoded = put_encoded(&depth, SPL_FORMAT_NPY);
+    assert_int_equal(spl_image_get_info(path, &info, NULL), SPL_E_UNSUPPORTED);
+    spl_encoded_finish(&encoded);
+    tjhandle handle = tjInitCompress();
+    unsigned char *bytes = NULL;
+    unsigned long length = 0;
+    assert_int_equal(tjCompress2(handle, pixels, 6, 0, 5, TJPF_CMYK, &bytes, &length, TJSAMP_444, 90, 0), 0);
+    put(bytes, length);
+    tjFree(bytes);
+    tjDestroy(handle);
+    assert_int_equal(spl_image_get_info(path, &info, NULL), 0);
+    assert_true(info.cmyk && info.width == 6);
+    assert_int_equal(spl_image_get_info("/nowhere.png", &info, NULL), SPL_E_NOT_FOUND);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_no_image_is_refused),
-        cmocka_unit_test(broken_npy_is_refused_by_field),
-        cmocka_unit_test(npy_comes_back_to_the_bit),
-        cmocka_unit_test(pictures_come_back),
-        cmocka_unit_test(depth_png_has_steps_and_nothing),
-        cmocka_unit_test(a_bomb_is_refused_before_memory_is_taken),
-        cmocka_unit_test(no_refused_allocation_is_passed_over),
+        cmocka_unit_test(what_is_no_image_is_refused),      cmocka_unit_test(broken_npy_is_refused_by_field),
+        cmocka_unit_test(npy_comes_back_to_the_bit),        cmocka_unit_test(pictures_come_back),
+        cmocka_unit_test(depth_png_has_steps_and_nothing),  cmocka_unit_test(a_bomb_is_refused_before_memory_is_taken),
+        cmocka_unit_test(headers_say_what_a_photograph_is), cmocka_unit_test(no_refused_allocation_is_passed_over),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

@@ -1,0 +1,278 @@
+/* A photograph, its pyramid, and the depths of the splats from its eye.
+ *
+ * The depth map is drawn by the renderer from the dataset that is textured, so what hides a splat is what hides it in a
+ * frame. It is a pinhole's: a distorted photograph gets one that holds all that its lens saw. Levels are averages in
+ * sRGB as stored, weighted by alpha, so that a transparent sky does not bleed into what stands before it. */
+#include "pack/texture/photo.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "image/load.h"
+
+enum { black = 6, border_steps = 32 };
+static const double widest = 5; /* tangent of the angle off the axis to which depth is drawn */
+
+static int make_levels(struct spl_photo *photo, struct spl_error *err)
+{
+    for (uint32_t l = 1; l < SPL_PHOTO_LEVELS_MAX && (photo->width[l - 1] > 1 || photo->height[l - 1] > 1); l++) {
+        uint32_t w = photo->width[l - 1], h = photo->height[l - 1];
+        uint32_t width = photo->width[l] = (w + 1) / 2, height = photo->height[l] = (h + 1) / 2;
+        uint8_t *out = photo->texels[l] = spl_alloc_raw((size_t)width * height, 4, err);
+        if (!out)
+            return SPL_E_NOMEM;
+        photo->levels = l + 1;
+        for (uint32_t y = 0; y < height; y++)
+            for (uint32_t x = 0; x < width; x++, out += 4) {
+                unsigned sum[4] = {0};
+                for (int i = 0; i < 4; i++) {
+                    uint32_t sx = 2 * x + (uint32_t)(i % 2), sy = 2 * y + (uint32_t)(i / 2);
+                    const uint8_t *in =
+                        photo->texels[l - 1] + 4 * ((size_t)(sy < h ? sy : h - 1) * w + (sx < w ? sx : w - 1));
+                    for (int c = 0; c < 3; c++)
+                        sum[c] += (unsigned)in[c] * in[3];
+                    sum[3] += in[3];
+                }
+                for (int c = 0; c < 3; c++)
+                    out[c] = (uint8_t)(sum[3] ? (sum[c] + sum[3] / 2) / sum[3] : 0);
+                out[3] = (uint8_t)((sum[3] + 2) / 4);
+            }
+    }
+    return SPL_OK;
+}
+
+/* Mean difference of neighbours in green. */
+static double contrast(const struct spl_photo *photo, uint32_t level)
+{
+    uint64_t sum = 0;
+    uint32_t w = photo->width[level], h = photo->height[level];
+    for (uint32_t y = 0; y < h; y++)
+        for (uint32_t x = 1; x < w; x++) {
+            const uint8_t *p = photo->texels[level] + 4 * ((size_t)y * w + x);
+            sum += (uint64_t)abs(p[1] - p[-3]);
+        }
+    return (double)sum / ((double)w * h);
+}
+
+/* A sharp photograph differs from pixel to pixel as much at full size as at half size, a blurred one half as much. */
+static double find_sharpness(const struct spl_photo *photo)
+{
+    double half = photo->levels > 2 ? contrast(photo, 1) : 0;
+    double ratio = half > 0 ? contrast(photo, 0) / half : 1;
+    return fmin(fmax((ratio - 0.4) / 0.4, 0.2), 1);
+}
+
+static bool is_black(const struct spl_photo *photo)
+{
+    size_t count = (size_t)photo->width[0] * photo->height[0];
+    for (size_t i = 0; i < count; i++) {
+        const uint8_t *p = photo->texels[0] + 4 * i;
+        if (p[3] && (p[0] > black || p[1] > black || p[2] > black))
+            return false;
+    }
+    return true;
+}
+
+int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, struct spl_image *pixels,
+                   struct spl_error *err)
+{
+    const struct spl_camera *camera = &view->camera;
+    const char *path = view->photograph ? view->photograph : view->name;
+    *photo = (struct spl_photo){.view = view, .levels = 1};
+    photo->texels[0] = pixels->pixels;
+    photo->width[0] = pixels->width;
+    photo->height[0] = pixels->height;
+    *pixels = (struct spl_image){0};
+    int rc = SPL_OK;
+    if (photo->width[0] != camera->width || photo->height[0] != camera->height)
+        rc = spl_fail_field(err, SPL_E_INPUT, "width",
+                            "%s: %u x %u pixels; its camera says %u x %u: scale the photograph or its lens", path,
+                            photo->width[0], photo->height[0], camera->width, camera->height);
+    else if (is_black(photo))
+        rc = spl_fail(err, SPL_E_INPUT, "%s: nothing but black", path);
+    if (!rc)
+        rc = make_levels(photo, err);
+    if (!rc)
+        photo->sharpness = find_sharpness(photo);
+    if (rc)
+        spl_photo_close(photo);
+    return rc;
+}
+
+/* The widest that the lens saw, along each image edge, as tangents. */
+static void find_extent(const struct spl_named_view *view, double low[2], double high[2])
+{
+    const struct spl_camera *c = &view->camera;
+    low[0] = low[1] = INFINITY;
+    high[0] = high[1] = -INFINITY;
+    for (int i = 0; i <= 4 * border_steps; i++) {
+        double along = (double)(i % border_steps) / border_steps;
+        int edge = i / border_steps;
+        double u = edge == 1 || edge == 4 ? 1 : edge == 3 ? 0 : edge ? 1 - along : along;
+        double v = edge == 0 ? 0 : edge == 2 ? 1 : along;
+        double x = (u * c->width - c->cx) / c->fx, y = (v * c->height - c->cy) / c->fy, r = hypot(x, y);
+        double scale = 1;
+        if (view->distortion.kind != SPL_DISTORTION_NONE && r > 1e-9)
+            scale = fmin(spl_distortion_invert(&view->distortion, r), widest) / r;
+        const double p[2] = {x * scale, y * scale};
+        for (int a = 0; a < 2; a++) {
+            low[a] = fmin(low[a], p[a]);
+            high[a] = fmax(high[a], p[a]);
+        }
+    }
+}
+
+static struct spl_camera find_depth_camera(const struct spl_named_view *view, uint32_t side)
+{
+    struct spl_camera camera = view->camera;
+    double low[2], high[2];
+    find_extent(view, low, high);
+    double span = fmax((high[0] - low[0]) * camera.fx, (high[1] - low[1]) * camera.fy);
+    double scale = fmin(1, side / span);
+    camera.fx *= scale;
+    camera.fy *= scale;
+    camera.cx = -low[0] * camera.fx;
+    camera.cy = -low[1] * camera.fy;
+    camera.width = (uint32_t)fmax(1, ceil((high[0] - low[0]) * camera.fx - 1e-6));
+    camera.height = (uint32_t)fmax(1, ceil((high[1] - low[1]) * camera.fy - 1e-6));
+    return camera;
+}
+
+uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side)
+{
+    struct spl_camera depth = find_depth_camera(view, depth_side);
+    return (uint64_t)view->camera.width * view->camera.height * 4 * 4 / 3 + (uint64_t)depth.width * depth.height * 4;
+}
+
+static int render_depth(struct spl_photo *photo, struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                        struct spl_error *err)
+{
+    const char *path = photo->view->photograph;
+    struct spl_view view;
+    struct spl_frame frame;
+    struct spl_error why = {0};
+    spl_view_init(&view);
+    view.camera = photo->depth_camera;
+    view.layers = 1u << SPL_LAYER_DEPTH;
+    int rc = spl_renderer_render(renderer, dataset, &view, &frame, &why);
+    if (rc)
+        return spl_fail_field(err, rc, why.field, "%s: depth of the splats: %s", path, why.message);
+    photo->depth = frame.images[SPL_LAYER_DEPTH];
+    frame.images[SPL_LAYER_DEPTH] = (struct spl_image){0};
+    spl_frame_finish(&frame);
+    const float *depth = photo->depth.pixels;
+    size_t count = (size_t)photo->depth.width * photo->depth.height, seen = 0, close = 0;
+    double within = 4 * spl_dataset_get_info(dataset)->splat_radius;
+    for (size_t i = 0; i < count; i++) {
+        seen += !isnan(depth[i]);
+        close += depth[i] < within;
+    }
+    if (!seen)
+        return spl_fail(err, SPL_E_INPUT, "%s: its pose sees no splat; is the model in the scan's coordinates?", path);
+    if (close > count / 2)
+        return spl_fail(err, SPL_E_INPUT,
+                        "%s: its pose stands within the splats: %.0f %% of them are nearer than %.3g, four radii", path,
+                        100.0 * (double)close / (double)count, within);
+    return SPL_OK;
+}
+
+int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_renderer *renderer,
+                   const struct spl_dataset *dataset, uint32_t depth_side, struct spl_error *err)
+{
+    struct spl_image pixels = {0};
+    struct spl_image_info info;
+    *photo = (struct spl_photo){0};
+    int rc = spl_image_get_info(view->photograph, &info, err);
+    if (rc)
+        return rc;
+    if (info.bits != 8 || info.cmyk)
+        return spl_fail(err, SPL_E_UNSUPPORTED, "%s: %s; photographs are 8 bit sRGB: convert it", view->photograph,
+                        info.cmyk         ? "a CMYK image"
+                        : info.bits == 16 ? "16 bit channels"
+                                          : "channels below 8 bit");
+    if ((rc = spl_image_load(view->photograph, SPL_LAYER_COLOR, &pixels, err)) ||
+        (rc = spl_photo_init(photo, view, &pixels, err)))
+        return rc;
+    photo->depth_camera = find_depth_camera(view, depth_side);
+    if ((rc = render_depth(photo, renderer, dataset, err)))
+        spl_photo_close(photo);
+    return rc;
+}
+
+void spl_photo_close(struct spl_photo *photo)
+{
+    for (uint32_t l = 0; l < SPL_PHOTO_LEVELS_MAX; l++)
+        free(photo->texels[l]);
+    spl_image_finish(&photo->depth);
+    *photo = (struct spl_photo){0};
+}
+
+/* Adds `share` of the bilinear colour of a level to sum[4], premultiplied. */
+static void add_bilinear(const struct spl_photo *photo, uint32_t level, const double pixel[2], float share,
+                         float sum[4])
+{
+    int w = (int)photo->width[level], h = (int)photo->height[level];
+    double x = ldexp(pixel[0], -(int)level) - 0.5, y = ldexp(pixel[1], -(int)level) - 0.5;
+    int x0 = (int)floor(x), y0 = (int)floor(y);
+    float fx = (float)(x - x0), fy = (float)(y - y0);
+    for (int i = 0; i < 4; i++) {
+        int sx = x0 + i % 2, sy = y0 + i / 2;
+        sx = sx < 0 ? 0 : sx < w ? sx : w - 1;
+        sy = sy < 0 ? 0 : sy < h ? sy : h - 1;
+        const uint8_t *p = photo->texels[level] + 4 * ((size_t)sy * (size_t)w + (size_t)sx);
+        float weight = share * (i % 2 ? fx : 1 - fx) * (i / 2 ? fy : 1 - fy) * (float)p[3];
+        for (int c = 0; c < 3; c++)
+            sum[c] += weight * (float)p[c];
+        sum[3] += weight;
+    }
+}
+
+bool spl_photo_sample(const struct spl_photo *photo, const double pixel[2], double footprint, float rgb[3])
+{
+    if (!(pixel[0] >= 0 && pixel[0] <= photo->width[0] && pixel[1] >= 0 && pixel[1] <= photo->height[0]))
+        return false;
+    double level = footprint > 1 ? log2(footprint) : 0;
+    level = fmin(level, photo->levels - 1);
+    uint32_t l = (uint32_t)level;
+    float sum[4] = {0}, rest = (float)(level - l);
+    add_bilinear(photo, l, pixel, 1 - rest, sum);
+    if (rest > 0 && l + 1 < photo->levels)
+        add_bilinear(photo, l + 1, pixel, rest, sum);
+    if (sum[3] < 128)
+        return false;
+    for (int c = 0; c < 3; c++)
+        rgb[c] = sum[c] / sum[3];
+    return true;
+}
+
+enum spl_sight spl_photo_see(const struct spl_photo *photo, const double p[3], double slack)
+{
+    double pixel[2], depth;
+    int w = (int)photo->depth.width, h = (int)photo->depth.height;
+    const float *map = photo->depth.pixels;
+    if (!map)
+        return SPL_SIGHT_CLEAR;
+    if (!spl_camera_project(&photo->depth_camera, p, pixel, &depth) || !(pixel[0] >= 0 && pixel[0] < w) ||
+        !(pixel[1] >= 0 && pixel[1] < h))
+        return SPL_SIGHT_HIDDEN;
+    int x = (int)pixel[0], y = (int)pixel[1];
+    enum spl_sight sight = SPL_SIGHT_CLEAR;
+    bool beyond = true;
+    for (int dy = -2; dy <= 2; dy++)
+        for (int dx = -2; dx <= 2; dx++) {
+            int sx = x + dx, sy = y + dy;
+            if (sx < 0 || sy < 0 || sx >= w || sy >= h)
+                continue;
+            float there = map[sy * w + sx];
+            bool inner = abs(dx) < 2 && abs(dy) < 2;
+            if (inner && there < depth - slack)
+                return SPL_SIGHT_HIDDEN;
+            if (!inner && there < depth - 3 * slack)
+                sight = SPL_SIGHT_EDGE;
+            if (inner && there <= depth + 2 * slack)
+                beyond = false;
+        }
+    return beyond ? SPL_SIGHT_BEYOND : sight;
+}

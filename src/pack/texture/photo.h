@@ -1,0 +1,50 @@
+/* One photograph in memory while splats take their colours from it: its pixels as a pyramid, and how far away the
+ * splats lie that it sees. Loading belongs to the renderer's thread; afterwards it is read-only, any thread. */
+#ifndef SPL_PACK_TEXTURE_PHOTO_H
+#define SPL_PACK_TEXTURE_PHOTO_H
+
+#include <splatd/render.h>
+
+#include "cloud/views.h"
+
+enum { SPL_PHOTO_LEVELS_MAX = 16 };
+
+struct spl_photo {
+    const struct spl_named_view *view; // borrowed
+    uint32_t levels, width[SPL_PHOTO_LEVELS_MAX], height[SPL_PHOTO_LEVELS_MAX];
+    uint8_t *texels[SPL_PHOTO_LEVELS_MAX]; /* RGBA; level 0 is the file, each next one half of it */
+    struct spl_camera depth_camera;        /* the same eye, a pinhole that holds the whole of the photograph */
+    struct spl_image depth;                /* of the splats; NaN = nothing */
+    double sharpness;                      /* 0.2 (blurred) to 1 */
+};
+
+/* Loads the view's photograph and renders the dataset's depth, at most `depth_side` samples a side. Refuses what is no
+ * photograph of this pose: other sizes than the camera's, CMYK, 16 bit channels, nothing but black, an eye that stands
+ * within splats, a view without any. Errors name the file. On failure nothing is held. Blocks. */
+int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_renderer *renderer,
+                   const struct spl_dataset *dataset, uint32_t depth_side, struct spl_error *err);
+void spl_photo_close(struct spl_photo *photo);
+
+/* The same without a renderer, for pixels (taken over, also on failure) and depth that are there already; `depth` may
+ * have no pixels: then everything in the image is seen. */
+int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, struct spl_image *pixels,
+                   struct spl_error *err);
+
+/* What an opened photograph holds. */
+uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side);
+
+/* The colour (0..255) at `pixel`, averaged over about `footprint` pixels; false outside and where most of it is
+ * transparent. */
+bool spl_photo_sample(const struct spl_photo *photo, const double pixel[2], double footprint, float rgb[3]);
+
+/* How world point `p` at view depth `depth` lies to the splats in front of it. `slack`: metres that count as the same
+ * surface. */
+enum spl_sight {
+    SPL_SIGHT_HIDDEN, /* something is nearer */
+    SPL_SIGHT_EDGE,   /* something nearer ends within two samples */
+    SPL_SIGHT_CLEAR,
+    SPL_SIGHT_BEYOND, /* the splats there lie farther: the point floats in front of a silhouette's background */
+};
+enum spl_sight spl_photo_see(const struct spl_photo *photo, const double p[3], double slack);
+
+#endif

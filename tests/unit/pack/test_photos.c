@@ -1,0 +1,255 @@
+/* Photographs onto splats without a device: sampling, the best candidates, exposures, the choice of colours. Bad input
+ * first. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "pack/texture/colors.h"
+#include "support/make_dataset.h"
+
+enum { side = 64 };
+
+static struct spl_named_view make_view(void)
+{
+    struct spl_named_view view = {.name = (char *)"a", .photograph = (char *)"a.png"};
+    view.camera = (struct spl_camera){.near = 0.01, .far = INFINITY};
+    assert_int_equal(spl_camera_set_fov(&view.camera, 60, side, side, NULL), 0);
+    assert_int_equal(
+        spl_camera_look_at(&view.camera, (double[]){0, -2, 0}, (double[]){0, 0, 0}, (double[]){0, 0, 1}, NULL), 0);
+    return view;
+}
+
+static struct spl_image make_image(uint32_t width, uint32_t height, uint8_t left, uint8_t right)
+{
+    struct spl_image image = {.type = SPL_PIXEL_RGBA8, .width = width, .height = height};
+    uint8_t *p = image.pixels = malloc((size_t)width * height * 4);
+    assert_non_null(p);
+    for (uint32_t i = 0; i < width * height; i++, p += 4) {
+        p[0] = p[1] = p[2] = i % width < width / 2 ? left : right;
+        p[3] = 255;
+    }
+    return image;
+}
+
+static void what_is_no_photograph_of_the_camera_is_refused(void **state)
+{
+    (void)state;
+    struct spl_named_view view = make_view();
+    struct spl_photo photo;
+    struct spl_error err = {0};
+    struct spl_image image = make_image(side, side - 1, 9, 9);
+    assert_int_equal(spl_photo_init(&photo, &view, &image, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "a.png: 64 x 63"));
+    assert_null(photo.texels[0]);
+    err = (struct spl_error){0};
+    image = make_image(side, side, 3, 3);
+    assert_int_equal(spl_photo_init(&photo, &view, &image, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "black"));
+    for (int n = 1;; n++) {
+        image = make_image(side, side, 90, 90);
+        spl_memory_fail_after(n);
+        int rc = spl_photo_init(&photo, &view, &image, NULL);
+        spl_memory_fail_after(0);
+        assert_true(rc == 0 || rc == SPL_E_NOMEM);
+        spl_photo_close(&photo);
+        if (!rc)
+            break;
+    }
+}
+
+static void samples_follow_the_footprint_and_leave_the_sky_out(void **state)
+{
+    (void)state;
+    struct spl_named_view view = make_view();
+    struct spl_photo photo;
+    struct spl_image image = make_image(side, side, 40, 200);
+    uint8_t *pixels = image.pixels;
+    for (int i = 0; i < side * side / 2; i++) { /* the upper half is sky, of a colour that must not show */
+        pixels[4 * i] = 255;
+        pixels[4 * i + 3] = 0;
+    }
+    assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
+    float rgb[3];
+    assert_true(spl_photo_sample(&photo, (double[]){10.5, 50.5}, 1, rgb) && rgb[0] == 40);
+    assert_true(spl_photo_sample(&photo, (double[]){50.5, 50.5}, 1, rgb) && rgb[0] == 200);
+    assert_true(spl_photo_sample(&photo, (double[]){32, 50}, 1, rgb) && fabsf(rgb[0] - 120) < 0.01f);
+    assert_true(spl_photo_sample(&photo, (double[]){34.5, 50}, 16, rgb) && rgb[0] > 110 && rgb[0] < 180);
+    assert_true(spl_photo_sample(&photo, (double[]){10.5, 32.2}, 1, rgb) && rgb[0] == 40);
+    assert_false(spl_photo_sample(&photo, (double[]){10.5, 10.5}, 1, rgb));
+    assert_false(spl_photo_sample(&photo, (double[]){-0.1, 50}, 1, rgb));
+    assert_false(spl_photo_sample(&photo, (double[]){10, NAN}, 1, rgb));
+    spl_photo_close(&photo);
+}
+
+static void what_hides_a_splat_is_seen(void **state)
+{
+    (void)state;
+    struct spl_named_view view = make_view();
+    struct spl_image image = make_image(side, side, 90, 90);
+    struct spl_photo photo;
+    assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
+    photo.depth_camera = view.camera;
+    photo.depth = (struct spl_image){.type = SPL_PIXEL_F32, .width = side, .height = side};
+    float *depth = photo.depth.pixels = malloc(side * side * sizeof *depth);
+    for (int i = 0; i < side * side; i++)
+        depth[i] = i % side < side / 2   ? 1
+                   : i % side < side - 8 ? 2
+                                         : NAN;        /* an occluder on the left, sky on the right */
+    const double pixel = 2 * tan(M_PI / 6) * 2 / side; /* at depth 2 */
+    assert_int_equal(spl_photo_see(&photo, (double[]){-0.5, 0, 0}, 0.05), SPL_SIGHT_HIDDEN);
+    assert_int_equal(spl_photo_see(&photo, (double[]){0.5 * pixel, 0, 0}, 0.05), SPL_SIGHT_HIDDEN);
+    assert_int_equal(spl_photo_see(&photo, (double[]){1.5 * pixel, 0, 0}, 0.05), SPL_SIGHT_EDGE);
+    assert_int_equal(spl_photo_see(&photo, (double[]){4.5 * pixel, 0, 0}, 0.05), SPL_SIGHT_CLEAR);
+    assert_int_equal(spl_photo_see(&photo, (double[]){4.5 * pixel, -1, 0}, 0.05), SPL_SIGHT_BEYOND);
+    assert_int_equal(spl_photo_see(&photo, (double[]){30 * pixel, 0, 0}, 0.05), SPL_SIGHT_BEYOND);
+    assert_int_equal(spl_photo_see(&photo, (double[]){0, -3, 0}, 0.05), SPL_SIGHT_HIDDEN); /* behind the eye */
+    /* a splat that is hidden is no candidate, one in the clear is, one seen from the side is not */
+    struct spl_world_splat splat = {.position = {0.4, 0, 0}, .splat = {.normal = {0, 1, 0}, .radius = 0.02f}};
+    uint8_t color[3];
+    double clear = spl_candidate_judge(&photo, &splat, color);
+    assert_true(clear > 0 && color[0] == 90);
+    splat.position[0] = -0.4;
+    assert_true(spl_candidate_judge(&photo, &splat, color) == 0);
+    splat.position[0] = 0.4;
+    memcpy(splat.splat.normal, (float[]){0.70710678f, 0.70710678f, 0}, sizeof splat.splat.normal);
+    double slanted = spl_candidate_judge(&photo, &splat, color);
+    assert_true(slanted > 0 && slanted < clear);
+    memcpy(splat.splat.normal, (float[]){0, 0, 1}, sizeof splat.splat.normal);
+    assert_true(spl_candidate_judge(&photo, &splat, color) == 0);
+    spl_photo_close(&photo);
+}
+
+static void the_best_are_kept_in_any_order(void **state)
+{
+    (void)state;
+    static const uint16_t scores[6] = {500, 900, 100, 900, 700, 800};
+    for (int turn = 0; turn < 6; turn++) {
+        struct spl_candidates candidates;
+        assert_int_equal(spl_candidates_init(&candidates, 2, 4, NULL), 0);
+        for (int i = 0; i < 6; i++) {
+            uint16_t n = (uint16_t)((i * (turn % 2 ? 5 : 1) + turn) % 6);
+            spl_candidates_add(&candidates, 1, &(struct spl_candidate){.photo = n, .score = scores[n]});
+        }
+        const uint16_t wanted[4] = {1, 3, 5, 4};
+        for (int i = 0; i < 4; i++) {
+            assert_int_equal(candidates.list[4 + i].photo, wanted[i]);
+            assert_int_equal(candidates.list[i].photo, SPL_NO_PHOTO);
+        }
+        spl_candidates_finish(&candidates);
+    }
+    for (double w = 1e-6; w < 1e6; w *= 3)
+        assert_true(fabs(spl_candidate_weight(spl_candidate_score(w)) / w - 1) < 0.001);
+}
+
+/* Splat s is seen by photographs s % photos and the next, which saw it by their factors; every tenth wrongly. */
+static void fill(struct spl_candidates *candidates, uint32_t photos, const double *factor, bool contradicting)
+{
+    for (uint64_t s = 0; s < candidates->splats; s++) {
+        double truth = 60 + (double)(s * 2654435761u % 97);
+        for (uint32_t k = 0; k < 2; k++) {
+            uint32_t photo = (uint32_t)(s + k) % photos;
+            double value = truth / factor[photo];
+            if (s % 10 == 0 && k == 0)
+                value = 230;
+            if (contradicting && photo == 2)
+                value = 40 + (double)((s * 40503 + 7) % 151);
+            struct spl_candidate c = {.photo = (uint16_t)photo, .score = (uint16_t)(33000 - k)};
+            memset(c.color, (int)(value + 0.5), 3);
+            spl_candidates_add(candidates, s, &c);
+        }
+    }
+}
+
+static void exposures_are_found_among_outliers(void **state)
+{
+    (void)state;
+    const double factor[5] = {0.8, 1, 1.25, 0.9, 1 / 0.9};
+    struct spl_candidates candidates;
+    struct spl_gain gains[6];
+    assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0); /* nothing is seen: nothing changes */
+    for (int i = 0; i < 6; i++)
+        assert_true(gains[i].factor[0] == 1 && gains[i].shared == 0 && !spl_gain_contradicts(&gains[i]));
+    fill(&candidates, 5, factor, false);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0);
+    for (int i = 0; i < 5; i++) {
+        assert_true(fabs((double)gains[i].factor[1] / factor[i] - 1) < 0.03);
+        assert_false(spl_gain_contradicts(&gains[i]));
+    }
+    spl_candidates_finish(&candidates);
+    assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
+    fill(&candidates, 5, factor, true);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0);
+    assert_true(spl_gain_contradicts(&gains[2]));
+    assert_true(gains[0].agreement > gains[2].agreement && gains[4].agreement > gains[2].agreement);
+    spl_candidates_finish(&candidates);
+}
+
+static void the_majority_gives_the_colour_and_neighbours_lend(void **state)
+{
+    (void)state;
+    enum { count = 200 };
+    static struct make_splat made[count];
+    for (int i = 0; i < count; i++)
+        made[i] =
+            (struct make_splat){.position = {0.01 * i, 0, 0}, .normal = {0, 0, 1}, .radius = 0.01f, .color = {1, 2, 3}};
+    struct spl_dataset *dataset = make_dataset(made, count);
+    struct spl_splats splats;
+    struct spl_candidates candidates;
+    struct spl_chosen chosen;
+    struct spl_stage stage = {.threads = 2};
+    struct spl_gain gains[4];
+    for (int i = 0; i < 4; i++)
+        gains[i] = (struct spl_gain){.factor = {1, 1, 1}};
+    assert_int_equal(spl_splats_init(&splats, dataset, NULL), 0);
+    assert_int_equal(spl_candidates_init(&candidates, splats.count, 4, NULL), 0);
+    /* splat 0: the best is a passer-by, two others agree; splat 1: all agree, the best gives the detail; 2 to 9: none
+     */
+    static const struct spl_candidate seen[2][3] = {
+        {{0, 33200, {250, 0, 0}}, {1, 33100, {100, 100, 100}}, {2, 33000, {110, 100, 100}}},
+        {{0, 34000, {100, 100, 100}}, {1, 33000, {120, 100, 100}}, {2, 31000, {90, 100, 100}}},
+    };
+    for (uint64_t s = 0; s < 2; s++)
+        for (int k = 0; k < 3; k++)
+            spl_candidates_add(&candidates, s, &seen[s][k]);
+    assert_int_equal(spl_chosen_init(&chosen, &splats, &candidates, gains, 3, NULL, &stage, NULL), 0);
+    assert_int_equal(chosen.photo[0], 1);
+    assert_true(chosen.color[0][0] >= 100 && chosen.color[0][0] <= 110 && chosen.color[0][1] == 100);
+    assert_int_equal(chosen.photo[1], 0);
+    assert_true(chosen.color[1][0] >= 100 && chosen.color[1][0] < 110);
+    assert_int_equal(chosen.unseen, count - 2);
+    assert_int_equal(chosen.photo[5], SPL_NO_PHOTO);
+    assert_true(abs(chosen.color[5][0] - chosen.color[1][0]) <= 6 && chosen.color[5][1] == 100); /* lent by 0 and 1 */
+    assert_true(chosen.color[199][1] == 100); /* another chunk: the node's mean */
+    spl_chosen_finish(&chosen);
+    uint8_t(*own)[3] = calloc(splats.count, 3);
+    memset(own, 80, splats.count * 3);
+    gains[3] = (struct spl_gain){.factor = {1.5f, 1, 1}};
+    assert_int_equal(spl_chosen_init(&chosen, &splats, &candidates, gains, 3, (const uint8_t(*)[3])own, &stage, NULL),
+                     0);
+    assert_true(chosen.color[5][0] == 120 && chosen.color[5][1] == 80); /* its own, evened out */
+    free(own);
+    spl_chosen_finish(&chosen);
+    spl_candidates_finish(&candidates);
+    spl_splats_finish(&splats);
+    spl_dataset_close(dataset);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_no_photograph_of_the_camera_is_refused),
+        cmocka_unit_test(samples_follow_the_footprint_and_leave_the_sky_out),
+        cmocka_unit_test(what_hides_a_splat_is_seen),
+        cmocka_unit_test(the_best_are_kept_in_any_order),
+        cmocka_unit_test(exposures_are_found_among_outliers),
+        cmocka_unit_test(the_majority_gives_the_colour_and_neighbours_lend),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
