@@ -1,5 +1,5 @@
-"""deploy/Dockerfile, packages.txt, container.conf, splatd.conf, splatd.service and .dockerignore against each other and the
-daemon: sections of packages, libraries of the binary, user, ports, paths, probe and signal.
+"""deploy/Dockerfile, packages.txt, container.conf, splatd.conf, splatd.service and .dockerignore against each other and
+the daemon: sections of packages, libraries of the binary, user, ports, paths, probe and signal.
 
 usage: container.py [BINARY]     with the binary, its libraries are looked up too"""
 import fnmatch
@@ -12,7 +12,12 @@ import sys
 
 from facts import ROOT, find, packages, run
 
-DOCKERFILE, CONF, UNIT, IGNORE = ("deploy/Dockerfile", "deploy/container.conf", "deploy/splatd.service", ".dockerignore")
+DOCKERFILE, CONF, UNIT, IGNORE = (
+    "deploy/Dockerfile",
+    "deploy/container.conf",
+    "deploy/splatd.service",
+    ".dockerignore",
+)
 DPKG = pathlib.Path("/var/lib/dpkg/info")
 binary = sys.argv[1] if len(sys.argv) > 1 else None
 
@@ -35,9 +40,13 @@ def is_ignored(path, patterns):
     for pattern in patterns:
         keep, pattern = pattern.startswith("!"), pattern.lstrip("!")
         parts = path.split("/")
-        heads = ["/".join(parts[:n + 1]) for n in range(len(parts))]
-        hit = pattern == "*" or any(fnmatch.fnmatch(head, pattern) or pattern.startswith("**/") and
-                                    fnmatch.fnmatch(head.rsplit("/", 1)[-1], pattern[3:]) for head in heads)
+        heads = ["/".join(parts[: n + 1]) for n in range(len(parts))]
+        hit = pattern == "*" or any(
+            fnmatch.fnmatch(head, pattern)
+            or pattern.startswith("**/")
+            and fnmatch.fnmatch(head.rsplit("/", 1)[-1], pattern[3:])
+            for head in heads
+        )
         ignored = not keep if hit else ignored
     return ignored
 
@@ -63,6 +72,7 @@ def check(tree):
     def expect(condition, message):
         if not condition:
             wrong.append(message)
+
     lists, stages = packages(tree.read("deploy/packages.txt")), instructions(tree.read(DOCKERFILE))
     conf, host, ignore = tree.config(CONF), tree.config("deploy/splatd.conf"), tree.read(IGNORE)
     unit = dict(re.findall(r"^(\w+)=(.*)$", tree.read(UNIT), re.M))
@@ -74,8 +84,12 @@ def check(tree):
     for path in (DOCKERFILE, "deploy/quickstart.sh", "tests/run.sh"):
         asked = re.findall(r"install-packages\.sh\"?((?: [a-z]+)+)", tree.read(path))
         expect(asked and all(set(words.split()) <= set(lists) for words in asked), f"{path}: sections {asked}")
-    installs = [re.findall(r"install-packages\.sh ([a-z ]+)", rest) for stage in stages for name, rest in stage if name == "RUN"]
-    expect([words[0].split() for words in installs if words] == [["build"], ["run"]], f"{DOCKERFILE}: installs {installs}")
+    installs = [
+        re.findall(r"install-packages\.sh ([a-z ]+)", rest) for stage in stages for name, rest in stage if name == "RUN"
+    ]
+    expect(
+        [words[0].split() for words in installs if words] == [["build"], ["run"]], f"{DOCKERFILE}: installs {installs}"
+    )
     expect("apt-get install" not in tree.read(DOCKERFILE), f"{DOCKERFILE}: a package beside packages.txt")
     there = set().union(*(libraries_of(package) for package in lists["run"] | {"libc6"}))
     for library in libraries:
@@ -84,12 +98,25 @@ def check(tree):
     # What the context lets through.
     tops = set(re.findall(r"^subdir\('(\w+)'\)", tree.read("meson.build"), re.M)) - {"tests"}
     needed = [f"{top}/meson.build" for top in tops | {"tests"}] + ["meson.build", "meson_options.txt", "include/splatd"]
-    needed += [source for stage in stages for name, rest in stage if name == "COPY" and "--from" not in rest
-               for source in rest.split()[:-1] if source != "."]
+    needed += [
+        source
+        for stage in stages
+        for name, rest in stage
+        if name == "COPY" and "--from" not in rest
+        for source in rest.split()[:-1]
+        if source != "."
+    ]
     for path in needed:
         expect((ROOT / path).exists(), f"{DOCKERFILE}: no {path}")
         expect(not is_ignored(path, patterns), f"{IGNORE} keeps {path} out of the image")
-    for path in (".git/config", "build/src/splatd", "quickstart/courtyard.spld", "tests/run.sh", "deploy/x.spld", "url.key"):
+    for path in (
+        ".git/config",
+        "build/src/splatd",
+        "quickstart/courtyard.spld",
+        "tests/run.sh",
+        "deploy/x.spld",
+        "url.key",
+    ):
         expect(is_ignored(path, patterns), f"{IGNORE} lets {path} into the image")
 
     # Who it runs as, where it listens, what it reads and writes.
@@ -99,9 +126,15 @@ def check(tree):
     expect(set(conf) <= set(tree.parameters()), f"{CONF}: unknown {set(conf) - set(tree.parameters())}")
     expect(set(host) <= set(tree.parameters()), f"deploy/splatd.conf: unknown {set(host) - set(tree.parameters())}")
     ports = [conf[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")]
-    expect(ports == [host[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")] ==
-           [tree.parameters()[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")], f"{CONF}: ports {ports}")
-    expect(all(conf[name].startswith("0.0.0.0:") for name in ("listen", "ops-listen")), f"{CONF}: not reached from outside")
+    expect(
+        ports
+        == [host[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")]
+        == [tree.parameters()[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")],
+        f"{CONF}: ports {ports}",
+    )
+    expect(
+        all(conf[name].startswith("0.0.0.0:") for name in ("listen", "ops-listen")), f"{CONF}: not reached from outside"
+    )
     expect(not {"allow-anonymous", "tokens"} & set(conf), f"{CONF}: whom it lets in is the operator's word")
     expect(final["EXPOSE"].split() == ports, f"{DOCKERFILE}: EXPOSE {final['EXPOSE']}, not {ports}")
     expect(f"/dev/tcp/127.0.0.1/{ports[1]} " in final["HEALTHCHECK"], f"{DOCKERFILE}: HEALTHCHECK asks another port")
@@ -109,20 +142,31 @@ def check(tree):
     expect(path == "/healthz" and f'"{path}"' in tree.read(find("ops.c")), f"{DOCKERFILE}: HEALTHCHECK asks for {path}")
     json.loads(final["HEALTHCHECK"].split("CMD", 1)[1])
     data = conf["dataset"]
-    expect(data == host["dataset"] == final["VOLUME"] == unit["ReadOnlyPaths"], f"datasets: {data}, {final['VOLUME']}, …")
+    expect(
+        data == host["dataset"] == final["VOLUME"] == unit["ReadOnlyPaths"], f"datasets: {data}, {final['VOLUME']}, …"
+    )
     command = json.loads(final["ENTRYPOINT"]) + json.loads(final["CMD"])
     expect(unit["ExecStart"].split() == command, f"{DOCKERFILE} runs {command}, {UNIT} {unit['ExecStart']}")
-    expect(any(name == "COPY" and rest.split() == [CONF, command[-1]] for name, rest in image),
-           f"{DOCKERFILE}: {CONF} is not {command[-1]}")
+    expect(
+        any(name == "COPY" and rest.split() == [CONF, command[-1]] for name, rest in image),
+        f"{DOCKERFILE}: {CONF} is not {command[-1]}",
+    )
     environment = dict(word.split("=", 1) for name, rest in image if name == "ENV" for word in rest.split())
     for folder in [data] + [value for value in environment.values() if value.startswith("/")]:
         expect(re.search(rf"install -d .* {folder}\b", " ".join(runs)), f"{DOCKERFILE}: nobody makes {folder}")
-    expect({f"{name}={value}" for name, value in environment.items() if "/" in value} == set(unit["Environment"].split()),
-           f"{DOCKERFILE}, {UNIT}: {environment} against {unit['Environment']}")
-    expect("graphics" in environment["NVIDIA_DRIVER_CAPABILITIES"].split(","), f"{DOCKERFILE}: no Vulkan from NVIDIA's toolkit")
+    expect(
+        {f"{name}={value}" for name, value in environment.items() if "/" in value} == set(unit["Environment"].split()),
+        f"{DOCKERFILE}, {UNIT}: {environment} against {unit['Environment']}",
+    )
+    expect(
+        "graphics" in environment["NVIDIA_DRIVER_CAPABILITIES"].split(","),
+        f"{DOCKERFILE}: no Vulkan from NVIDIA's toolkit",
+    )
     expect(final["STOPSIGNAL"] == "SIGTERM", f"{DOCKERFILE}: STOPSIGNAL {final['STOPSIGNAL']} does not drain")
-    expect({rest.split()[0] for stage in stages for name, rest in stage if name == "FROM"} == {"debian:bookworm-slim"},
-           f"{DOCKERFILE}: the packages are Debian 12's")
+    expect(
+        {rest.split()[0] for stage in stages for name, rest in stage if name == "FROM"} == {"debian:bookworm-slim"},
+        f"{DOCKERFILE}: the packages are Debian 12's",
+    )
     return wrong
 
 

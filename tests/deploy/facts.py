@@ -1,8 +1,8 @@
-"""What the checks of deploy/ share: files with planted mistakes, and the facts that those files must agree with, read from
-where the daemon has them.
+"""What the checks of deploy/ share: files with planted mistakes, and the facts that those files must agree with, read
+from where the daemon has them.
 
-A check is a function of a Tree that returns what is wrong. run() asks that the tree as it is has nothing wrong, and that
-each planted mistake is found: a check that cannot fail is no check."""
+A check is a function of a Tree that returns what is wrong. run() asks that the tree as it is has nothing wrong, and
+that each planted mistake is found: a check that cannot fail is no check."""
 import os
 import pathlib
 import re
@@ -63,11 +63,12 @@ def size(text):
     return int(value) << 10 * " KMGT".index(unit or " ")
 
 
-def run(check, planted):
-    wrong = check(Tree())
+def run(check, planted, tree=Tree):
+    wrong = check(tree())
     for mistake in planted:
+        changed = tree(*mistake)
         try:
-            found = check(Tree(*mistake))
+            found = check(changed)
         except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
             found = [repr(error)]
         if not found:

@@ -1,6 +1,6 @@
-"""deploy/prometheus and deploy/grafana against the daemon's own /metrics: every metric, label and value that an expression
-names is there; every alert has a test that fires, one that does not, and its row in operating.md; the dashboard is sound.
-With promtool the rules and their tests are run; with a Prometheus every expression is asked of real data."""
+"""deploy/prometheus and deploy/grafana against the daemon's own /metrics: every metric, label and value that an
+expression names is there; every alert has a test that fires, one that does not, and its row in operating.md; the
+dashboard is sound. With promtool the tests of the rules are run; with a Prometheus every expression is asked of real data."""
 import json
 import pathlib
 import re
@@ -21,9 +21,13 @@ from promql import named
 sys.path.insert(0, str(ROOT / "tests/http"))
 from harness import REAL, VIEW, Daemon, eventually, fresh  # noqa: E402
 
-RULES, TESTS, SCRAPE, DASHBOARD, GUIDE = ("deploy/prometheus/rules.yml", "deploy/prometheus/tests.yml",
-                                          "deploy/prometheus/prometheus.yml", "deploy/grafana/splatd.json",
-                                          "deploy/operating.md")
+RULES, TESTS, SCRAPE, DASHBOARD, GUIDE = (
+    "deploy/prometheus/rules.yml",
+    "deploy/prometheus/tests.yml",
+    "deploy/prometheus/prometheus.yml",
+    "deploy/grafana/splatd.json",
+    "deploy/operating.md",
+)
 PROMTOOL, PROMETHEUS = shutil.which("promtool"), shutil.which("prometheus")
 TARGET = {"job", "instance", "le"}  # labels that Prometheus adds, and that of histograms
 VARIABLES = {"$__rate_interval": "5m", "$job": ".+", "$instance": ".+"}
@@ -41,7 +45,12 @@ def sample(text):
 
 def use(d):
     """A little of everything that is counted by route or state."""
-    for path in (fresh(f"{VIEW}?width=16&height=16"), f"{VIEW}?width=16&height=16", f"{VIEW}?width=16&height=16", "/v1/status"):
+    for path in (
+        fresh(f"{VIEW}?width=16&height=16"),
+        f"{VIEW}?width=16&height=16",
+        f"{VIEW}?width=16&height=16",
+        "/v1/status",
+    ):
         assert d.ask(path).status == 200
 
 
@@ -59,33 +68,49 @@ def panels_of(dashboard):
 
 def check_dashboard(dashboard, expect):
     panels = list(panels_of(dashboard))
-    expect(dashboard["schemaVersion"] >= 36 and dashboard["uid"] and dashboard["title"], "dashboard: no uid, title or schema")
+    expect(
+        dashboard["schemaVersion"] >= 36 and dashboard["uid"] and dashboard["title"],
+        "dashboard: no uid, title or schema",
+    )
     ids = [panel["id"] for panel in panels]
     expect(len(set(ids)) == len(ids), f"dashboard: ids {ids}")
     variables = {v["name"]: v for v in dashboard["templating"]["list"]}
-    expect(variables["datasource"]["type"] == "datasource" and variables["datasource"]["query"] == "prometheus",
-           "dashboard: no variable for the data source")
+    expect(
+        variables["datasource"]["type"] == "datasource" and variables["datasource"]["query"] == "prometheus",
+        "dashboard: no variable for the data source",
+    )
     taken = {}
     for panel in panels:
         place, title = panel["gridPos"], panel.get("title")
-        expect(place["x"] + place["w"] <= 24 and min(place.values()) >= 0 and place["w"] * place["h"] > 0, f"{title}: {place}")
+        expect(
+            place["x"] + place["w"] <= 24 and min(place.values()) >= 0 and place["w"] * place["h"] > 0,
+            f"{title}: {place}",
+        )
         for x in range(place["x"], place["x"] + place["w"]):
             for y in range(place["y"], place["y"] + place["h"]):
                 other = taken.setdefault((x, y), title)
                 expect(other == title, f"dashboard: '{title}' lies over '{other}'")
         if panel["type"] != "row":
-            expect(title and panel.get("description") and panel["targets"], f"panel {panel['id']}: title, description, targets?")
+            expect(
+                title and panel.get("description") and panel["targets"],
+                f"panel {panel['id']}: title, description, targets?",
+            )
             references = [target["refId"] for target in panel["targets"]]
             expect(len(set(references)) == len(references), f"{title}: refIds {references}")
             for thing in [panel, *panel["targets"]]:
-                expect(thing["datasource"] == {"type": "prometheus", "uid": "${datasource}"}, f"{title}: another data source")
+                expect(
+                    thing["datasource"] == {"type": "prometheus", "uid": "${datasource}"},
+                    f"{title}: another data source",
+                )
     for name in set(re.findall(r"\$(\w+)", json.dumps([p.get("targets") for p in panels]))) - set(variables):
         expect(name.startswith("__"), f"dashboard: no variable ${name}")
 
 
 def expressions(rules, dashboard):
     """[(where, expression)]"""
-    found = [(rule.get("record") or rule["alert"], rule["expr"]) for group in rules["groups"] for rule in group["rules"]]
+    found = [
+        (rule.get("record") or rule["alert"], rule["expr"]) for group in rules["groups"] for rule in group["rules"]
+    ]
     for panel in panels_of(dashboard):
         found += [(f"panel '{panel['title']}'", substituted(target["expr"])) for target in panel.get("targets", [])]
     for variable in dashboard["templating"]["list"]:
@@ -101,6 +126,7 @@ def check(tree):
     def expect(condition, message):
         if not condition:
             wrong.append(message)
+
     rules, tests = yaml.safe_load(tree.read(RULES)), yaml.safe_load(tree.read(TESTS))
     dashboard, guide, scrape = json.loads(tree.read(DASHBOARD)), tree.read(GUIDE), yaml.safe_load(tree.read(SCRAPE))
     every = [rule for group in rules["groups"] for rule in group["rules"]]
@@ -126,7 +152,7 @@ def check(tree):
                 known = METRICS.get(metric, {}).get(label) or (values.get(label) if foreign else None)
                 expect(known or label in TARGET, f"{where}: {metric} has no label {label}")
                 if known and value is not None and label != "software":
-                    expect(value in known, f"{where}: {metric} has no {label}=\"{value}\", but {sorted(known)}")
+                    expect(value in known, f'{where}: {metric} has no {label}="{value}", but {sorted(known)}')
         for text in re.findall(r'job="(\w+)"', expression):
             expect(text == scrape["scrape_configs"][0]["job_name"], f"{where}: job {text}")
     [target] = scrape["scrape_configs"][0]["static_configs"][0]["targets"]
@@ -136,10 +162,19 @@ def check(tree):
     tried = [t for group in tests["tests"] for t in group.get("alert_rule_test", [])]
     fire = {t["alertname"] for t in tried if t.get("exp_alerts")}
     quiet = {t["alertname"] for t in tried if not t.get("exp_alerts")}
-    checked = {metric for group in tests["tests"] for t in group.get("promql_expr_test", []) for metric, _ in named(t["expr"])[0]}
+    checked = {
+        metric
+        for group in tests["tests"]
+        for t in group.get("promql_expr_test", [])
+        for metric, _ in named(t["expr"])[0]
+    }
     expect(recorded <= checked, f"{TESTS}: nobody checks {recorded - checked}")
     runbook = set(re.findall(r"^\| `(Splatd\w+)` \| \S.* \| \S.* \|$", guide, re.M))
-    for what, names in (("a test that fires", fire), ("a test that stays quiet", quiet), ("a row in operating.md", runbook)):
+    for what, names in (
+        ("a test that fires", fire),
+        ("a test that stays quiet", quiet),
+        ("a row in operating.md", runbook),
+    ):
         expect(names == set(alerts), f"alerts and those with {what} differ: {names ^ set(alerts)}")
     for name, rule in alerts.items():
         expect(rule["labels"]["severity"] in ("warning", "critical"), f"{name}: severity {rule['labels']}")
@@ -152,7 +187,11 @@ def promtool():
     """What promtool says of the rules as they are, and that it notices a rule that changes."""
     folder = ROOT / "deploy/prometheus"
     wrong = []
-    for words in (["check", "rules", "rules.yml"], ["check", "config", "prometheus.yml"], ["test", "rules", "tests.yml"]):
+    for words in (
+        ["check", "rules", "rules.yml"],
+        ["check", "config", "prometheus.yml"],
+        ["test", "rules", "tests.yml"],
+    ):
         done = subprocess.run([PROMTOOL, *words], cwd=folder, capture_output=True, text=True)
         if done.returncode:
             wrong.append(f"promtool {' '.join(words)}: {done.stdout}{done.stderr}")
@@ -177,8 +216,15 @@ def prometheus(d):
         config["scrape_configs"][0].update(scrape_interval="300ms", scrape_timeout="300ms")
         config["scrape_configs"][0]["static_configs"][0]["targets"] = [f"127.0.0.1:{d.ops_port}"]
         pathlib.Path(top, "prometheus.yml").write_text(yaml.safe_dump(config))
-        process = subprocess.Popen([PROMETHEUS, f"--config.file={top}/prometheus.yml", f"--storage.tsdb.path={top}/data",
-                                    f"--web.listen-address=127.0.0.1:{port}", "--log.level=error"])
+        process = subprocess.Popen(
+            [
+                PROMETHEUS,
+                f"--config.file={top}/prometheus.yml",
+                f"--storage.tsdb.path={top}/data",
+                f"--web.listen-address=127.0.0.1:{port}",
+                "--log.level=error",
+            ]
+        )
 
         def ask(expression):
             url = f"http://127.0.0.1:{port}/api/v1/query?" + urllib.parse.urlencode({"query": expression})
@@ -189,6 +235,7 @@ def prometheus(d):
                 return error.read().decode()
             except OSError:
                 return []
+
         try:
             eventually(lambda: ask("splatd_ready == 1"), 120)
             use(d)

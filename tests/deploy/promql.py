@@ -1,14 +1,14 @@
 """As much of PromQL as it takes to say which metrics and labels an expression names."""
 import re
 
-WORDS = set("by without on ignoring group_left group_right and or unless bool offset sum count avg min max rate increase delta "
-            "changes histogram_quantile avg_over_time max_over_time round clamp_max label_values topk deriv time".split())
+WORDS = set("by without on ignoring group_left group_right and or unless bool offset sum count avg min max rate "
+            "increase delta changes histogram_quantile avg_over_time max_over_time round".split())
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|\'(?:[^\'\\]|\\.)*\'|\[[^\]]*\]|[a-zA-Z_:][\w:]*|=~|!~|!=|\d[\w.]*|\S')
 
 
 def named(expression):
-    """[(metric, {label: value where it is matched by =, else None})], {labels of by, on, …}; ValueError for a word that is
-    no metric of ours, none of Prometheus' and no function."""
+    """[(metric, {label: value where it is matched by =, else None})], {labels of by, on, …}; ValueError for a word
+    that is no metric of ours, none of Prometheus' and no function."""
     tokens = TOKEN.findall(expression)
     selectors, labels, i = [], set(), 0
     while i < len(tokens):
