@@ -1,6 +1,6 @@
 """deploy/kubernetes as kubectl renders it, each overlay with and without the components: shapes of the objects, and
 everything that must agree: ports, probes, selectors, volumes, user, configuration, times and memory, the metric that
-scales, the variable that the ingress hashes by. The daemon is started with configuration and flags of the CPU overlay."""
+scales, the variable that the ingress hashes by. The daemon is started with what the overlay cpu gives it."""
 import os
 import pathlib
 import re

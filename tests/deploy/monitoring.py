@@ -1,6 +1,6 @@
 """deploy/prometheus and deploy/grafana against the daemon's own /metrics: every metric, label and value that an
 expression names is there; every alert has a test that fires, one that does not, and its row in operating.md; the
-dashboard is sound. With promtool the tests of the rules are run; with a Prometheus every expression is asked of real data."""
+dashboard is sound. promtool runs the tests of the rules, a Prometheus asks every expression of real data."""
 import json
 import pathlib
 import re
@@ -211,9 +211,9 @@ def prometheus(d):
         port = s.getsockname()[1]
     with tempfile.TemporaryDirectory() as top:
         config = yaml.safe_load((ROOT / SCRAPE).read_text())
-        config["global"] = {"evaluation_interval": "300ms"}
+        config["global"] = {"evaluation_interval": "1s"}
         config["rule_files"] = [str(ROOT / RULES)]
-        config["scrape_configs"][0].update(scrape_interval="300ms", scrape_timeout="300ms")
+        config["scrape_configs"][0].update(scrape_interval="1s", scrape_timeout="1s")
         config["scrape_configs"][0]["static_configs"][0]["targets"] = [f"127.0.0.1:{d.ops_port}"]
         pathlib.Path(top, "prometheus.yml").write_text(yaml.safe_dump(config))
         process = subprocess.Popen(
@@ -238,17 +238,17 @@ def prometheus(d):
 
         try:
             eventually(lambda: ask("splatd_ready == 1"), 120)
-            use(d)
             rules, dashboard = yaml.safe_load((ROOT / RULES).read_text()), json.loads((ROOT / DASHBOARD).read_text())
             alerts = {rule.get("alert") for group in rules["groups"] for rule in group["rules"]}
             wanted = [(where, e) for where, e in expressions(rules, dashboard) if where not in alerts]
             left, end = wanted, time.monotonic() + 120
             while left and time.monotonic() < end:
+                use(d)
                 answers = [(where, e, ask(e)) for where, e in left]
                 left = [(where, e) for where, e, answer in answers if not answer or isinstance(answer, str)]
                 if any(isinstance(answer, str) for *_, answer in answers):
                     break
-                time.sleep(0.2)
+                time.sleep(0.5)
             wrong = [f"{where}: a real Prometheus finds nothing: {e}: {ask(e)}" for where, e in left]
             for where, e in expressions(rules, dashboard):
                 if where in alerts and isinstance(ask(e), str):
