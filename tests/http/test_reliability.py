@@ -10,6 +10,7 @@ import shutil
 import socket
 import struct
 import tempfile
+import threading
 import time
 
 import openapi
@@ -150,15 +151,19 @@ def test_random_requests():
 def test_clients_that_leave_in_the_middle_of_a_reply():
     def descriptors():
         return len(os.listdir(f"/proc/{d.process.pid}/fd"))
-    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+    with Daemon(FAKE, "--cache", "0", FAKE_FRAME_MS=0) as d:
         assert d.ask(SMALL).status == 200
-        before = descriptors()
+        before, all_wait = descriptors(), threading.Barrier(8)
 
         def leave(i):
             s = socket.create_connection(("127.0.0.1", d.port), 60)
             s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             s.sendall(f"GET {VIEW}?width=1600&height=900&format=raw HTTP/1.1\r\nHost: x\r\n\r\n".encode())
             assert s.recv(1000).startswith(b"HTTP/1.1 200")
+            all_wait.wait(60)
+            if i == 0:
+                assert d.status()["memory"]["reply_bytes"] >= 1600 * 900 * 4, "nobody waits in the middle of a reply"
+            all_wait.wait(60)
             if i % 2:
                 s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             s.close()
