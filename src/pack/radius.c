@@ -9,9 +9,10 @@
  * neighbours' neighbours tell, as noise fades in a wider view, and give the normal where they show a surface;
  * - at a border a disc of full size would stick out: it is as small as the discs behind it allow;
  * - scan lines are often denser than they are apart, or come in bundles: then the neighbours lie along a line, or all
- * on one side. Where they leave a wide angle of a surface empty, more are asked. The radius then reaches to the nearest
- * point in each direction that has one, and counts the rest as a border: neighbours that fill half a disc are that much
- * closer.
+ * on one side. Where several stations' points lie over each other they fall at random, and leave empty places that no
+ * disc of a mean size reaches into. So the radius reaches towards the nearest point in each direction that has one;
+ * where a quarter of the surface holds none of the neighbours, more are asked, and what is empty then counts as a
+ * border: neighbours that fill half a disc are that much closer.
  *
  * Pure functions of the points; any thread. */
 #include "pack/radius.h"
@@ -128,6 +129,7 @@ static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighb
 struct place {
     double gap;     /* largest distance to the nearest point in a quarter of the plane, of quarters that hold any */
     double filled;  /* share of the eighths that hold any */
+    bool open;      /* a quarter is empty */
     bool on_line;   /* two opposite quarters are empty */
     bool one_sided; /* three eighths in a row are empty */
 };
@@ -141,6 +143,8 @@ static struct place place_of(const double nearest[8])
         quarter[e] = fmin(nearest[e], nearest[(e + 1) % 8]);
         if (quarter[e] < INFINITY)
             place.gap = fmax(place.gap, quarter[e]);
+        else
+            place.open = true;
         place.filled += nearest[e] < INFINITY ? 0.125 : 0;
         empty |= (unsigned)!(nearest[e] < INFINITY) << e;
     }
@@ -209,8 +213,10 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
         radius = fmin(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
     eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
-    if (*round > 0.1 || !(linear || place.on_line || place.one_sided))
+    if (*round > 0.1)
         return radius;
+    if (!linear && !place.open)
+        return fmax(radius, fmin(0.7 * place.gap, 2 * radius));
 
     spl_neighbours_find(v->neighbours, i, v->wide, near);
     if (linear) {
@@ -226,7 +232,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     place = place_of(nearest);
     radius *= sqrt(fmax(place.filled, 0.25));
     if (!place.one_sided)
-        return fmax(radius, fmin(0.75 * place.gap, 3 * radius));
+        return fmax(radius, fmin(0.65 * place.gap, 3 * radius));
     return fmin(fmax(at_border * radius, fmin(0.5 * place.gap, 3 * radius)),
                 along_border * least_radius(p, i, list, v->k));
 }
