@@ -2,7 +2,7 @@
  *
  *   nerfstudio  camera_path.json: its `camera_path`, OpenGL axes; render_width, render_height, fps, is_cycle
  *   Open3D      PinholeCameraTrajectory: world to camera, column-major; first pixel centre at (0, 0), moved to ours
- *   COLMAP      text model, images in the order of their names; a folder, or {"cameras_txt": …, "images_txt": …}
+ *   COLMAP      images in the order of their names; a folder (binary or text), or {"cameras_txt": …, "images_txt": …}
  *   TUM         text, `timestamp tx ty tz qx qy qz qw` a line, camera to world, +Z forward; no lens of its own
  *   splatd      {"keyframes": […]} or {"frames": […]}: views as in a list of views, each with a "time" if all have one
  *
@@ -28,8 +28,7 @@ struct spl_path_options {
 int spl_camera_path_from_json(json_t *json, const struct spl_path_options *options, struct spl_camera_path *path,
                               struct spl_error *err);
 
-/* A file of any of them (JSON when it begins with '{'), or the folder of a COLMAP text model. Blocks for the reading.
- */
+/* A file of any of them (JSON when it begins with '{'), or the folder of a COLMAP model. Blocks for the reading. */
 int spl_camera_path_load(const char *file, const struct spl_path_options *options, struct spl_camera_path *path,
                          struct spl_error *err);
 

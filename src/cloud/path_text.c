@@ -1,4 +1,4 @@
-/* Camera paths as text: TUM trajectories, and COLMAP's text model through the reader of view lists.
+/* Camera paths as text: TUM trajectories, and COLMAP's models through the readers of view lists.
  *
  * Any thread; no state. */
 #include <math.h>

@@ -42,7 +42,7 @@ static void usage(FILE *out)
 {
     fprintf(out,
             "usage: splatd tour NAME.spld --path FILE -o OUT.mp4|DIR [OPTION…]\n\n"
-            "Renders frames along a camera path: nerfstudio's camera_path.json, Open3D's trajectory, a COLMAP text\n"
+            "Renders frames along a camera path: nerfstudio's camera_path.json, Open3D's trajectory, a COLMAP\n"
             "model, a TUM trajectory, or keyframes of splatd itself.\n\n"
             "What nerfstudio's viewer has saved, as a video:\n"
             "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
@@ -51,7 +51,7 @@ static void usage(FILE *out)
             "Metric depth images of a recorded trajectory, one a pose, into a folder:\n"
             "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n"
             "Path:\n"
-            "  --path FILE              JSON, a TUM text, or the folder of a COLMAP text model\n"
+            "  --path FILE              JSON, a TUM text, or the folder of a COLMAP model, binary or text\n"
             "  --frames N               how many; or\n"
             "  --seconds S              how long. Neither: every camera of the path is a frame\n"
             "  --fps F                  frames a second (the path's own, or 30)\n"

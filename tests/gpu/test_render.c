@@ -91,9 +91,10 @@ static void same_images(const struct spl_dataset *dataset, const struct spl_view
 }
 
 /* Random splats in a cube around `center`: every orientation, radii over two decades. */
-static struct spl_dataset *random_cube(size_t count, const double center[3], double radius)
+static struct make_splat *random_splats(size_t count, const double center[3], double radius)
 {
     struct make_splat *splats = calloc(count, sizeof *splats);
+    assert_non_null(splats);
     for (size_t i = 0; i < count; i++) {
         double length = 0, n[3];
         for (int c = 0; c < 3; c++) {
@@ -106,6 +107,12 @@ static struct spl_dataset *random_cube(size_t count, const double center[3], dou
             splats[i].normal[c] = (float)(n[c] / sqrt(length));
         splats[i].radius = (float)(radius * pow(10, 2 * uniform() - 1));
     }
+    return splats;
+}
+
+static struct spl_dataset *random_cube(size_t count, const double center[3], double radius)
+{
+    struct make_splat *splats = random_splats(count, center, radius);
     struct spl_dataset *dataset = make_dataset(splats, count);
     free(splats);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
@@ -411,6 +418,37 @@ static void the_same_request_gives_the_same_bytes(void **state)
     done(dataset);
 }
 
+/* Discs that cut through each other, stored in another order: chunks are whole, so that their codes stay the same. */
+static void the_order_of_splats_changes_nothing(void **state)
+{
+    (void)state;
+    enum { chunks = 24, count = chunks * SPL_CHUNK_SPLATS, width = 160, height = 120 };
+    struct make_splat *splats = random_splats(count, origin, 0.05), *shuffled = calloc(count, sizeof *shuffled);
+    assert_non_null(shuffled);
+    for (size_t c = 0; c < chunks; c++)
+        memcpy(shuffled + (c * 7 + 5) % chunks * SPL_CHUNK_SPLATS, splats + c * SPL_CHUNK_SPLATS,
+               SPL_CHUNK_SPLATS * sizeof *splats);
+    struct spl_dataset *datasets[2] = {make_dataset(splats, count), make_dataset(shuffled, count)};
+    struct spl_frame frames[2];
+    struct spl_view view = looking(origin, 2, width, height);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(spl_renderer_add(renderer, datasets[i], NULL), SPL_OK);
+        assert_int_equal(spl_renderer_render(renderer, datasets[i], &view, &frames[i], NULL), SPL_OK);
+    }
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        const struct spl_image *a = &frames[0].images[layer], *b = &frames[1].images[layer];
+        int differs = memcmp(a->pixels, b->pixels, (size_t)width * height * spl_pixel_bytes(a->type)) != 0;
+        if (differs != (layer == SPL_LAYER_ID)) /* ids say where a splat is stored */
+            fail_msg("layer %s is %s", spl_layer_name((enum spl_layer)layer), differs ? "another" : "the same");
+    }
+    for (int i = 0; i < 2; i++) {
+        spl_frame_finish(&frames[i]);
+        done(datasets[i]);
+    }
+    free(splats);
+    free(shuffled);
+}
+
 static void a_lost_device_is_reported_and_replaced(void **state)
 {
     struct spl_renderer_options options = {.device = *state};
@@ -483,6 +521,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_prestate(small_tiles_give_the_same_image, device),
         cmocka_unit_test(coarse_frames_show_the_same_place),
         cmocka_unit_test(the_same_request_gives_the_same_bytes),
+        cmocka_unit_test(the_order_of_splats_changes_nothing),
         cmocka_unit_test_prestate(a_lost_device_is_reported_and_replaced, device),
         cmocka_unit_test(views_out_of_range_name_their_field),
         cmocka_unit_test(the_widest_codes_match),

@@ -196,6 +196,15 @@ def test_background_and_methods_change_the_picture():
         assert d.view(**near).body != d.view(**near, method="points").body
 
 
+def test_alpha_is_the_share_of_the_pixel_that_is_covered():
+    with Daemon(REAL) as d:
+        view = dict(**LOOK, width=160, height=120, supersample=4, format="raw")
+        alpha = d.view(**view, transparent="true").body[3::4]
+        coverage = struct.unpack("<19200f", d.view(**view, layer="coverage").body)
+        assert all(abs(a - 255 * c) <= 0.51 for a, c in zip(alpha, coverage))
+        assert {0, 255} < set(alpha) and any(0 < a < 255 for a in alpha), sorted(set(alpha))
+
+
 def test_keep_alive_serves_one_after_the_other():
     with Daemon(REAL) as d:
         connection = d.connect()

@@ -213,6 +213,52 @@ static void put(const char *folder, const char *name, const char *text)
     assert_true(file && fputs(text, file) >= 0 && !fclose(file));
 }
 
+/* A binary model's images.bin or cameras.bin: a count of 1, then words of the sizes that they have. */
+static void put_binary(const char *folder, bool images)
+{
+    static const double pose[7] = {-0.55772847375664971, -0.76215345285486739, -0.30022022910563139,
+                                   0.13389875988314353,  -0.06410832213881687, 0.16613728300474614,
+                                   4.6401280721795111};
+    static const double lens[4] = {500, 510, 331.25, 228.5};
+    const uint64_t one = 1, none = 0, size[2] = {640, 480};
+    const uint32_t id = 7, pinhole = 1;
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s.bin", folder, images ? "images" : "cameras");
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    size_t put = fwrite(&one, 8, 1, file) + fwrite(&id, 4, 1, file);
+    if (images)
+        put += fwrite(pose, 56, 1, file) + fwrite(&id, 4, 1, file) + fwrite("a.png", 6, 1, file) +
+               fwrite(&none, 8, 1, file);
+    else
+        put += fwrite(&pinhole, 4, 1, file) + fwrite(size, 16, 1, file) + fwrite(lens, 32, 1, file);
+    assert_int_equal(put, images ? 6 : 5);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void test_a_binary_model(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/splatd-path-XXXXXX", path[256];
+    struct spl_path_options options = {.width = 1280, .height = 960, .limits = &limits};
+    struct spl_camera_path loaded = {0};
+    struct spl_error err = {0};
+    assert_non_null(mkdtemp(folder));
+    put_binary(folder, false);
+    assert_int_equal(spl_camera_path_load(folder, &options, &loaded, &err), SPL_E_NOT_FOUND);
+    assert_non_null(strstr(err.message, "images.bin"));
+    put_binary(folder, true);
+    assert_int_equal(spl_camera_path_load(folder, &options, &loaded, NULL), 0);
+    assert_int_equal(loaded.count, 1);
+    assert_true(loaded.whole);
+    assert_pixel(&loaded, 0, 825, 546.25); /* the lens is scaled to the size that is asked for */
+    spl_camera_path_finish(&loaded);
+    for (int i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "%s/%s", folder, i == 0 ? "cameras.bin" : i == 1 ? "images.bin" : "");
+        remove(path);
+    }
+}
+
 static void test_files(void **state)
 {
     (void)state;
@@ -249,7 +295,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_golden_vectors),  cmocka_unit_test(test_own_sizes_and_defaults),
         cmocka_unit_test(test_times_and_order), cmocka_unit_test(test_bad_paths_are_named),
-        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_files),           cmocka_unit_test(test_a_binary_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
