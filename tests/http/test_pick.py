@@ -3,7 +3,7 @@ import json
 import math
 import struct
 
-from harness import FAKE, REAL, VIEW, Daemon, run
+from harness import FAKE, REAL, VIEW, Daemon, eventually, run
 
 PICK = VIEW.replace("/view", "/pick")
 WIDTH, HEIGHT = 160, 120
@@ -111,10 +111,13 @@ def test_bad_picks_are_refused_by_name():
 
 
 def test_a_pick_waits_in_the_queue_like_a_view():
-    with Daemon(FAKE, SPLATD_INJECT_LOSS_AFTER="1") as d:
+    with Daemon(FAKE, SPLATD_INJECT_LOSS_AFTER="1x2") as d:
         assert d.ask(f"{PICK}?x=1&y=1").json()["depth"] == d.ask(f"{PICK}?x=1&y=1").json()["depth"] > 100
         lost = d.ask(f"{PICK}?x=2&y=1")
         assert lost.status == 503 and lost.json()["type"] == "urn:splatd:error:device-lost"
+        eventually(lambda: d.ops("/readyz").status == 200)
+        assert d.post({"x": 3, "y": 1}, PICK).status == 200
+        assert d.post({"x": 4, "y": 1}, PICK).status == 503
 
 
 def every_parameter_of_a_pick(d):
@@ -142,6 +145,9 @@ def a_body_means_what_a_query_means(d):
         found = d.post({**rest, "camera": form}, PICK)
         assert found.status == 200, found.body
         assert math.dist(found.json()["position"], asked.json()["position"]) < 1e-6, (form, found.body, asked.body)
+    inside = {"eye": [3, 0, 1], "target": [0, 0, 1], "fov": 50, "near": 0.1, "far": 50}  # of the camera, not beside it
+    assert d.post({"x": 9, "y": 9, "camera": inside}, PICK).json() == d.ask(
+        f"{PICK}?x=9&y=9&eye=3,0,1&target=0,0,1&fov=50&near=0.1&far=50").json()
     assert d.post({**rest, "v": "0" * 16}, PICK).status == 404
 
 
