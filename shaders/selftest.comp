@@ -1,9 +1,10 @@
 /* Proves at open that a device runs our kernels as we mean them: struct layout of shared.h, specialisation constants,
- * storage bindings 0..7, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c checks every word.
+ * storage bindings 0..7, texel buffers, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c checks every word.
  *
  * OUTPUT: constants 0..7, then each field of frame, then each field of chunks[1], in the order of shared.h.
  * DRAW[i] -> SUMS[i] = bits of float(DRAW[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of DRAW, [3] or of ~PAGE;
- * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i. */
+ * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i, plus by how much texels differ from
+ * PAGE, which lies SPL_BIND_PAGE times its size into its buffer, and from 0 behind the buffer's end. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -34,6 +35,9 @@ layout(std430, binding = SPL_BIND_DEPTH) buffer Depth { uint depth[]; };
 layout(std430, binding = SPL_BIND_SUMS) writeonly buffer Sums { uint sums[]; };
 layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer Output { uint words[]; };
 layout(std430, binding = SPL_BIND_ID) writeonly buffer Id { uint ids[]; };
+
+layout(binding = SPL_TEXELS(SPL_TEXELS_PAGE), r32ui) uniform readonly uimageBuffer page_texels;
+layout(binding = SPL_TEXELS(SPL_TEXELS_CHUNKS), r32ui) uniform readonly uimageBuffer chunk_texels;
 
 uint at = 0;
 
@@ -95,7 +99,9 @@ void main()
         return;
     precise float f = float(draw[i]) * 0.5 + 0.25;
     sums[i] = floatBitsToUint(f);
-    ids[i] = i;
+    int texel = SPL_BIND_PAGE * page.length() + int(i);
+    uint page_differs = imageLoad(page_texels, texel).x - page[i], chunks_differ = imageLoad(chunk_texels, texel).x - page[i];
+    ids[i] = i + page_differs + chunks_differ + imageLoad(page_texels, 1 << 20).x;
 #ifdef SPL_ATOMICS_64
     atomicMin(depth[0], uint64_t(draw[i]) << 32 | uint64_t(i));
 #else

@@ -44,6 +44,19 @@
 #define SPL_BIND_TEXTURES SPL_BIND_OUTPUT /* uint[], one page's section TEXP as it lies in the file */
 #define SPL_BIND_ATOMS SPL_BIND_ID     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
 
+/* Some of them a second time, as texel buffers of words (image buffers, r32ui), whole and from their start: a software
+ * driver gathers texels for all lanes in one instruction, but reads storage buffers in a loop over the lanes. Vulkan
+ * numbers them behind the storage buffers, OpenGL as image units, of which it may have eight. */
+#define SPL_TEXELS_PAGE 0   /* SPL_BIND_PAGE */
+#define SPL_TEXELS_DEPTH 1  /* SPL_BIND_DEPTH */
+#define SPL_TEXELS_CHUNKS 2 /* SPL_BIND_CHUNKS, SPL_CHUNK_WORDS each */
+#define SPL_TEXELS_COUNT 3
+#ifdef VULKAN
+#define SPL_TEXELS(index) (SPL_BIND_COUNT + index)
+#else
+#define SPL_TEXELS(index) index
+#endif
+
 /* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */
 #define SPL_SUMS_COLOR 0
 #define SPL_SUMS_DEPTH 1  /* layers depth and range */
@@ -128,6 +141,8 @@ struct spl_draw_chunk {
 #define SPL_COLOR_V 8
 #define SPL_COLOR_BASE_Y 16
 
+#define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
+
 /* count: splats 0..7 (1..SPL_CHUNK_SPLATS; 0 = hidden), window 8..31: 0 = the whole tile, else column + 1 (12 bits) and row
  * (12 bits) in a grid of SPL_WINDOW samples a side. A chunk whose discs may be larger than a window is listed once a window:
  * a loop of a software driver's kernel ends after 65535 rounds, whether it is done or not, and one invocation draws
@@ -166,7 +181,7 @@ struct spl_frame_params {
 };
 
 #ifndef SPL_GLSL
-_Static_assert(sizeof(struct spl_draw_chunk) == 72, "spl_draw_chunk is 72 bytes on both sides");
+_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
 _Static_assert(sizeof(struct spl_frame_params) == 128, "spl_frame_params is 128 bytes on both sides");
 #endif

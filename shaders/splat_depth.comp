@@ -5,7 +5,8 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint depth[]; };
+coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
 void draw(splat_run run, splat s)
 {
@@ -17,7 +18,9 @@ void draw(splat_run run, splat s)
         float z;
         if (disc_sample(d, at, z) < 1.0) {
             precise float pushed = z + d.margin;
-            atomicMin(depth[sample_index(at)], floatBitsToUint(pushed));
+            uint index = sample_index(at), bits = floatBitsToUint(pushed);
+            if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */
+                atomicMin(depth[index], bits);
         }
         next_sample(d, at);
     }

@@ -25,7 +25,7 @@ layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
 layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
 #endif
 
-layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
 /* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves both. */
 #ifdef SPL_ATOMICS_64
@@ -88,7 +88,7 @@ void draw(splat_run run, splat s)
         float distance = disc_sample(d, sample_at, z, offset);
         uint at = sample_index(sample_at);
         if (distance < 1.0) {
-            float first = uintBitsToFloat(depth[at]);
+            float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
 #ifdef SPL_TEXTURED
             if (z <= first)
                 value = sample_texture(t, offset);

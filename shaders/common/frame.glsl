@@ -15,6 +15,9 @@ void load_frame()
     frame = frame_in_memory;
 }
 
+/* Words of a buffer as texels. */
+#define SPL_TEXEL_BUFFER(index) layout(binding = SPL_TEXELS(index), r32ui) uniform readonly uimageBuffer
+
 /* The buffers' dimension in samples is frame.width x frame.height. */
 uint sample_index(ivec2 at)
 {

@@ -5,8 +5,8 @@
 #include "common/frame.glsl"
 
 layout(std430, binding = SPL_BIND_DRAW) readonly buffer draw_buffer { uint draw_entries[]; };
-layout(std430, binding = SPL_BIND_CHUNKS) readonly buffer chunk_buffer { spl_draw_chunk draw_chunks[]; };
-layout(std430, binding = SPL_BIND_PAGE) readonly buffer page_buffer { uint page_words[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_CHUNKS) chunk_texels; /* struct spl_draw_chunk[] */
+SPL_TEXEL_BUFFER(SPL_TEXELS_PAGE) page_texels;
 
 struct splat {
     vec3 position; /* view space */
@@ -34,19 +34,47 @@ uint funnel(uint low, uint high, uint shift)
     return low >> shift | (high << 1) << (31u - shift);
 }
 
-/* The `length` (0..108) bits that start `bit` bits after word `word`. A page ends in two words of zeros, so that reading a
- * word too far is harmless. */
-bit_run load_run(uint word, uint bit, uint length)
+uint page_word(uint at)
+{
+    return imageLoad(page_texels, int(at)).x;
+}
+
+uint chunk_word(uint chunk, int word)
+{
+    return imageLoad(chunk_texels, int(chunk) * SPL_CHUNK_WORDS + word).x;
+}
+
+spl_draw_chunk load_chunk(uint index)
+{
+    spl_draw_chunk c;
+    c.origin_x = uintBitsToFloat(chunk_word(index, 0));
+    c.origin_y = uintBitsToFloat(chunk_word(index, 1));
+    c.origin_z = uintBitsToFloat(chunk_word(index, 2));
+    c.step = uintBitsToFloat(chunk_word(index, 3));
+    c.radius_min = uintBitsToFloat(chunk_word(index, 4));
+    c.radius_step = uintBitsToFloat(chunk_word(index, 5));
+    c.geometry_word = chunk_word(index, 6);
+    c.color_word = chunk_word(index, 7);
+    c.geometry_bits = chunk_word(index, 8);
+    c.color_bits = chunk_word(index, 9);
+    c.color_base = chunk_word(index, 10);
+    c.normal_u = uintBitsToFloat(chunk_word(index, 11));
+    c.normal_v = uintBitsToFloat(chunk_word(index, 12));
+    c.normal_step = uintBitsToFloat(chunk_word(index, 13));
+    c.first_id = chunk_word(index, 14);
+    c.count = chunk_word(index, 15);
+    c.texture = chunk_word(index, 16);
+    c.texture_scale = uintBitsToFloat(chunk_word(index, 17));
+    return c;
+}
+
+/* Bits from `bit` bits after word `word` on, as many as `words` (2..5, a constant) words hold wherever they start: 33, 65, 97
+ * or 128. Loading a word too many costs less than asking, and out of a page's bounds there are zeros. */
+bit_run load_run(uint word, uint bit, int words)
 {
     uint at = word + (bit >> 5), shift = bit & 31u;
-    uint w0 = page_words[at], w1 = page_words[at + 1u], w2 = 0u, w3 = 0u, w4 = 0u;
-    if (length > 33u) {
-        w2 = page_words[at + 2u];
-        if (length > 65u)
-            w3 = page_words[at + 3u];
-        if (length > 97u)
-            w4 = page_words[at + 4u];
-    }
+    uint w0 = page_word(at), w1 = page_word(at + 1u), w2 = words > 2 ? page_word(at + 2u) : 0u;
+    uint w3 = words > 3 ? page_word(at + 3u) : 0u, w4 = words > 4 ? page_word(at + 4u) : 0u;
     bit_run run;
     run.a = funnel(w0, w1, shift);
     run.b = funnel(w1, w2, shift);
@@ -97,7 +125,7 @@ splat_run load_splat_run()
     uint entry = gl_GlobalInvocationID.x / SPL_LANES;
     if (entry < frame.entries) {
         uint packed_entry = draw_entries[frame.first_entry + entry];
-        r.chunk = draw_chunks[packed_entry >> SPL_RUN_BITS];
+        r.chunk = load_chunk(packed_entry >> SPL_RUN_BITS);
         uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_SPLATS;
         r.first = first + gl_GlobalInvocationID.x % SPL_LANES;
         r.end = min(first + SPL_RUN_SPLATS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
@@ -120,7 +148,7 @@ splat load_splat(spl_draw_chunk chunk, uint index, bool position_only)
     uint nz = bitfieldExtract(widths, SPL_GEOMETRY_Z, 5), nu = bitfieldExtract(widths, SPL_GEOMETRY_U, 4);
     uint nv = bitfieldExtract(widths, SPL_GEOMETRY_V, 4), nr = bitfieldExtract(widths, SPL_GEOMETRY_RADIUS, 4);
     uint length = nx + ny + nz + nu + nv + nr;
-    bit_run run = load_run(word, s.index * length, position_only ? nx + ny + nz : length);
+    bit_run run = load_run(word, s.index * length, position_only ? 4 : 5);
     vec3 code;
     code.x = float(take(run, nx));
     code.y = float(take(run, ny));
@@ -154,7 +182,7 @@ uvec3 load_color(spl_draw_chunk chunk, uint index)
     uint word = chunk.color_word;
     uint ny = bitfieldExtract(widths, SPL_COLOR_Y, 4), nu = bitfieldExtract(widths, SPL_COLOR_U, 4);
     uint nv = bitfieldExtract(widths, SPL_COLOR_V, 4), length = ny + nu + nv;
-    bit_run run = load_run(word, index * length, length);
+    bit_run run = load_run(word, index * length, 2);
     int y = int(bitfieldExtract(widths, SPL_COLOR_BASE_Y, 8) + take(run, ny));
     int u = bitfieldExtract(int(base), 0, 16) + int(take(run, nu));
     int v = bitfieldExtract(int(base), 16, 16) + int(take(run, nv));

@@ -77,6 +77,10 @@ struct spl_gpu_backend {
     void (*read_timestamps)(struct spl_gpu *gpu, uint64_t ticket); /* of an ended submission */
 };
 
+/* The binding that each texel buffer of a dispatch shows. */
+static const uint8_t spl_gpu_texels_of[SPL_TEXELS_COUNT] = {
+    [SPL_TEXELS_PAGE] = SPL_BIND_PAGE, [SPL_TEXELS_DEPTH] = SPL_BIND_DEPTH, [SPL_TEXELS_CHUNKS] = SPL_BIND_CHUNKS};
+
 extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;
 
 /* Runs and checks the self-test kernels; SPL_E_NO_DEVICE names what differed. */

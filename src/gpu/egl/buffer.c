@@ -20,6 +20,8 @@ int gl_buffer_create(struct spl_gpu *base, enum spl_gpu_buffer_kind kind, uint64
     gl->CreateBuffers(1, &buffer->name);
     gl->NamedBufferStorage(buffer->name, (GLsizeiptr)bytes, NULL,
                            flags | (kind == SPL_GPU_READBACK ? GL_CLIENT_STORAGE_BIT : 0));
+    gl->CreateTextures(GL_TEXTURE_BUFFER, 1, &buffer->texels);
+    gl->TextureBuffer(buffer->texels, GL_R32UI, buffer->name);
     GLenum error = gl->GetError();
     if (error == GL_NO_ERROR && flags) {
         buffer->base.map = gl->MapNamedBufferRange(buffer->name, 0, (GLsizeiptr)bytes, flags);
@@ -39,6 +41,7 @@ void gl_buffer_destroy(struct spl_gpu *base, struct spl_gpu_buffer *base_buffer)
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     struct gl_buffer *buffer = (struct gl_buffer *)base_buffer;
     gl_use(gpu);
+    gpu->gl.DeleteTextures(1, &buffer->texels);
     gpu->gl.DeleteBuffers(1, &buffer->name);
     free(buffer);
 }

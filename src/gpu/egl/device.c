@@ -39,7 +39,7 @@ static void read_limits(struct gl_gpu *gpu)
     static const uint64_t buffer_bytes = UINT64_C(1) << 31;
     const struct gl_functions *gl = &gpu->gl;
     struct spl_gpu_limits *limits = &gpu->base.limits;
-    GLint values[4] = {0}, workgroups = 0, subgroup = 0, bits = 0;
+    GLint values[4] = {0}, workgroups = 0, subgroup = 0, bits = 0, texels = 0;
     GLint64 binding = 0;
     if (gpu->base.info.software)
         limits->memory_bytes = spl_gpu_host_memory();
@@ -52,12 +52,14 @@ static void read_limits(struct gl_gpu *gpu)
     if (!limits->memory_bytes) /* graphics within the processor share its memory */
         limits->memory_bytes = spl_gpu_host_memory() / 2;
     gl->GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &binding);
+    gl->GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
     gl->GetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &workgroups);
     gl->GetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &bits);
     if (gl_has_extension(gl, "GL_KHR_shader_subgroup"))
         gl->GetIntegerv(SUBGROUP_SIZE_KHR, &subgroup);
     limits->buffer_bytes = buffer_bytes;
-    limits->binding_bytes = (uint64_t)binding;
+    uint64_t texel_bytes = UINT64_C(4) * (uint32_t)texels;
+    limits->binding_bytes = (uint64_t)binding < texel_bytes ? (uint64_t)binding : texel_bytes;
     limits->workgroups = (uint32_t)workgroups;
     limits->subgroup = (uint32_t)subgroup;
     limits->timestamps = bits > 0;

@@ -54,6 +54,11 @@ void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const stru
         else
             gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, ((struct gl_buffer *)gpu->dummy)->name, 0, 256);
     }
+    for (uint32_t i = 0; i < SPL_TEXELS_COUNT; i++) {
+        const struct gl_buffer *buffer = (const struct gl_buffer *)bindings[spl_gpu_texels_of[i]].buffer;
+        GLuint texels = buffer ? buffer->texels : ((struct gl_buffer *)gpu->dummy)->texels;
+        gpu->gl.BindImageTexture(i, texels, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R32UI);
+    }
     gpu->gl.UseProgram(((struct gl_kernel *)kernel)->program);
     gpu->gl.DispatchCompute(workgroups, 1, 1);
 }

@@ -14,6 +14,7 @@
 #define GL_FUNCTIONS                                                                                                   \
     FUNCTION(PFNGLATTACHSHADERPROC, AttachShader)                                                                      \
     FUNCTION(PFNGLBINDBUFFERRANGEPROC, BindBufferRange)                                                                \
+    FUNCTION(PFNGLBINDIMAGETEXTUREPROC, BindImageTexture)                                                              \
     FUNCTION(PFNGLCLEARNAMEDBUFFERSUBDATAPROC, ClearNamedBufferSubData)                                                \
     FUNCTION(PFNGLCLIENTWAITSYNCPROC, ClientWaitSync)                                                                  \
     FUNCTION(PFNGLCOPYNAMEDBUFFERSUBDATAPROC, CopyNamedBufferSubData)                                                  \
@@ -21,12 +22,14 @@
     FUNCTION(PFNGLCREATEPROGRAMPROC, CreateProgram)                                                                    \
     FUNCTION(PFNGLCREATEQUERIESPROC, CreateQueries)                                                                    \
     FUNCTION(PFNGLCREATESHADERPROC, CreateShader)                                                                      \
+    FUNCTION(PFNGLCREATETEXTURESPROC, CreateTextures)                                                                  \
     FUNCTION(PFNGLDEBUGMESSAGECALLBACKPROC, DebugMessageCallback)                                                      \
     FUNCTION(PFNGLDELETEBUFFERSPROC, DeleteBuffers)                                                                    \
     FUNCTION(PFNGLDELETEPROGRAMPROC, DeleteProgram)                                                                    \
     FUNCTION(PFNGLDELETEQUERIESPROC, DeleteQueries)                                                                    \
     FUNCTION(PFNGLDELETESHADERPROC, DeleteShader)                                                                      \
     FUNCTION(PFNGLDELETESYNCPROC, DeleteSync)                                                                          \
+    FUNCTION(PFNGLDELETETEXTURESPROC, DeleteTextures)                                                                  \
     FUNCTION(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)                                                                \
     FUNCTION(PFNGLENABLEPROC, Enable)                                                                                  \
     FUNCTION(PFNGLFENCESYNCPROC, FenceSync)                                                                            \
@@ -50,6 +53,7 @@
     FUNCTION(PFNGLNAMEDBUFFERSTORAGEPROC, NamedBufferStorage)                                                          \
     FUNCTION(PFNGLQUERYCOUNTERPROC, QueryCounter)                                                                      \
     FUNCTION(PFNGLSHADERBINARYPROC, ShaderBinary)                                                                      \
+    FUNCTION(PFNGLTEXTUREBUFFERPROC, TextureBuffer)                                                                    \
     FUNCTION(PFNGLUSEPROGRAMPROC, UseProgram)
 
 struct gl_functions {
@@ -78,7 +82,7 @@ struct gl_gpu {
 
 struct gl_buffer {
     struct spl_gpu_buffer base;   /* first */
-    GLuint name;
+    GLuint name, texels;          /* texels: a buffer texture of its words */
 };
 
 struct gl_kernel {

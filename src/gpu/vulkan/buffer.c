@@ -50,6 +50,7 @@ int vk_buffer_create(struct spl_gpu *base, enum spl_gpu_buffer_kind kind, uint64
                                      &(VkBufferCreateInfo){.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
                                                            .size = bytes,
                                                            .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                                                                    VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT |
                                                                     VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                                                                     VK_BUFFER_USAGE_TRANSFER_DST_BIT},
                                      NULL, &buffer->buffer);
@@ -71,6 +72,13 @@ int vk_buffer_create(struct spl_gpu *base, enum spl_gpu_buffer_kind kind, uint64
     result = vkBindBufferMemory(gpu->device, buffer->buffer, buffer->memory, 0);
     if (result >= 0 && kind != SPL_GPU_DEVICE)
         result = vkMapMemory(gpu->device, buffer->memory, 0, VK_WHOLE_SIZE, 0, &buffer->base.map);
+    if (result >= 0 && bytes <= gpu->base.limits.binding_bytes)
+        result = vkCreateBufferView(gpu->device,
+                                    &(VkBufferViewCreateInfo){.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                                              .buffer = buffer->buffer,
+                                                              .format = VK_FORMAT_R32_UINT,
+                                                              .range = bytes / 4 * 4},
+                                    NULL, &buffer->texels);
     if (result < 0)
         goto failed;
     *out = &buffer->base;
@@ -88,6 +96,7 @@ void vk_buffer_destroy(struct spl_gpu *base, struct spl_gpu_buffer *base_buffer)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     struct vk_buffer *buffer = (struct vk_buffer *)base_buffer;
+    vkDestroyBufferView(gpu->device, buffer->texels, NULL);
     vkDestroyBuffer(gpu->device, buffer->buffer, NULL);
     vkFreeMemory(gpu->device, buffer->memory, NULL);
     free(buffer);

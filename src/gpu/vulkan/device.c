@@ -55,7 +55,8 @@ static void read_limits(struct vk_gpu *gpu, VkPhysicalDeviceProperties *properti
     if (gpu->base.info.software)
         limits->memory_bytes = spl_gpu_host_memory();
     limits->buffer_bytes = min64(maintenance3.maxMemoryAllocationSize, maintenance4.maxBufferSize);
-    limits->binding_bytes = properties->limits.maxStorageBufferRange;
+    limits->binding_bytes = min64(properties->limits.maxStorageBufferRange,
+                                  UINT64_C(4) * properties->limits.maxTexelBufferElements);
     limits->workgroups = properties->limits.maxComputeWorkGroupCount[0];
     limits->subgroup = subgroup.subgroupSize;
     limits->atomics_64 = atomics_64;
@@ -104,17 +105,20 @@ static int create_device(struct vk_gpu *gpu, bool *atomics_64, struct spl_error 
 
 static int create_layout(struct vk_gpu *gpu, struct spl_error *err)
 {
-    VkDescriptorSetLayoutBinding bindings[SPL_BIND_COUNT];
-    for (uint32_t i = 0; i < SPL_BIND_COUNT; i++)
+    enum { count = SPL_BIND_COUNT + SPL_TEXELS_COUNT };
+    VkDescriptorSetLayoutBinding bindings[count];
+    for (uint32_t i = 0; i < count; i++)
         bindings[i] = (VkDescriptorSetLayoutBinding){.binding = i,
-                                                     .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                                                     .descriptorType = i < SPL_BIND_COUNT
+                                                                           ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
+                                                                           : VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
                                                      .descriptorCount = 1,
                                                      .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT};
     VkResult result = vkCreateDescriptorSetLayout(
         gpu->device,
         &(VkDescriptorSetLayoutCreateInfo){.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                            .flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR,
-                                           .bindingCount = SPL_BIND_COUNT,
+                                           .bindingCount = count,
                                            .pBindings = bindings},
         NULL, &gpu->set_layout);
     if (result >= 0)

@@ -83,7 +83,8 @@ void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const stru
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     VkCommandBuffer commands = gpu->slot->commands;
     VkDescriptorBufferInfo ranges[SPL_BIND_COUNT];
-    VkWriteDescriptorSet writes[SPL_BIND_COUNT];
+    VkBufferView views[SPL_TEXELS_COUNT];
+    VkWriteDescriptorSet writes[SPL_BIND_COUNT + SPL_TEXELS_COUNT];
     for (uint32_t i = 0; i < SPL_BIND_COUNT; i++) {
         const struct vk_buffer *buffer = (const struct vk_buffer *)bindings[i].buffer;
         if (buffer)
@@ -96,8 +97,18 @@ void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const stru
                                            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
                                            .pBufferInfo = &ranges[i]};
     }
+    for (uint32_t i = 0; i < SPL_TEXELS_COUNT; i++) {
+        const struct vk_buffer *buffer = (const struct vk_buffer *)bindings[spl_gpu_texels_of[i]].buffer;
+        views[i] = buffer && buffer->texels ? buffer->texels : ((struct vk_buffer *)gpu->dummy)->texels;
+        writes[SPL_BIND_COUNT + i] = (VkWriteDescriptorSet){.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                                            .dstBinding = SPL_BIND_COUNT + i,
+                                                            .descriptorCount = 1,
+                                                            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
+                                                            .pTexelBufferView = &views[i]};
+    }
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, ((struct vk_kernel *)kernel)->pipeline);
-    gpu->push_descriptors(commands, VK_PIPELINE_BIND_POINT_COMPUTE, gpu->layout, 0, SPL_BIND_COUNT, writes);
+    gpu->push_descriptors(commands, VK_PIPELINE_BIND_POINT_COMPUTE, gpu->layout, 0,
+                          SPL_BIND_COUNT + SPL_TEXELS_COUNT, writes);
     vkCmdDispatch(commands, workgroups, 1, 1);
 }
 

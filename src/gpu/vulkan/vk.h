@@ -38,6 +38,7 @@ struct vk_gpu {
 struct vk_buffer {
     struct spl_gpu_buffer base;    /* first */
     VkBuffer buffer;
+    VkBufferView texels;           /* its words; none where the buffer is larger than a binding */
     VkDeviceMemory memory;
 };
 
