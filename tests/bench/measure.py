@@ -21,7 +21,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 
 SPLATD = os.environ["SPLATD_BINARY"]

@@ -192,8 +192,8 @@ def flood(s, path, seconds, gap):
     slowest = max(ms for status, _, ms, *_ in replies if status == 200)
     queue, resident = after["queues"]["render"]["capacity"], after["memory"]["resident_bytes"]
     print(f"{asked} requests in {seconds} s, one every {1e3 * gap:.0f} ms: {len(good)} times 200, "
-          f"{len(replies) - len(good)} times 503; frame under load {frame:.0f} ms, slowest 200 {slowest:.0f} ms; resident {before >> 20} MiB before, "
-          f"{resident >> 20} after")
+          f"{len(replies) - len(good)} times 503; frame under load {frame:.0f} ms, slowest 200 {slowest:.0f} ms; "
+          f"resident {before >> 20} MiB before, {resident >> 20} after")
     bound("neither 200 nor 503 with Retry-After", len(other), 0, f"replies {other[:3]}")
     bound("p99 of the 200s", good[int(0.99 * len(good))], queue + 2, "frame times")
     bound("memory grown under overload", (resident - before) / 2**20, 32, "MiB")
@@ -261,8 +261,8 @@ def compare(what, service, body, total, folder, start, count, *arguments):
     finally:
         process.send_signal(signal.SIGCONT)
         process.wait(60)
-    print(f"{total} frames by turns of {TURN_S} s: {1000 * served[0]:.1f} ms a frame by the service, {1000 * alone[0]:.1f} "
-          f"bare; of processor time {1000 * served[1]:.1f} and {1000 * alone[1]:.1f} ms")
+    print(f"{total} frames by turns of {TURN_S} s: {1000 * served[0]:.1f} ms a frame by the service, "
+          f"{1000 * alone[0]:.1f} bare; of processor time {1000 * served[1]:.1f} and {1000 * alone[1]:.1f} ms")
     print(f"{what}, processor time: {served[1] / alone[1]:.3f} times")
     bound(what, served[0] / alone[0], 1.05, "times")
 
@@ -302,7 +302,8 @@ def tours():
             if reply.status != 202:
                 sys.exit(reply.read())
         compare(f"{total} frames of a tour against as many bare ones", s, path, total, folder, start,
-                lambda: sum(1 for _ in pathlib.Path(folder, "tours").glob("*/*.jp*g")), "--frames", str(total), "--lod", "2")
+                lambda: sum(1 for _ in pathlib.Path(folder, "tours").glob("*/*.jp*g")), "--frames", str(total), "--lod",
+                "2")
 
 
 def connect(port, receive=None):
@@ -345,7 +346,8 @@ def median_ms(port, paths):
 @contextlib.contextmanager
 def crowd(port, slow_path):
     """2,000 connections that have asked once and keep still; 200 that read a large image byte by byte."""
-    idle, slow, over = [connect(port) for _ in range(2000)], [connect(port, 4096) for _ in range(200)], threading.Event()
+    idle, slow = [connect(port) for _ in range(2000)], [connect(port, 4096) for _ in range(200)]
+    over = threading.Event()
     for s in idle:
         s.sendall(request("/v1/datasets"))
         read_reply(s)
