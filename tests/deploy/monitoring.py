@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.parse
 import urllib.request
 
@@ -232,7 +233,7 @@ def prometheus(d):
                 with urllib.request.urlopen(url, timeout=60) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as error:
-                return error.read().decode()
+                return [] if error.code == 503 else error.read().decode()  # 503: it is not ready
             except OSError:
                 return []
 
