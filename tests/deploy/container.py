@@ -54,7 +54,7 @@ def is_ignored(path, patterns):
 def needed_libraries():
     """What the binary names itself, sanitisers' libraries aside."""
     dynamic = subprocess.run(["readelf", "-d", binary], capture_output=True, text=True, check=True).stdout
-    return [name for name in re.findall(r"NEEDED.*\[(.*)\]", dynamic) if not re.match(r"lib([atul]+san|gcc_s)\b", name)]
+    return [name for name in re.findall(r"NEEDED.*\[(.*)\]", dynamic) if not re.match(r"lib((a|t|l|ub)san|gcc_s)\b", name)]
 
 
 def libraries_of(package):
