@@ -2,7 +2,7 @@
 import re
 
 WORDS = set("by without on ignoring group_left group_right and or unless bool offset sum count avg min max rate "
-            "increase delta changes histogram_quantile avg_over_time max_over_time round".split())
+            "increase delta absent changes histogram_quantile avg_over_time max_over_time round".split())
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|\'(?:[^\'\\]|\\.)*\'|\[[^\]]*\]|[a-zA-Z_:][\w:]*|=~|!~|!=|\d[\w.]*|\S')
 
 
