@@ -1,6 +1,7 @@
 """deploy/kubernetes as kubectl renders it, each overlay with and without the components: shapes of the objects, and
 everything that must agree: ports, probes, selectors, volumes, user, configuration, times and memory, the metric that
 scales, the variable that the ingress hashes by. The daemon is started with what the overlay cpu gives it."""
+import functools
 import os
 import pathlib
 import re
@@ -79,8 +80,13 @@ def start(text):
             return set(re.findall(r"^(splatd_\w+)", d.ops("/metrics").body.decode(), re.M))
 
 
+@functools.cache
+def parse(text):
+    return tuple(yaml.safe_load_all(text))
+
+
 def check_overlay(tree, name, text, expect):
-    objects = list(yaml.safe_load_all(text))
+    objects = parse(text)
     by = {}
     for o in objects:
         for error in jsonschema.Draft202012Validator(shape_of(o)).iter_errors(o):
