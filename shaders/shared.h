@@ -91,6 +91,8 @@
 /* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
  * from this bit on the number of planes, 1..8. */
 #define SPL_CHUNK_TEXTURE_PLANES 28
+/* The same word of a drawn chunk has this bit where texels are interpolated. */
+#define SPL_CHUNK_TEXTURE_SMOOTH 27
 
 /* A chunk's codes in TEXP, words:
  *   for each plane a header and a mask: bit i of its 4 words says whether splat i has this plane's atom

@@ -1,6 +1,7 @@
 /* A splat's texture: the sum of PLANES atoms at most, read from the codes of src/dataset/texture.c and the dictionary of
- * src/dataset/dictionary.h. The level is the splat's: texels are between half a sample and a sample wide where the nearest
- * one is taken, and the finest level is interpolated where its texels are wider than a sample. */
+ * src/dataset/dictionary.h. The level is the splat's: its texels are half a sample to a sample wide, and the nearest one
+ * counts. In chunks whose finest are wider than a sample they are interpolated: another kernel (constant 1), because
+ * software drivers run both sides of a branch. */
 #ifndef SPL_TEXTURE_GLSL
 #define SPL_TEXTURE_GLSL
 
@@ -8,6 +9,7 @@
 #include "common/tangent.glsl"
 
 layout(constant_id = 0) const uint PLANES = 1;
+layout(constant_id = 1) const uint SMOOTH = 0; /* texels are interpolated */
 
 layout(std430, binding = SPL_BIND_TEXTURES) readonly buffer texture_buffer { uint texture_words[]; };
 layout(std430, binding = SPL_BIND_ATOMS) readonly buffer atom_buffer { uint atom_words[]; };
@@ -19,7 +21,6 @@ struct splat_texture {
     vec3 base;                     /* what the biased texels' sum is added to, in 255ths */
     vec3 u, v;                     /* view space; (offset . u, offset . v) + side / 2 are texels */
     float side;                    /* texels of the level */
-    bool magnified;
 };
 
 /* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; false where it has none. */
@@ -48,14 +49,13 @@ bool load_atom(uint word, uint t, uint index, out uint atom, out float weight)
 splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
 {
     splat_texture x;
-    float texels = float(frame.texture_size), diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / s.position.z;
+    float diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / s.position.z;
     uint size = frame.texture_size, side = clamp(2u << findMSB(uint(clamp(diameter, 1.0, 64.0))), SPL_TEXTURE_SIDE_MIN, size);
     uint level = 1u + (4u * (size * size - side * side)) / 3u;
     uint atom_size = 1u + (4u * size * size - SPL_TEXTURE_SIDE_MIN * SPL_TEXTURE_SIDE_MIN) / 3u;
-    x.magnified = diameter > texels;
     x.side = float(side);
     x.count = 0u;
-    uint word = bitfieldExtract(chunk.texture, 0, SPL_CHUNK_TEXTURE_PLANES);
+    uint word = bitfieldExtract(chunk.texture, 0, SPL_CHUNK_TEXTURE_SMOOTH);
     float sum = 0.0;
     for (uint t = 0u; t < PLANES; t++) {
         uint atom;
@@ -79,9 +79,10 @@ splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
     return x;
 }
 
+/* Converted from signed numbers: the only conversion that processors have. */
 vec3 unpack_texel(uint word)
 {
-    return vec3(float(word >> 16), float(word >> 8 & 255u), float(word & 255u));
+    return vec3(float(int(word >> 16)), float(int(word >> 8 & 255u)), float(int(word & 255u)));
 }
 
 /* The colour, 8 bit, at `offset` from the splat's centre, in drawn radii. */
@@ -90,7 +91,7 @@ uvec3 sample_texture(splat_texture x, vec3 offset)
     vec2 at = vec2(dot(offset, x.u), dot(offset, x.v)) + 0.5 * x.side;
     vec3 color = x.base;
     uint row = uint(x.side);
-    if (x.magnified) {
+    if (SMOOTH != 0u) {
         at = clamp(at - 0.5, vec2(0.0), vec2(x.side - 1.0));
         vec2 corner = min(floor(at), vec2(x.side - 2.0));
         uvec2 part = uvec2((at - corner) * 16.0 + 0.5);
@@ -103,15 +104,15 @@ uvec3 sample_texture(splat_texture x, vec3 offset)
                 /* Two channels a product: the weights add up to 256, so that each fits its half word. */
                 uint rb = (a & 0xff00ffu) * w00 + (b & 0xff00ffu) * w01 + (c & 0xff00ffu) * w10 + (e & 0xff00ffu) * w11;
                 uint g = (a >> 8 & 255u) * w00 + (b >> 8 & 255u) * w01 + (c >> 8 & 255u) * w10 + (e >> 8 & 255u) * w11;
-                color += vec3(float(rb >> 16), float(g), float(rb & 0xffffu)) * (x.weight[t] * (1.0 / 256.0));
+                vec3 mix = vec3(float(int(rb >> 16)), float(int(g)), float(int(rb & 0xffffu)));
+                color += mix * (x.weight[t] * (1.0 / 256.0));
             }
         }
     } else {
         uvec2 cell = uvec2(clamp(at, vec2(0.0), vec2(x.side - 0.5)));
         uint texel = cell.y * row + cell.x;
-        for (uint t = 0u; t < PLANES; t++)
-            if (t < x.count)
-                color += unpack_texel(atom_words[x.first[t] + texel]) * x.weight[t];
+        for (uint t = 0u; t < PLANES; t++) /* an atom that is not there weighs nothing */
+            color += unpack_texel(atom_words[x.first[t] + texel]) * x.weight[t];
     }
     return uvec3(clamp(color, vec3(0.0), vec3(255.5)));
 }

@@ -10,29 +10,30 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page, phase and number of planes of atoms: what one dispatch works off. The front phase is the nearer half of the
- * splats, whose depth occludes chunks of the back phase. */
+/* The draw-list entries of one page, phase and number of planes of atoms: what one dispatch works off. The front phase
+ * is the nearer half of the splats, whose depth occludes chunks of the back phase. */
 struct spl_draw_batch {
     uint32_t page;
     uint8_t planes; /* 0 = no textures */
+    bool smooth;    /* texels are interpolated */
     bool back;
     uint32_t first_entry, entries;
 };
 
 struct spl_draw_list {
-    struct spl_draw_chunk *chunks;    /* visible chunks, roughly front to back */
-    struct spl_chunk_bounds *bounds;  /* parallel to chunks */
-    uint32_t *entries;                /* chunk index << SPL_RUN_BITS | run, batch after batch */
-    struct spl_draw_batch *batches;   /* in the order in which their pages were first met */
-    size_t first_back_chunk;          /* chunks from here on are of the back phase */
+    struct spl_draw_chunk *chunks;   /* visible chunks, roughly front to back */
+    struct spl_chunk_bounds *bounds; /* parallel to chunks */
+    uint32_t *entries;               /* chunk index << SPL_RUN_BITS | run, batch after batch */
+    struct spl_draw_batch *batches;  /* in the order in which their pages were first met */
+    size_t first_back_chunk;         /* chunks from here on are of the back phase */
     size_t chunk_count, entry_count, batch_count;
     size_t chunk_capacity, entry_capacity, batch_capacity;
-    uint32_t *page_of_chunk;          /* chunk_count, scratch */
-    uint64_t splats;                  /* that are drawn */
-    uint64_t listed_splats;           /* the same, once for every window that they are drawn in */
-    uint32_t nodes;                   /* that the chunks came from */
-    uint64_t sample_splats;           /* upper bound of the splats that reach any one sample */
-    bool complete;                    /* false: a coarser node stood in for pages that are not resident */
+    uint32_t *page_of_chunk; /* chunk_count, scratch */
+    uint64_t splats;         /* that are drawn */
+    uint64_t listed_splats;  /* the same, once for every window that they are drawn in */
+    uint32_t nodes;          /* that the chunks came from */
+    uint64_t sample_splats;  /* upper bound of the splats that reach any one sample */
+    bool complete;           /* false: a coarser node stood in for pages that are not resident */
 };
 
 /* Empties the list and keeps its memory. */

@@ -15,7 +15,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         struct spl_gpu_kernel *kernel;
         int rc = spl_renderer_get_kernel(r, SPL_KERNEL_POINTS + 2 * group + pass, &kernel, err);
         if (!rc)
-            rc = spl_tile_dispatch_splats(tile, kernel, SPL_PHASE_BOTH, SPL_PLANES_ANY, err);
+            rc = spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
         if (rc)
             return rc;
         spl_gpu_barrier(r->gpu);

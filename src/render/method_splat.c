@@ -6,12 +6,12 @@
 static int record_depth(struct spl_tile *tile, struct spl_gpu_kernel *depth, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    int rc = spl_tile_dispatch_splats(tile, depth, SPL_PHASE_FRONT, SPL_PLANES_ANY, err);
+    int rc = spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = SPL_PHASE_FRONT}, err);
     spl_gpu_barrier(r->gpu);
     if (!rc)
         rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, err);
     if (!rc)
-        rc = spl_tile_dispatch_splats(tile, depth, SPL_PHASE_BACK, SPL_PLANES_ANY, err);
+        rc = spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = SPL_PHASE_BACK}, err);
     spl_gpu_barrier(r->gpu);
     return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, err);
 }
@@ -20,17 +20,20 @@ static int record_depth(struct spl_tile *tile, struct spl_gpu_kernel *depth, str
 static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, struct spl_error *err)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
-    uint32_t seen = 0;
+    uint64_t seen = 0;
     for (size_t i = 0; i < list->batch_count; i++)
-        seen |= 1u << list->batches[i].planes;
-    int rc = spl_tile_dispatch_splats(tile, plain, SPL_PHASE_BOTH, 0, err);
-    for (int planes = 1; planes <= SPL_TEXTURE_ATOMS && !rc; planes++) {
+        seen |= 1ull << (2 * list->batches[i].planes + list->batches[i].smooth);
+    struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true};
+    int rc = spl_tile_dispatch_splats(tile, plain, &what, err);
+    for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1) && !rc; kind++) {
         struct spl_gpu_kernel *kernel;
-        if (!(seen >> planes & 1))
+        if (!(seen >> kind & 1))
             continue;
-        rc = spl_renderer_get_kernel(tile->renderer, SPL_KERNEL_SPLAT_TEXTURE + (uint32_t)planes - 1, &kernel, err);
+        what.planes = kind / 2;
+        what.smooth = kind % 2;
+        rc = spl_renderer_get_kernel(tile->renderer, SPL_KERNEL_SPLAT_TEXTURE + kind - 2, &kernel, err);
         if (!rc)
-            rc = spl_tile_dispatch_splats(tile, kernel, SPL_PHASE_BOTH, planes, err);
+            rc = spl_tile_dispatch_splats(tile, kernel, &what, err);
     }
     return rc;
 }
@@ -60,7 +63,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     }
     if (!rc)
         rc = group == SPL_SUMS_COLOR ? shade_colors(tile, shade, err)
-                                     : spl_tile_dispatch_splats(tile, shade, SPL_PHASE_BOTH, SPL_PLANES_ANY, err);
+                                     : spl_tile_dispatch_splats(tile, shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;

@@ -15,8 +15,8 @@ enum spl_kernel_slot {
     SPL_KERNEL_OCCLUSION_TILES,
     SPL_KERNEL_OCCLUSION_CHUNKS,
     SPL_KERNEL_SPLAT_SHADE,                                          /* + SPL_SUMS_* */
-    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + SPL_SUMS_COUNT, /* + planes - 1 */
-    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
+    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + SPL_SUMS_COUNT, /* + 2 (planes - 1) + smooth */
+    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + 2 * SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
     SPL_KERNEL_RESOLVE = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT,     /* + 2 layer + method */
     SPL_KERNEL_COUNT = SPL_KERNEL_RESOLVE + 2 * SPL_LAYER_COUNT
 };
@@ -73,10 +73,15 @@ int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot 
                             struct spl_error *err);
 
 enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
-/* Records `kernel` once per page of the draw list (and per the device's largest dispatch), for the given phases, and for
- * chunks drawn with any number of planes of atoms, or with `planes` of them. */
-enum { SPL_PLANES_ANY = -1 };
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases, int planes,
+/* Records `kernel` once per page of the draw list (and per the device's largest dispatch), for the given phases and
+ * chunks. */
+struct spl_dispatch {
+    enum spl_phase phases;
+    bool by_texture;   /* only chunks drawn with `planes` planes of atoms, interpolated or not */
+    uint32_t planes;
+    bool smooth;
+};
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, const struct spl_dispatch *what,
                              struct spl_error *err);
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides. Clobbers the id buffer. */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err);

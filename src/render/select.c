@@ -88,22 +88,25 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
-/* The chunk's word of CTEX with the planes that are drawn; 0 where its textures, no part of which is nearer than
- * `near`, are less than so many samples wide that their mean colours show all there is. */
+/* The chunk's word of CTEX as it is drawn: with as many planes, and interpolated where the finest texels, no part of
+ * the chunk being nearer than `near`, are wider than a sample. 0 where the textures are less than so many samples wide
+ * that their mean colours show all there is. */
 static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
 {
-    enum { samples = 2 };
+    static const double least = 2.83; // samples: below, the coarsest level that is kept has texels of less than 0.7
     const struct spl_select_params *params = w->params;
     uint32_t texture = params->atoms && w->textures ? w->textures[chunk - w->chunks] : 0;
-    if (!texture || 2 * chunk->radius_mean * w->focal < samples * fmax(near, params->camera->near))
+    double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
+    if (!texture || samples < least)
         return 0;
     if (!params->textured(params->context, page)) {
         w->list->complete = false;
         return 0;
     }
-    uint32_t planes = texture >> SPL_CHUNK_TEXTURE_PLANES;
+    uint32_t planes = texture >> SPL_CHUNK_TEXTURE_PLANES, size = spl_dataset_get_info(params->dataset)->texture_size;
     planes = planes < params->atoms ? planes : params->atoms;
-    return (texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1)) | planes << SPL_CHUNK_TEXTURE_PLANES;
+    return (texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1)) | planes << SPL_CHUNK_TEXTURE_PLANES |
+           (samples > size ? 1u : 0u) << SPL_CHUNK_TEXTURE_SMOOTH;
 }
 
 static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,

@@ -14,7 +14,8 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
     if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
         return "occlusion_chunks";
     if (slot >= SPL_KERNEL_SPLAT_TEXTURE && slot < SPL_KERNEL_POINTS) {
-        constants[(*count)++] = slot - SPL_KERNEL_SPLAT_TEXTURE + 1;
+        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2 + 1;
+        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) % 2;
         return wide ? "splat_texture64" : "splat_texture";
     }
     if (slot < SPL_KERNEL_POINTS) {
@@ -71,7 +72,7 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
     bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
 }
 
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, enum spl_phase phases, int planes,
+int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, const struct spl_dispatch *what,
                              struct spl_error *err)
 {
     enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
@@ -81,10 +82,11 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || (planes >= 0 && planes != batch->planes))
+        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
+            (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
             continue;
         bindings[SPL_BIND_PAGE].buffer = tile->resident->pages[batch->page].buffer;
-        if (planes > 0) {
+        if (what->planes) {
             bindings[SPL_BIND_TEXTURES].buffer =
                 tile->resident->pages[spl_textures_slot(tile->resident, batch->page)].buffer;
             bindings[SPL_BIND_ATOMS].buffer = tile->resident->pages[spl_dictionary_slot(tile->resident)].buffer;

@@ -46,6 +46,7 @@ struct disc {
     uint8_t color[3];
     uint32_t window;               /* of the tile that it is drawn to; 0 = all of it */
     float world[3], texture_scale; /* with atoms: its normal, and its radius over that of its texture */
+    bool smooth;                   /* texels are interpolated */
     uint32_t planes;               /* atoms that are drawn at most; 0 = plain */
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
@@ -139,7 +140,7 @@ static uint32_t texel_of(const struct scene *s, uint32_t atom, int channel, int 
 }
 
 /* The colour of the splat's texture at `offset`. The level's texels are half a sample to a sample wide and the nearest
- * one counts; where the finest are wider than a sample, they are interpolated in steps of a 16th. */
+ * one counts; in chunks whose finest are wider than a sample they are interpolated, in steps of a 16th. */
 static void sample_texture(const struct scene *s, const struct disc *d, const float offset[3], uint32_t color[3])
 {
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
@@ -155,7 +156,7 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
         at[0] += offset[i] * (uv[i] * scale);
         at[1] += offset[i] * (vv[i] * scale);
     }
-    bool magnified = diameter > (float)size;
+    bool magnified = d->smooth;
     int corner[2], part[2];
     for (int i = 0; i < 2; i++) {
         float most = (float)side - (magnified ? 1 : 0.5f),
@@ -288,6 +289,7 @@ static void for_each_disc(struct scene *s, bool shade)
             memcpy(d.world, splat.normal, sizeof d.world);
             d.texture_scale = draw->texture_scale;
             d.planes = spl_texture_planes(draw->texture);
+            d.smooth = draw->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1;
             if (d.planes) {
                 load_code(s, batch->page, chunk, (uint32_t)(chunk - chunks));
                 d.code = &s->code;
