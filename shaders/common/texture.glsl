@@ -11,11 +11,20 @@
 layout(constant_id = 0) const uint PLANES = 1;
 layout(constant_id = 1) const uint SMOOTH = 0; /* texels are interpolated */
 
-layout(std430, binding = SPL_BIND_TEXTURES) readonly buffer texture_buffer { uint texture_words[]; };
-layout(std430, binding = SPL_BIND_ATOMS) readonly buffer atom_buffer { uint atom_words[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_TEXTURES) texture_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_ATOMS) atom_texels;
+
+uint texture_word(uint at)
+{
+    return imageLoad(texture_texels, int(at)).x;
+}
+
+uint atom_word(uint at)
+{
+    return imageLoad(atom_texels, int(at)).x;
+}
 
 struct splat_texture {
-    uint count;                    /* atoms */
     uint first[SPL_TEXTURE_ATOMS]; /* word of the level's first texel */
     float weight[SPL_TEXTURE_ATOMS];
     vec3 base;                     /* what the biased texels' sum is added to, in 255ths */
@@ -23,26 +32,23 @@ struct splat_texture {
     float side;                    /* texels of the level */
 };
 
-/* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; false where it has none. */
-bool load_atom(uint word, uint t, uint index, out uint atom, out float weight)
+/* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; atom 0 of weight 0 where it has
+ * none. Whatever is read past the splats that have one is not used: out of bounds there are zeros. */
+void load_atom(uint word, uint t, uint index, out uint atom, out float weight)
 {
     uint header_at = word + t * SPL_TEXTURE_PLANE_WORDS, own = index >> 5, bit = index & 31u;
-    uint header = texture_words[header_at], mask = texture_words[header_at + 1u + own];
-    atom = 0u;
-    weight = 0.0;
-    if ((mask >> bit & 1u) == 0u)
-        return false;
+    uint header = texture_word(header_at), mask = texture_word(header_at + 1u + own);
     uint before = bitCount(mask & ((1u << bit) - 1u));
-    for (uint w = 0u; w < own; w++)
-        before += bitCount(texture_words[header_at + 1u + w]);
+    for (uint w = 0u; w < SPL_TEXTURE_PLANE_WORDS - 2u; w++) /* of fixed length: it is unrolled */
+        before += w < own ? bitCount(texture_word(header_at + 1u + w)) : 0;
     uint index_bits = bitfieldExtract(header, SPL_TEXTURE_INDEX_BITS, 5);
     uint weight_bits = bitfieldExtract(header, SPL_TEXTURE_WEIGHT_BITS, 4), width = index_bits + weight_bits;
     uint at = before * width, code_at = word + (header >> SPL_TEXTURE_OFFSET) + (at >> 5);
-    uint code = funnel(texture_words[code_at], texture_words[code_at + 1u], at & 31u);
+    uint code = funnel(texture_word(code_at), texture_word(code_at + 1u), at & 31u);
     float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 8)) - 224.0) / 16.0);
-    atom = code & ((1u << index_bits) - 1u);
-    weight = step * (float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5);
-    return true;
+    bool has = (mask >> bit & 1u) != 0u;
+    atom = has ? code & ((1u << index_bits) - 1u) : 0u;
+    weight = has ? step * (float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5) : 0.0;
 }
 
 /* `color` is the splat's own. */
@@ -54,21 +60,15 @@ splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
     uint level = 1u + (4u * (size * size - side * side)) / 3u;
     uint atom_size = 1u + (4u * size * size - SPL_TEXTURE_SIDE_MIN * SPL_TEXTURE_SIDE_MIN) / 3u;
     x.side = float(side);
-    x.count = 0u;
     uint word = bitfieldExtract(chunk.texture, 0, SPL_CHUNK_TEXTURE_SMOOTH);
     float sum = 0.0;
     for (uint t = 0u; t < PLANES; t++) {
         uint atom;
         float weight;
-        x.first[t] = 0u;
-        x.weight[t] = 0.0;
-        if (load_atom(word, t, s.index, atom, weight)) {
-            uint at = atom * atom_size;
-            x.count = t + 1u;
-            x.first[t] = at + level;
-            x.weight[t] = 255.0 * weight * uintBitsToFloat(atom_words[at]);
-            sum += x.weight[t];
-        }
+        load_atom(word, t, s.index, atom, weight);
+        x.first[t] = atom * atom_size + level;
+        x.weight[t] = 255.0 * weight * uintBitsToFloat(atom_word(atom * atom_size));
+        sum += x.weight[t];
     }
     x.base = vec3(color) + 0.5 - 128.0 * sum;
     vec3 u, v;
@@ -98,21 +98,19 @@ uvec3 sample_texture(splat_texture x, vec3 offset)
         uint w11 = part.x * part.y, w01 = 16u * part.x - w11, w10 = 16u * part.y - w11, w00 = 256u - w11 - w01 - w10;
         uint texel = uint(corner.y) * row + uint(corner.x);
         for (uint t = 0u; t < PLANES; t++) {
-            if (t < x.count) {
-                uint p = x.first[t] + texel;
-                uint a = atom_words[p], b = atom_words[p + 1u], c = atom_words[p + row], e = atom_words[p + row + 1u];
-                /* Two channels a product: the weights add up to 256, so that each fits its half word. */
-                uint rb = (a & 0xff00ffu) * w00 + (b & 0xff00ffu) * w01 + (c & 0xff00ffu) * w10 + (e & 0xff00ffu) * w11;
-                uint g = (a >> 8 & 255u) * w00 + (b >> 8 & 255u) * w01 + (c >> 8 & 255u) * w10 + (e >> 8 & 255u) * w11;
-                vec3 mix = vec3(float(int(rb >> 16)), float(int(g)), float(int(rb & 0xffffu)));
-                color += mix * (x.weight[t] * (1.0 / 256.0));
-            }
+            uint p = x.first[t] + texel;
+            uint a = atom_word(p), b = atom_word(p + 1u), c = atom_word(p + row), e = atom_word(p + row + 1u);
+            /* Two channels a product: the weights add up to 256, so that each fits its half word. */
+            uint rb = (a & 0xff00ffu) * w00 + (b & 0xff00ffu) * w01 + (c & 0xff00ffu) * w10 + (e & 0xff00ffu) * w11;
+            uint g = (a >> 8 & 255u) * w00 + (b >> 8 & 255u) * w01 + (c >> 8 & 255u) * w10 + (e >> 8 & 255u) * w11;
+            vec3 sum = vec3(float(int(rb >> 16)), float(int(g)), float(int(rb & 0xffffu)));
+            color += sum * (x.weight[t] * (1.0 / 256.0));
         }
     } else {
         uvec2 cell = uvec2(clamp(at, vec2(0.0), vec2(x.side - 0.5)));
         uint texel = cell.y * row + cell.x;
         for (uint t = 0u; t < PLANES; t++) /* an atom that is not there weighs nothing */
-            color += unpack_texel(atom_words[x.first[t] + texel]) * x.weight[t];
+            color += unpack_texel(atom_word(x.first[t] + texel)) * x.weight[t];
     }
     return uvec3(clamp(color, vec3(0.0), vec3(255.5)));
 }

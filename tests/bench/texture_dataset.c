@@ -1,6 +1,7 @@
 /* Gives a dataset textures of random smooth atoms, to measure what drawing them costs.
  *
- * usage: texture-dataset IN.spld OUT.spld SIZE ATOMS PLANES    splats get 0 to PLANES of the ATOMS atoms of SIZE × SIZE */
+ * usage: texture-dataset IN.spld OUT.spld SIZE ATOMS PLANES    splats get 0 to PLANES of the ATOMS atoms of SIZE × SIZE
+ */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -18,8 +19,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s\n", err.message);
         return 1;
     }
-    struct spl_dictionary dictionary =
-        make_dictionary((uint32_t)atoi(argv[4]), (uint32_t)atoi(argv[3]), 1);
+    struct spl_dictionary dictionary = make_dictionary((uint32_t)atoi(argv[4]), (uint32_t)atoi(argv[3]), 1);
     make_textured_file(from, &dictionary, (uint32_t)atoi(argv[5]), 1, argv[2]);
     spl_dictionary_finish(&dictionary);
     spl_dataset_close(from);
