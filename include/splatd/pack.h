@@ -15,14 +15,29 @@ struct spl_progress {          /* one call about every 100 ms while work runs, f
     double rate;               /* items per second */
 };
 
-/* Colours from photographs with known poses. */
+/* How photographs are coded: into nothing but the splats' colours; as sums of atoms of a dictionary, of which a splat
+ * takes those that are worth their bits; or as in the paper, dictionaries of 8, 12 or 16 bit and weights of 4 or 8. */
+enum spl_texture_coding {
+    SPL_TEXTURES_NONE,
+    SPL_TEXTURES_ADAPTIVE,
+    SPL_TEXTURES_D8W4,
+    SPL_TEXTURES_D12W4,
+    SPL_TEXTURES_D16W8,
+    SPL_TEXTURES_COUNT
+};
+
+/* Colours and textures from photographs with known poses. */
 struct spl_photo_options {
-    const char *cameras;       /* COLMAP's folder, transforms.json, Open3D's trajectory, pose folder, or a list of views */
+    const char *cameras;       /* COLMAP's folder, transforms.json, Open3D's trajectory, pose folder, list of views */
     const char *images;        /* folder of the photographs; NULL = where `cameras` says */
-    const char *device;        /* as of struct spl_renderer_options: it draws how far the splats lie from each photograph */
+    const char *device;        /* as of struct spl_renderer_options: draws how far the splats lie from photographs */
     uint64_t memory_bytes;     /* of this pass; 0 = 2 GiB */
-    /* Each photograph that cannot be used, and why: the others are still taken. NULL: the first one fails the packing. */
+    enum spl_texture_coding textures;
+    double texture_quality;    /* dB at which a splat takes no further atom; 0 = 40 */
+    /* Each photograph that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
     void (*refused)(void *context, const struct spl_error *why);
+    /* After each epoch of training; may be NULL. `psnr` of the sample, dB. */
+    void (*trained)(void *context, uint32_t epoch, double seconds, double psnr, double atoms_per_splat, uint32_t atoms);
     void *context;
 };
 
@@ -30,6 +45,12 @@ struct spl_photo_report {
     uint32_t photographs;      /* whose poses and files could be used */
     uint32_t refused;
     uint64_t unseen;           /* splats that none of them shows */
+    uint64_t textured;         /* splats whose texture was coded */
+    uint32_t texture_size;     /* texels a side, 8, 16 or 32; 0 = no textures */
+    uint32_t atoms;            /* of the dictionary */
+    double resampling_psnr;    /* of textures before coding, against the photograph's pixels on their discs, dB */
+    double texture_psnr;       /* of what is coded, against the textures, dB */
+    uint64_t histogram[9];     /* textured splats by their number of atoms */
     double seconds;
 };
 
@@ -58,9 +79,9 @@ struct spl_pack_report {
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
- * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed as
- * soon as it is open again, and then written with their colours. Blocks; uses options->threads threads and at most about 80 bytes a point.
- * `report` may be NULL. Any thread. */
+ * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
+ * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
+ * and at most about 80 bytes a point. `report` may be NULL. Any thread. */
 int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 #endif

@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include <splatd/pack.h>
@@ -74,6 +75,18 @@ static void catch_signals(const char *output)
     sigaction(SIGHUP, &action, NULL);
 }
 
+static void print_textures(const struct spl_photo_report *r, const uint64_t *bits, double splats)
+{
+    fprintf(stderr,
+            "%llu textures of %u x %u: resampled at %.2f dB, coded at %.2f dB with %u atoms; %.2f bytes a splat\n",
+            (unsigned long long)r->textured, r->texture_size, r->texture_size, r->resampling_psnr, r->texture_psnr,
+            r->atoms, (double)(bits[SPL_ATTRIBUTE_TEXTURE] + bits[SPL_ATTRIBUTE_DICTIONARY]) / 8 / splats);
+    fprintf(stderr, "atoms a splat:");
+    for (int i = 0; i <= 8; i++)
+        fprintf(stderr, " %d: %.1f %%%s", i, 100 * (double)r->histogram[i] / (double)(r->textured ? r->textured : 1),
+                i < 8 ? "," : "\n");
+}
+
 static void print_summary(const char *output, const struct spl_pack_report *r)
 {
     uint64_t total = 0;
@@ -96,7 +109,29 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     if (r->photos.photographs)
         fprintf(stderr, "%u photographs in %.1f s (%u could not be used); %.1f %% of the splats are on none\n",
                 r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);
+    if (r->photos.texture_size)
+        print_textures(&r->photos, r->attribute_bits, splats);
     fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
+}
+
+static void say_trained(void *context, uint32_t epoch, double seconds, double psnr, double atoms_per_splat,
+                        uint32_t atoms)
+{
+    spl_cmd_progress_finish(context);
+    fprintf(stderr, "training: epoch %u, %.0f s, %.2f dB, %.2f atoms a splat of %u\n", epoch, seconds, psnr,
+            atoms_per_splat, atoms);
+}
+
+static int parse_textures(const char *text, enum spl_texture_coding *out, struct spl_error *err)
+{
+    static const char *const names[SPL_TEXTURES_COUNT] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
+    for (int i = 0; i < SPL_TEXTURES_COUNT; i++)
+        if (!strcmp(text, names[i])) {
+            *out = (enum spl_texture_coding)i;
+            return 0;
+        }
+    return spl_fail_field(err, SPL_E_USAGE, "textures",
+                          "--textures takes adaptive, none, D8W4, D12W4 or D16W8, not '%.32s'", text);
 }
 
 static void name_refused(void *context, const struct spl_error *why)
@@ -117,7 +152,9 @@ int spl_cmd_pack(int argc, char **argv)
         opt_images,
         opt_keep,
         opt_memory,
-        opt_device
+        opt_device,
+        opt_textures,
+        opt_quality
     };
     static const struct option options[] = {
         {"output", required_argument, NULL, 'o'},
@@ -131,12 +168,14 @@ int spl_cmd_pack(int argc, char **argv)
         {"keep-going", no_argument, NULL, opt_keep},
         {"memory", required_argument, NULL, opt_memory},
         {"device", required_argument, NULL, opt_device},
+        {"textures", required_argument, NULL, opt_textures},
+        {"texture-quality", required_argument, NULL, opt_quality},
         {"help", no_argument, NULL, 'h'},
         {0},
     };
     struct spl_cmd_progress progress = {0};
     struct spl_pack_options o = {.progress = spl_cmd_progress, .progress_context = &progress};
-    struct spl_photo_options photos = {.context = &progress};
+    struct spl_photo_options photos = {.textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
     uint64_t number = 0;
@@ -175,6 +214,12 @@ int spl_cmd_pack(int argc, char **argv)
         case opt_memory:
             result = spl_cmd_parse_count("--memory", optarg, 64, 1 << 20, &number, &err);
             photos.memory_bytes = number << 20;
+            break;
+        case opt_textures:
+            result = parse_textures(optarg, &photos.textures, &err);
+            break;
+        case opt_quality:
+            result = spl_cmd_parse_real("--texture-quality", optarg, 20, 60, &photos.texture_quality, &err);
             break;
         case opt_device:
             photos.device = optarg;

@@ -57,25 +57,34 @@ double spl_distortion_invert(const struct spl_distortion *d, double image)
     return d->kind == SPL_DISTORTION_FISHEYE ? tan(low) : low;
 }
 
+bool spl_distortion_place(const struct spl_camera *camera, const struct spl_distortion *d, const double c[3],
+                          double pixel[2])
+{
+    if (!(c[2] > 0))
+        return false;
+    double x = c[0] / c[2], y = c[1] / c[2], out[2] = {x, y};
+    if (d->kind != SPL_DISTORTION_NONE) {
+        double s = x * x + y * y, r = sqrt(s), reached = d->kind == SPL_DISTORTION_FISHEYE ? atan(r) : r;
+        if (!(reached <= d->reach))
+            return false;
+        double scale = r > 1e-9 ? image_of(d, reached) / r : 1;
+        out[0] = x * scale + 2 * d->p[0] * x * y + d->p[1] * (s + 2 * x * x);
+        out[1] = y * scale + 2 * d->p[1] * x * y + d->p[0] * (s + 2 * y * y);
+    }
+    pixel[0] = camera->fx * out[0] + camera->cx;
+    pixel[1] = camera->fy * out[1] + camera->cy;
+    return true;
+}
+
 bool spl_distortion_project(const struct spl_camera *camera, const struct spl_distortion *d, const double p[3],
                             double pixel[2], double *depth)
 {
-    if (d->kind == SPL_DISTORTION_NONE)
-        return spl_camera_project(camera, p, pixel, depth);
     const double *m = camera->rotation, q[3] = {p[0] - camera->eye[0], p[1] - camera->eye[1], p[2] - camera->eye[2]};
-    double z = m[6] * q[0] + m[7] * q[1] + m[8] * q[2];
-    if (!(z > 0))
+    double c[3];
+    for (int i = 0; i < 3; i++)
+        c[i] = m[3 * i] * q[0] + m[3 * i + 1] * q[1] + m[3 * i + 2] * q[2];
+    if (!spl_distortion_place(camera, d, c, pixel))
         return false;
-    double x = (m[0] * q[0] + m[1] * q[1] + m[2] * q[2]) / z, y = (m[3] * q[0] + m[4] * q[1] + m[5] * q[2]) / z;
-    double s = x * x + y * y, r = sqrt(s), out[2] = {x, y};
-    double reached = d->kind == SPL_DISTORTION_FISHEYE ? atan(r) : r;
-    if (!(reached <= d->reach))
-        return false;
-    double scale = r > 1e-9 ? image_of(d, reached) / r : 1;
-    out[0] = x * scale + 2 * d->p[0] * x * y + d->p[1] * (s + 2 * x * x);
-    out[1] = y * scale + 2 * d->p[1] * x * y + d->p[0] * (s + 2 * y * y);
-    pixel[0] = camera->fx * out[0] + camera->cx;
-    pixel[1] = camera->fy * out[1] + camera->cy;
-    *depth = z;
+    *depth = c[2];
     return true;
 }

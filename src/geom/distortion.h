@@ -21,6 +21,10 @@ struct spl_distortion {
  * finite, and those that turn the middle of the image inside out (field "params"). */
 int spl_distortion_init(struct spl_distortion *distortion, struct spl_error *err);
 
+/* The same of a point in the camera's frame (x right, y down, z forward). */
+bool spl_distortion_place(const struct spl_camera *camera, const struct spl_distortion *distortion, const double c[3],
+                          double pixel[2]);
+
 /* The r (tangent of the angle off the axis) whose image has the radius `image`; that of `reach` for those beyond.
  * Without the tangential terms. */
 double spl_distortion_invert(const struct spl_distortion *distortion, double image);

@@ -1,5 +1,6 @@
-"""'splatd pack --cameras' as a user runs it: splats take the photographs' colours, what is wrong with a photograph is said
-by name, and the rest is packed when --keep-going says so."""
+"""'splatd pack --cameras' as a user runs it: splats take the photographs' colours and textures, what is wrong with a
+photograph is said by name, and the rest is packed when --keep-going says so."""
+import math
 import os
 import pathlib
 import re
@@ -23,9 +24,11 @@ def run(*arguments, code=0):
 
 
 def write_png(path, width, height, pixel, bits=8):
-    row = b"\0" + pixel * width
+    """`pixel`: the bytes of every one, or a function of x and y that gives a grey level."""
+    rows = (b"\0" + pixel * width) * height if isinstance(pixel, bytes) else b"".join(
+        b"\0" + b"".join(bytes((pixel(x, y),)) * 3 for x in range(width)) for y in range(height))
     chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)),
-              (b"IDAT", zlib.compress(row * height)), (b"IEND", b"")]
+              (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
     data = b"\x89PNG\r\n\x1a\n"
     for kind, body in chunks:
         data += struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
@@ -43,7 +46,8 @@ def put_views(cameras):
 
 def pack(*arguments, code=0):
     before = sorted(os.listdir("."))
-    said = run("pack", "wall.xyz", "--cameras", "views.json", "-o", "wall.spld", *arguments, code=code)
+    textures = () if "--textures" in arguments else ("--textures", "none")
+    said = run("pack", "wall.xyz", "--cameras", "views.json", "-o", "wall.spld", *textures, *arguments, code=code)
     left = [f for f in sorted(os.listdir(".")) if f not in before and f != "wall.spld"]
     assert not left, left
     return said
@@ -109,8 +113,9 @@ with tempfile.TemporaryDirectory() as folder:
     gray = lambda: write_png(odd, 64, 48, bytes((200, 100, 50)))
     refused("sees no splat", gray, {**good, "odd": camera((0, -3, 0), (0, -9, 0))})
     refused("within the splats", gray, {**good, "odd": camera((0, -0.03, 0), (0, 0, 0))})
-    mirrored = '{"matrix":[-1,0,0,0, 0,0,1,-3, 0,-1,0,0, 0,0,0,1],"convention":"opencv","fov":60,"width":64,"height":48}'
-    scaled = '{"matrix":[2,0,0,0, 0,0,2,-3, 0,-2,0,0, 0,0,0,1],"convention":"opencv","fov":60,"width":64,"height":48}'
+    pose = '{"matrix":[%s,0,0,0,1],"convention":"opencv","fov":60,"width":64,"height":48}'
+    mirrored = pose % "-1,0,0,0, 0,0,1,-3, 0,-1,0,0"
+    scaled = pose % "2,0,0,0, 0,0,2,-3, 0,-2,0,0"
     refused("mirrored", gray, {**good, "odd": mirrored})
     refused("scaled", gray, {**good, "odd": scaled})
     for name in good:
@@ -121,25 +126,42 @@ with tempfile.TemporaryDirectory() as folder:
     assert pathlib.Path("wall.spld").read_bytes() == before
 
     # a model of another scale: each photograph shows something, none what the others show
-    def stripes(name, phase):
-        rows = b"".join(b"\0" + b"".join(bytes((40 + 40 * ((x * 7 + phase * 31 + y * 3) * 2654435761 % 2**32 >> 30),)) * 3
-                                         for x in range(64)) for y in range(48))
-        chunks = [(b"IHDR", struct.pack(">IIBBBBB", 64, 48, 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
-        pathlib.Path(f"images/{name}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
-            struct.pack(">I", len(b)) + k + b + struct.pack(">I", zlib.crc32(k + b)) for k, b in chunks))
+    def speckle(phase):
+        return lambda x, y: 40 + 40 * ((x * 7 + phase * 31 + y * 3) * 2654435761 % 2**32 >> 30)
     apart = {f"p{i}": camera((0.3 * i - 0.5, -3, 0.2 * i), (0.3 * i - 0.5, 0, 0)) for i in range(4)}
     for i, name in enumerate(apart):
-        stripes(name, i * i + 1)
+        write_png(f"images/{name}.png", 64, 48, speckle(i * i + 1))
     put_views(apart)
     said = pack(code=2)
     assert "contradict" in said, said
 
+    # textures: what is finer than the splats shows in a close view, and only with atoms
+    def rings(x, y):
+        return int(128 + 90 * math.sin(0.8 * math.hypot(x - 64, y - 48)))
+    write_png("images/rings.png", 128, 96, rings)
+    put_views({"rings": camera((0, -1.5, 0), (0, 0, 0), (128, 96))})
+
+    def spread(atoms):
+        out = subprocess.run([SPLATD, "render", "wall.spld", "--eye", "0,-0.75,0", "--target", "0,0,0", "--size",
+                              "64x48", "--format", "raw", "--atoms", str(atoms), "-o", "-"], stdout=subprocess.PIPE,
+                             stderr=subprocess.DEVNULL, check=True).stdout
+        grey = [out[4 * i] for i in range(64 * 48)]
+        return sum((g - sum(grey) / len(grey)) ** 2 for g in grey) / len(grey)
+
+    for coding in ("adaptive",):
+        said = pack("--textures", coding, "--texture-quality", "36")
+        found = re.search(r"(\d+) textures of (\d+) x \d+: resampled at ([\d.]+) dB, coded at ([\d.]+) dB", said)
+        assert found and int(found[1]) > 1000 and float(found[3]) > 30 and float(found[4]) > 25, said
+        assert "epoch 1" in said and "atoms a splat: 0:" in said, said
+        assert spread(8) > 1.3 * spread(0), (coding, spread(8), spread(0))
+        assert run("info", "wall.spld", "--json").count("resampling_psnr") <= 1
+
+    model = ("--cameras", "views.json")
     for arguments, words in ((("--images", "."), "--cameras"), (("--keep-going",), "--cameras"),
-                             (("--cameras", "nowhere"), "nowhere"), (("--cameras", "views.json", "--memory", "1"), "memory"),
-                             (("--cameras", "views.json", "--device", "nosuch"), "nosuch")):
-        said = run("pack", "wall.xyz", "-o", "wall.spld", *arguments, code=None if "--device" in arguments else 2) \
-            if "--device" not in arguments else subprocess.run(
-                [SPLATD, "pack", "wall.xyz", "-o", "wall.spld", *arguments], stderr=subprocess.PIPE, text=True).stderr
-        assert words in said, (arguments, said)
+                             (("--cameras", "nowhere"), "nowhere"), ((*model, "--textures", "D9"), "D9"),
+                             ((*model, "--memory", "1"), "memory"), ((*model, "--device", "nosuch"), "nosuch")):
+        done = subprocess.run([SPLATD, "pack", "wall.xyz", "-o", "wall.spld", *arguments], stderr=subprocess.PIPE,
+                              text=True)
+        assert done.returncode in (1, 2) and words in done.stderr, (arguments, done.stderr)
     assert sorted(os.listdir(".")) == ["images", "views.json", "wall.spld", "wall.xyz"], os.listdir(".")
     shutil.rmtree("images")

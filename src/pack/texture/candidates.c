@@ -93,29 +93,37 @@ static bool find_color(const struct spl_photo *photo, const struct spl_world_spl
     return true;
 }
 
+/* Distance from the eye and the cosine of the angle to it. */
+static double find_facing(const struct spl_camera *camera, const struct spl_world_splat *s, double *facing)
+{
+    double square = 0, along = 0;
+    for (int a = 0; a < 3; a++) {
+        double to_eye = camera->eye[a] - s->position[a];
+        square += to_eye * to_eye;
+        along += to_eye * (double)s->splat.normal[a];
+    }
+    *facing = fmin(fabs(along) / sqrt(square), 1);
+    return sqrt(square);
+}
+
+double spl_candidate_slack(const struct spl_photo *photo, const struct spl_world_splat *s)
+{
+    double facing, distance = find_facing(&photo->view->camera, s, &facing);
+    double step = photo->depth.pixels ? distance / photo->depth_camera.fx : 0;
+    return (double)s->splat.radius + 2 * step * (1 + sqrt(1 - facing * facing) / fmax(facing, grazing));
+}
+
 double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *s, uint8_t color[3])
 {
     const struct spl_camera *camera = &photo->view->camera;
-    double pixel[2], depth, eye[3], distance = 0, facing = 0, radius = (double)s->splat.radius;
+    double pixel[2], depth, facing, radius = (double)s->splat.radius;
     if (!spl_distortion_project(camera, &photo->view->distortion, s->position, pixel, &depth))
         return 0;
     double edge = fmin(fmin(pixel[0], camera->width - pixel[0]), fmin(pixel[1], camera->height - pixel[1]));
-    if (!(edge > 0))
+    double distance = find_facing(camera, s, &facing), density = camera->fx / distance;
+    if (!(edge > 0) || !(facing > grazing))
         return 0;
-    for (int a = 0; a < 3; a++) {
-        eye[a] = camera->eye[a] - s->position[a];
-        distance += eye[a] * eye[a];
-        facing += eye[a] * (double)s->splat.normal[a];
-    }
-    distance = sqrt(distance);
-    facing = fabs(facing) / distance;
-    if (!(facing > grazing))
-        return 0;
-    double density = camera->fx / distance, step = 0;
-    if (photo->depth.pixels)
-        step = depth / photo->depth_camera.fx;
-    double slack = radius + 2 * step * (1 + sqrt(1 - fmin(facing * facing, 1)) / facing);
-    enum spl_sight sight = spl_photo_see(photo, s->position, slack);
+    enum spl_sight sight = spl_photo_see(photo, s->position, spl_candidate_slack(photo, s));
     if (sight == SPL_SIGHT_HIDDEN || !find_color(photo, s, radius * density / 2, color))
         return 0;
     double weight = fmin(density, texels_across / (2 * radius)) * facing * facing * photo->sharpness;

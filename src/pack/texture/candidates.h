@@ -40,4 +40,8 @@ uint64_t spl_candidates_look(struct spl_candidates *candidates, const struct spl
 /* How one photograph shows one splat: the score's weight, 0 = not at all; and the colour of its disc. */
 double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *splat, uint8_t color[3]);
 
+/* Metres in front of the splat that count as its own surface there: its radius, and what a sample of the depth map
+ * spans on its slant. */
+double spl_candidate_slack(const struct spl_photo *photo, const struct spl_world_splat *splat);
+
 #endif

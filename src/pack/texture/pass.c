@@ -1,9 +1,10 @@
 /* The second pass of packing with photographs.
  *
  * Every photograph is read once, one at a time, to find which splats it shows (candidates.h); then exposures are evened
- * out, each splat chooses, and the container is written anew with other colours (retexture.h). Memory: one photograph
- * and some 40 bytes a splat. A fault of a photograph fails the packing, or is handed out and the photograph left out,
- * as the options say. The caller's thread owns the renderer. */
+ * out and each splat chooses. For textures each is read again, for those that chose it; they are coded (textures.h),
+ * and the container is written anew with other colours and with codes (retexture.h). Memory: one photograph and some 40
+ * bytes a splat. A fault of a photograph fails the packing, or is handed out and the photograph left out, as the
+ * options say. The caller's thread owns the renderer. */
 #include "pack/texture/pass.h"
 
 #include <math.h>
@@ -17,9 +18,9 @@
 #include "base/parallel.h"
 #include "dataset/retexture.h"
 #include "image/load.h"
-#include "pack/texture/colors.h"
+#include "pack/texture/textures.h"
 
-enum { depth_side = 1600 };
+enum { depth_side = 1600, splats_compared = 4000 };
 static const uint64_t memory_default = 2ull << 30;
 
 /* The fault of one photograph: *err, or handed out. */
@@ -118,7 +119,8 @@ struct pass {
     struct spl_gain *gains;
     uint8_t (*own)[3]; /* NULL: the scan has no colours */
     struct spl_renderer *renderer;
-    bool *dropped; /* by photograph */
+    bool *dropped;  /* by photograph */
+    uint64_t *uses; /* the same: splats that chose it */
 };
 
 static void get_own(void *context, size_t begin, size_t end, unsigned worker)
@@ -240,6 +242,115 @@ static int even_out(struct pass *pass, struct spl_error *err)
     }
 }
 
+/* Leaves are what is looked at closely; those of the photograph that most splats chose stand for all. The smallest
+ * size whose resampling loses less than coding will. */
+static int choose_size(struct pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    double quality = pass->options->texture_quality > 0 ? pass->options->texture_quality : 40;
+    struct spl_resample_error error[3] = {0};
+    struct spl_photo photo;
+    uint32_t best = 0;
+    for (uint32_t i = 0; i < pass->report->photographs; i++)
+        best = pass->uses[i] > pass->uses[best] ? i : best;
+    int rc = spl_photo_open(&photo, &pass->list->views[best], pass->renderer, dataset, depth_side, err);
+    if (rc)
+        return rc;
+    uint32_t stride = (uint32_t)(pass->uses[best] / splats_compared + 1);
+    spl_textures_compare(&pass->splats, &pass->candidates, &pass->chosen, pass->gains, &photo, (uint16_t)best, stride,
+                         error);
+    spl_photo_close(&photo);
+    for (uint32_t k = 0; k < 3; k++) {
+        double mean = error[k].squared / fmax((double)error[k].values, 1);
+        pass->report->texture_size = 8u << k;
+        pass->report->resampling_psnr = mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
+        if (pass->report->resampling_psnr > quality)
+            break;
+    }
+    return SPL_OK;
+}
+
+static int take_textures(struct pass *pass, const struct spl_dataset *dataset, struct spl_textures *textures,
+                         struct spl_error *err)
+{
+    int rc = SPL_OK;
+    spl_stage_begin(pass->stage, "resampling", (uint64_t)pass->report->photographs * pass->splats.chunk_count);
+    for (uint32_t i = 0; !rc && i < pass->report->photographs; i++) {
+        struct spl_photo photo;
+        if (!pass->uses[i]) {
+            spl_stage_add(pass->stage, pass->splats.chunk_count, 0);
+            continue;
+        }
+        rc = spl_photo_open(&photo, &pass->list->views[i], pass->renderer, dataset, depth_side, err);
+        if (rc)
+            break;
+        rc = spl_textures_take(textures, &pass->splats, &pass->candidates, &pass->chosen, pass->gains, &photo,
+                               (uint16_t)i, pass->stage, err);
+        spl_photo_close(&photo);
+    }
+    spl_stage_end(pass->stage);
+    return rc ? rc : spl_textures_list(textures, pass->splats.count, err);
+}
+
+/* What META says of the textures. */
+static json_t *describe(const struct pass *pass, const struct spl_coded *coded)
+{
+    static const char *const names[SPL_TEXTURES_COUNT] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
+    const struct spl_photo_report *r = pass->report;
+    json_t *histogram = json_array();
+    for (int i = 0; i <= SPL_ATOMS_MAX; i++)
+        json_array_append_new(histogram, json_integer((json_int_t)r->histogram[i]));
+    return json_pack("{s:s, s:i, s:i, s:f, s:f, s:I, s:o, s:O}", "coding", names[pass->options->textures], "size",
+                     (int)r->texture_size, "atoms", (int)r->atoms, "resampling_psnr", r->resampling_psnr, "psnr",
+                     r->texture_psnr, "splats", (json_int_t)r->textured, "histogram", histogram, "training",
+                     coded->epochs);
+}
+
+static void report_codes(struct spl_photo_report *report, const struct spl_coded *coded)
+{
+    const struct spl_code_sums *sums = &coded->sums;
+    double mean = sums->squared_error / fmax((double)sums->values, 1);
+    report->textured = sums->splats;
+    report->atoms = coded->dictionary.count;
+    report->texture_psnr = mean > 0 ? fmin(-10 * log10(mean), 99) : 99;
+    memcpy(report->histogram, sums->histogram, sizeof report->histogram);
+}
+
+static int write_textured(struct pass *pass, const struct spl_dataset *dataset, const char *output,
+                          struct spl_error *err)
+{
+    struct spl_textures textures = {.fd = -1};
+    struct spl_coded coded = {0};
+    json_t *description = NULL;
+    pass->uses = spl_alloc(pass->report->photographs, sizeof *pass->uses, err);
+    int rc = pass->uses ? SPL_OK : SPL_E_NOMEM;
+    for (uint64_t id = 0; !rc && id < pass->splats.count; id++)
+        if (pass->chosen.photo[id] != SPL_NO_PHOTO)
+            pass->uses[pass->chosen.photo[id]]++;
+    if (rc || (rc = choose_size(pass, dataset, err)) ||
+        (rc = spl_textures_init(&textures, output, pass->splats.count, pass->report->texture_size, err)) ||
+        (rc = take_textures(pass, dataset, &textures, err)) ||
+        (rc = spl_coded_init(&coded, &textures, &pass->splats, pass->options, &pass->chosen, pass->stage, err)))
+        goto done;
+    report_codes(pass->report, &coded);
+    if (!(description = describe(pass, &coded))) {
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing textures");
+        goto done;
+    }
+    struct spl_coded_chunks chunks = {&coded, &pass->splats};
+    const struct spl_retexture what = {.from = dataset,
+                                       .colors = (const uint8_t(*)[3])pass->chosen.color,
+                                       .dictionary = &coded.dictionary,
+                                       .code_chunk = spl_coded_get,
+                                       .context = &chunks,
+                                       .textures = description};
+    rc = spl_dataset_retexture(&what, output, err);
+done:
+    json_decref(description);
+    spl_coded_finish(&coded);
+    spl_textures_finish(&textures);
+    return rc;
+}
+
 int spl_photos_apply(const struct spl_photo_options *options, const struct spl_view_list *list,
                      const struct spl_dataset *dataset, const char *output, struct spl_stage *stage,
                      struct spl_photo_report *report, struct spl_error *err)
@@ -260,8 +371,9 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
         goto done;
     spl_stage_end(stage);
     report->unseen = pass.chosen.unseen;
-    const struct spl_retexture what = {.from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color};
-    rc = spl_dataset_retexture(&what, output, err);
+    const struct spl_retexture plain = {.from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color};
+    rc = options->textures == SPL_TEXTURES_NONE ? spl_dataset_retexture(&plain, output, err)
+                                                : write_textured(&pass, dataset, output, err);
     report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
 done:
     spl_renderer_destroy(pass.renderer);
@@ -271,5 +383,6 @@ done:
     free(pass.gains);
     free(pass.own);
     free(pass.dropped);
+    free(pass.uses);
     return rc;
 }

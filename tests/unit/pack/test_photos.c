@@ -10,6 +10,8 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
+#include "geom/tangent.h"
+#include "pack/texture/resample.h"
 #include "pack/texture/colors.h"
 #include "support/make_dataset.h"
 
@@ -241,6 +243,81 @@ static void the_majority_gives_the_colour_and_neighbours_lend(void **state)
     spl_dataset_close(dataset);
 }
 
+static float smooth(double x, double y)
+{
+    return (float)(128 + 50 * sin(x * 7) + 40 * cos(y * 5));
+}
+
+/* A photograph of a smooth pattern on the plane y = 0, seen slantwise: textures are that pattern, whatever the view. */
+static void textures_show_the_plane_and_not_the_view(void **state)
+{
+    (void)state;
+    struct spl_named_view view = make_view();
+    assert_int_equal(
+        spl_camera_look_at(&view.camera, (double[]){0.6, -1.5, 0.4}, (double[]){0, 0, 0}, (double[]){0, 0, 1}, NULL),
+        0);
+    view.camera.fx = view.camera.fy = 200;
+    view.camera.width = view.camera.height = 200;
+    view.camera.cx = view.camera.cy = 100;
+    struct spl_image image = make_image(200, 200, 0, 0);
+    uint8_t *pixels = image.pixels;
+    for (int i = 0; i < 200 * 200; i++) {
+        double ray[3], c[3] = {(i % 200 + 0.5 - 100) / 200, (i / 200 + 0.5 - 100) / 200, 1}; /* place to ray to plane */
+        for (int a = 0; a < 3; a++)
+            ray[a] = c[0] * view.camera.rotation[a] + c[1] * view.camera.rotation[3 + a] + view.camera.rotation[6 + a];
+        double t = -view.camera.eye[1] / ray[1];
+        for (int a = 0; a < 3; a++)
+            pixels[4 * i + a] =
+                (uint8_t)(smooth(view.camera.eye[0] + t * ray[0], view.camera.eye[2] + t * ray[2]) + 0.5f);
+    }
+    struct spl_photo photo;
+    assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
+    const struct spl_world_splat splat = {.position = {0.1, 0, 0.05}, .splat = {.normal = {0, -1, 0}, .radius = 0.12f}};
+    const struct spl_gain gain = {.factor = {1, 1, 0.5f}};
+    const uint8_t seen[3] = {100, 100, 100}, color[3] = {100, 110, 50};
+    const struct spl_tone tone = spl_tone_find(&gain, seen, color);
+    assert_true(tone.offset[0] == 0 && tone.offset[1] == 10 && tone.offset[2] == 0);
+    static uint8_t texture[SPL_TEXTURE_VALUES_MAX];
+    float u[3], v[3];
+    spl_tangent_frame(splat.splat.normal, u, v);
+    for (uint32_t size = 8; size <= 32; size *= 2) {
+        assert_true(spl_texture_resample(&photo, &tone, &splat, size, texture));
+        for (uint32_t i = 0; i < size * size; i++) {
+            float a = 0.12f * ((2 * (float)(i % size) + 1) / (float)size - 1);
+            float b = 0.12f * ((2 * (float)(i / size) + 1) / (float)size - 1);
+            float wanted = smooth(0.1 + (double)(a * u[0] + b * v[0]), 0.05 + (double)(a * u[2] + b * v[2]));
+            assert_true(fabsf((float)texture[i] - wanted) < 2);
+            assert_true(fabsf((float)texture[size * size + i] - wanted - 10) < 2);
+            assert_true(fabsf((float)texture[2 * size * size + i] - wanted / 2) < 2);
+        }
+    }
+    struct spl_resample_error error = {0}, coarse = {0};
+    spl_texture_compare(&photo, &tone, &splat, 32, texture, &error);
+    assert_true(error.values > 3 * 300 && 10 * log10(65025 * (double)error.values / error.squared) > 50);
+    memset(texture, 128, 3 * 64);
+    spl_texture_compare(&photo, &tone, &splat, 8, texture, &coarse);
+    assert_true(coarse.values == error.values && coarse.squared > 100 * error.squared);
+
+    /* what the photograph does not show is filled from beside it: the right half is hidden by something nearer */
+    photo.depth_camera = view.camera;
+    photo.depth = (struct spl_image){.type = SPL_PIXEL_F32, .width = 200, .height = 200};
+    float *depth = photo.depth.pixels = malloc(200 * 200 * sizeof *depth);
+    double middle[2], at;
+    assert_true(spl_camera_project(&view.camera, splat.position, middle, &at));
+    for (int i = 0; i < 200 * 200; i++) {
+        depth[i] = i % 200 > (int)middle[0] + 4 ? 0.5f : (float)at;
+        if (i % 200 > (int)middle[0] + 4)
+            pixels = photo.texels[0] + 4 * (size_t)i, pixels[0] = pixels[1] = pixels[2] = 255;
+    }
+    assert_true(spl_texture_resample(&photo, &tone, &splat, 16, texture));
+    for (int i = 0; i < 256; i++)
+        assert_true(texture[i] < 230); /* the occluder's white is on no texel */
+    for (int i = 0; i < 200 * 200; i++)
+        depth[i] = 0.5f;
+    assert_false(spl_texture_resample(&photo, &tone, &splat, 16, texture));
+    spl_photo_close(&photo);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -249,6 +326,7 @@ int main(void)
         cmocka_unit_test(what_hides_a_splat_is_seen),
         cmocka_unit_test(the_best_are_kept_in_any_order),
         cmocka_unit_test(exposures_are_found_among_outliers),
+        cmocka_unit_test(textures_show_the_plane_and_not_the_view),
         cmocka_unit_test(the_majority_gives_the_colour_and_neighbours_lend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
