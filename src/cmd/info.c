@@ -10,8 +10,10 @@
 
 #include <jansson.h>
 
+#include "cmd/dictionary.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "dataset/texture.h"
 
 enum { width_max = 24, levels_max = 64 };
 
@@ -41,12 +43,13 @@ struct report {
     } levels[levels_max]; /* deeper ones are counted with the last */
     uint32_t level_count;
     double widths[code_count][width_max + 1]; /* shares of the codes */
+    uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
 };
 
 static void usage(FILE *out)
 {
     fprintf(out,
-            "usage: splatd info [--json] [--no-verify] NAME.spld…\n\n"
+            "usage: splatd info [--json] [--no-verify] [--dictionary PNG] NAME.spld…\n\n"
             "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
             "histogram of bits that the scene needed. Every section's checksum is verified first.\n\n"
             "A table to read:\n"
@@ -54,8 +57,11 @@ static void usage(FILE *out)
             "Only check that files are whole (exit code 2 when one is not):\n"
             "  splatd info *.spld >/dev/null\n"
             "One line of JSON a dataset, for scripts:\n"
-            "  splatd info --json courtyard.spld | jq .bytes_per_splat.total\n\n"
+            "  splatd info --json courtyard.spld | jq .bytes_per_splat.total\n"
+            "The atoms that textures are sums of, the most used first, as a picture:\n"
+            "  splatd info hall.spld --dictionary atoms.png\n\n"
             "      --json       one JSON object a line\n"
+            "      --dictionary PNG  where the picture goes; one dataset with textures\n"
             "      --verify     check the pages' checksums too (default)\n"
             "      --no-verify  trust the pages; everything else is always checked\n");
 }
@@ -73,7 +79,7 @@ static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attr
     }
 }
 
-static void gather(struct report *report, const struct spl_dataset *dataset)
+static int gather(struct report *report, const struct spl_dataset *dataset, struct spl_error *err)
 {
     uint32_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
@@ -101,6 +107,7 @@ static void gather(struct report *report, const struct spl_dataset *dataset)
                 report->widths[k][width] +=
                     (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
             }
+    return spl_dataset_count_atoms(dataset, report->atoms, err);
 }
 
 static double bytes_per_splat(const struct spl_dataset_info *info, enum spl_attribute attribute)
@@ -162,7 +169,8 @@ static void print_table(const struct report *report)
     }
     printf("\n  bytes a splat\n");
     for (int attribute = 0; attribute < SPL_ATTRIBUTE_COUNT; attribute++)
-        printf("  %-14s%6.2f\n", spl_attribute_name(attribute), bytes_per_splat(info, attribute));
+        if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
+            printf("  %-14s%6.2f\n", spl_attribute_name(attribute), bytes_per_splat(info, attribute));
     printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
            total_bytes_per_splat(info));
     for (int k = 0; k < code_count; k++) {
@@ -172,11 +180,31 @@ static void print_table(const struct report *report)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
     }
+    if (!info->atoms)
+        return;
+    printf("\n  textures of %u x %u from %s atoms, %.1f MB resident; splats by number of atoms\n ", info->texture_size,
+           info->texture_size, grouped(info->atoms, a), (double)info->dictionary_bytes / 1e6);
+    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
+        printf("  %d: %.1f %%", count, 100.0 * (double)report->atoms[count] / (double)info->splats);
+    printf("\n");
 }
 
 static json_t *vector(const double v[3])
 {
     return json_pack("[f,f,f]", v[0], v[1], v[2]);
+}
+
+/* null where there are none; NULL when memory is refused. */
+static json_t *textures_to_json(const struct report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    json_t *counts = info->atoms ? json_array() : NULL;
+    if (!info->atoms)
+        return json_null();
+    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
+        json_array_append_new(counts, json_integer((json_int_t)report->atoms[count]));
+    return json_pack("{s:I, s:I, s:I, s:o}", "size", (json_int_t)info->texture_size, "atoms", (json_int_t)info->atoms,
+                     "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
 }
 
 /* NULL when memory is refused: json_pack passes it on. */
@@ -206,7 +234,7 @@ static json_t *to_json(const struct report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b}, s:I, s:o, s:o, s:o, s:O}",
+        "s:b}, s:I, s:o, s:o, s:o, s:o, s:O}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -215,7 +243,7 @@ static json_t *to_json(const struct report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes, "by_level",
-        levels, "widths", widths, "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
+        levels, "widths", widths, "textures", textures_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
 }
 
 static int print_json(const struct report *report, struct spl_error *err)
@@ -232,15 +260,17 @@ static int print_json(const struct report *report, struct spl_error *err)
 
 int spl_cmd_info(int argc, char **argv)
 {
-    enum { opt_json = 256, opt_verify, opt_no_verify };
+    enum { opt_json = 256, opt_verify, opt_no_verify, opt_dictionary };
     static const struct option options[] = {
         {"json", no_argument, NULL, opt_json},
         {"verify", no_argument, NULL, opt_verify},
         {"no-verify", no_argument, NULL, opt_no_verify},
+        {"dictionary", required_argument, NULL, opt_dictionary},
         {"help", no_argument, NULL, 'h'},
         {0},
     };
     bool json = false, verify = true;
+    const char *picture = NULL;
     for (int c; (c = getopt_long(argc, argv, "h", options, NULL)) >= 0;) {
         switch (c) {
         case opt_json:
@@ -249,6 +279,9 @@ int spl_cmd_info(int argc, char **argv)
         case opt_verify:
         case opt_no_verify:
             verify = c == opt_verify;
+            break;
+        case opt_dictionary:
+            picture = optarg;
             break;
         case 'h':
             usage(stdout);
@@ -262,19 +295,24 @@ int spl_cmd_info(int argc, char **argv)
         fprintf(stderr, "splatd: info needs at least one NAME.spld; 'splatd info --help' shows how\n");
         return 2;
     }
+    if (picture && argc - optind > 1) {
+        fprintf(stderr, "splatd: --dictionary is the picture of one dataset, not of %d\n", argc - optind);
+        return 2;
+    }
     int worst = 0; /* the remaining files are still told of */
     for (int i = optind; i < argc; i++) {
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
         struct report report;
         int rc = spl_dataset_open(argv[i], verify, &dataset, &err);
-        if (!rc) {
-            gather(&report, dataset);
-            if (json)
-                rc = print_json(&report, &err);
-            else
-                print_table(&report);
-        }
+        if (!rc)
+            rc = gather(&report, dataset, &err);
+        if (!rc && json)
+            rc = print_json(&report, &err);
+        else if (!rc)
+            print_table(&report);
+        if (!rc && picture)
+            rc = spl_cmd_write_dictionary(dataset, picture, &err);
         spl_dataset_close(dataset);
         int code = rc ? spl_cmd_fail(&err) : 0;
         worst = code > worst ? code : worst;

@@ -1,4 +1,5 @@
 /* splatd info as scripts meet it: output, exit codes, messages. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +12,9 @@
 #include <cmocka.h>
 #include <jansson.h>
 
+#include "image/load.h"
 #include "support/make_dataset.h"
+#include "support/make_textures.h"
 
 static char folder[256];
 
@@ -126,6 +129,51 @@ static void test_exit_codes(void **state)
     assert_int_equal(run("--no-verify hurt.spld", output, sizeof output), 0);
 }
 
+static void test_textures(void **state)
+{
+    (void)state;
+    char output[8192], path[300];
+    struct spl_dataset *from;
+    struct spl_dictionary dictionary = make_dictionary(10, 8, 1);
+    snprintf(path, sizeof path, "%s/two.spld", folder);
+    assert_int_equal(spl_dataset_open(path, true, &from, NULL), SPL_OK);
+    snprintf(path, sizeof path, "%s/textured.spld", folder);
+    make_textured_file(from, &dictionary, 3, 1, path);
+    spl_dataset_close(from);
+    spl_dictionary_finish(&dictionary);
+    assert_int_equal(run("--json textured.spld", output, sizeof output), 0);
+    json_t *json = json_loads(output, 0, NULL), *textures = json_object_get(json, "textures"), *count;
+    const json_t *bytes = json_object_get(json, "bytes_per_splat"), *counts = json_object_get(textures, "splats_by_atoms");
+    assert_true(number(textures, "atoms") == 10 && number(textures, "size") == 8);
+    assert_true(number(bytes, "texture") > 0 && fabs(number(bytes, "dictionary") - (16 + 10 * 196) / 4500.0) < 1e-9);
+    double splats = 0;
+    size_t i;
+    json_array_foreach(counts, i, count)
+        splats += json_number_value(count);
+    assert_true(splats == 4500 && json_array_size(counts) == 9 && json_number_value(json_array_get(counts, 3)) > 100);
+    json_decref(json);
+    assert_int_equal(run("--dictionary atoms.png textured.spld", output, sizeof output), 0);
+    assert_non_null(strstr(output, "textures of 8 x 8 from 10 atoms"));
+    snprintf(path, sizeof path, "%s/atoms.png", folder);
+    struct spl_image picture;
+    assert_int_equal(spl_image_load(path, SPL_LAYER_COLOR, &picture, NULL), SPL_OK);
+    assert_true(picture.width == 4 * 9 + 1 && picture.height == 3 * 9 + 1);
+    const uint8_t *pixels = picture.pixels;
+    int least = 255, most = 0;
+    for (uint32_t y = 1; y < 9; y++)
+        for (uint32_t x = 1; x < 9; x++) {
+            int red = pixels[4 * (y * picture.width + x)];
+            least = red < least ? red : least;
+            most = red > most ? red : most;
+        }
+    assert_true(pixels[0] == 0 && least < 100 && most > 150);
+    spl_image_finish(&picture);
+    assert_int_equal(run("--dictionary atoms.png one.spld 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "one has no textures"));
+    assert_int_equal(run("--dictionary atoms.png one.spld two.spld 2>&1", output, sizeof output), 2);
+    assert_int_equal(run("--dictionary nowhere/atoms.png textured.spld 2>/dev/null", output, sizeof output), 1);
+}
+
 static int prepare(void **state)
 {
     (void)state;
@@ -138,8 +186,8 @@ static int prepare(void **state)
 static int clean(void **state)
 {
     (void)state;
-    static const char *const names[] = {"one.spld", "two.spld", "hurt.spld"};
-    for (size_t i = 0; i < 3; i++) {
+    static const char *const names[] = {"one.spld", "two.spld", "hurt.spld", "textured.spld", "atoms.png"};
+    for (size_t i = 0; i < 5; i++) {
         char path[300];
         snprintf(path, sizeof path, "%s/%s", folder, names[i]);
         unlink(path);
@@ -153,6 +201,7 @@ int main(void)
         cmocka_unit_test(test_json),
         cmocka_unit_test(test_table),
         cmocka_unit_test(test_exit_codes),
+        cmocka_unit_test(test_textures),
     };
     return cmocka_run_group_tests(tests, prepare, clean);
 }
