@@ -113,7 +113,8 @@ double spl_candidate_slack(const struct spl_photo *photo, const struct spl_world
     return (double)s->splat.radius + 2 * step * (1 + sqrt(1 - facing * facing) / fmax(facing, grazing));
 }
 
-double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *s, uint8_t color[3])
+double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *s,
+                           struct spl_candidate *candidate)
 {
     const struct spl_camera *camera = &photo->view->camera;
     double pixel[2], depth, facing, radius = (double)s->splat.radius;
@@ -124,8 +125,10 @@ double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world
     if (!(edge > 0) || !(facing > grazing))
         return 0;
     enum spl_sight sight = spl_photo_see(photo, s->position, spl_candidate_slack(photo, s));
-    if (sight == SPL_SIGHT_HIDDEN || !find_color(photo, s, radius * density / 2, color))
+    if (sight == SPL_SIGHT_HIDDEN || !find_color(photo, s, radius * density / 2, candidate->color))
         return 0;
+    candidate->place[0] = (uint8_t)(pixel[0] / camera->width * 255 + 0.5);
+    candidate->place[1] = (uint8_t)(pixel[1] / camera->height * 255 + 0.5);
     double weight = fmin(density, texels_across / (2 * radius)) * facing * facing * photo->sharpness;
     weight *= fmin(1, 0.1 + edge / (frame_share * camera->width));
     return sight == SPL_SIGHT_CLEAR ? weight : weight / 4;
@@ -166,7 +169,7 @@ static void look_at_chunks(void *context, size_t begin, size_t end, unsigned wor
         uint32_t count = spl_splats_get(look->splats, chunk, splats);
         for (uint32_t i = 0; i < count; i++) {
             struct spl_candidate candidate = {.photo = look->index};
-            double weight = spl_candidate_judge(look->photo, &splats[i], candidate.color);
+            double weight = spl_candidate_judge(look->photo, &splats[i], &candidate);
             if (!(weight > 0))
                 continue;
             candidate.score = spl_candidate_score(weight);

@@ -12,6 +12,7 @@ struct spl_candidate {
     uint16_t photo; /* SPL_NO_PHOTO: none, and none behind it */
     uint16_t score; /* spl_candidate_weight() */
     uint8_t color[3];
+    uint8_t place[2]; /* in the photograph: 0..255 across and down */
 };
 
 /* `depth` candidates a splat, best first; entry [splat * depth + i]. */
@@ -37,8 +38,9 @@ void spl_candidates_add(struct spl_candidates *candidates, uint64_t splat, const
 uint64_t spl_candidates_look(struct spl_candidates *candidates, const struct spl_splats *splats,
                              const struct spl_photo *photo, uint16_t index, struct spl_stage *stage);
 
-/* How one photograph shows one splat: the score's weight, 0 = not at all; and the colour of its disc. */
-double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *splat, uint8_t color[3]);
+/* How one photograph shows one splat: the score's weight, 0 = not at all; and the colour of its disc and its place. */
+double spl_candidate_judge(const struct spl_photo *photo, const struct spl_world_splat *splat,
+                           struct spl_candidate *candidate);
 
 /* Metres in front of the splat that count as its own surface there: its radius, and what a sample of the depth map
  * spans on its slant. */

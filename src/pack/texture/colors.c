@@ -74,7 +74,7 @@ static void choose(const struct pass *pass, uint64_t id, struct tally *tally)
     uint32_t n = 0, leader = 0;
     for (; n < pass->candidates->depth && list[n].photo != SPL_NO_PHOTO; n++) {
         weight[n] = spl_candidate_weight(list[n].score);
-        spl_gain_apply(&pass->gains[list[n].photo], list[n].color, color[n]);
+        spl_gain_apply(&pass->gains[list[n].photo], list[n].place, list[n].color, color[n]);
     }
     for (uint32_t i = 0; i < n; i++) { /* who has most on its side */
         support[i] = 0;
@@ -158,7 +158,7 @@ static void choose_chunks(void *context, size_t begin, size_t end, unsigned work
                 borrow(pass, splats, count, first, i);
                 continue;
             }
-            spl_gain_apply(&pass->gains[pass->photos], pass->own[first + i], color);
+            spl_gain_apply(&pass->gains[pass->photos], spl_gain_middle, pass->own[first + i], color);
             for (int c = 0; c < 3; c++)
                 pass->chosen->color[first + i][c] = (uint8_t)(color[c] + 0.5f);
         }

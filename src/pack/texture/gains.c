@@ -1,6 +1,8 @@
 /* Gains by iteratively reweighted least squares (Cauchy weights): for a splat that photographs i and j show,
- * log c_i + x_i = log c_j + x_j. The normal equations are a graph's Laplacian; conjugate gradients solve them without a
- * matrix. Values near black and white say nothing about exposure and are left out. One thread; deterministic. */
+ * log c_i + x_i = log c_j + x_j, where x_i is bilinear in the photograph between the corners of a grid whose neighbours
+ * are drawn together. Weights are lenient at first, so that glare on a part of a photograph, on which all pairs agree,
+ * is not taken for an outlier. Conjugate gradients solve the normal equations without a matrix. Values near black and
+ * white say nothing about exposure and are left out. One thread; deterministic. */
 #include "pack/texture/gains.h"
 
 #include <math.h>
@@ -9,22 +11,45 @@
 
 #include "base/memory.h"
 
-enum { pairs_max = 1 << 18, rounds = 6, steps_max = 60, darkest = 12, brightest = 243, enough = 200 };
-static const double scale = 0.1;      /* of the Cauchy weights: 10 % */
+enum { pairs_max = 1 << 17, rounds = 5, steps_max = 50, darkest = 12, brightest = 243, enough = 200 };
+static const double scales[rounds] = {0.8, 0.4, 0.2, 0.1, 0.1}; /* of the Cauchy weights, logarithm */
+static const double stiffness = 0.5; /* between corners of a grid, share of a mean corner's pairs */
+const uint8_t spl_gain_middle[2] = {128, 128};
 static const double anchor = 1e-3;    /* pull towards 0, share of a mean photograph's pairs */
 static const double log_max = 1.0986; /* of a factor: 3 */
 
 struct pair {
-    uint16_t i, j;
+    uint16_t photo[2];
+    uint8_t place[2][2];
     float difference[3], brightness[2];
     float weight;
 };
 
+/* The corners around a place, and their shares. */
+struct corners {
+    uint32_t node[4];
+    float share[4];
+};
+
+static struct corners find_corners(const uint8_t place[2])
+{
+    struct corners c;
+    float x = (float)place[0] / 255 * (SPL_GAIN_ACROSS - 1), y = (float)place[1] / 255 * (SPL_GAIN_DOWN - 1);
+    uint32_t x0 = (uint32_t)fminf(x, SPL_GAIN_ACROSS - 2), y0 = (uint32_t)fminf(y, SPL_GAIN_DOWN - 2);
+    float fx = x - (float)x0, fy = y - (float)y0;
+    for (uint32_t i = 0; i < 4; i++) {
+        c.node[i] = (y0 + i / 2) * SPL_GAIN_ACROSS + x0 + i % 2;
+        c.share[i] = (i % 2 ? fx : 1 - fx) * (i / 2 ? fy : 1 - fy);
+    }
+    return c;
+}
+
 struct system {
     const struct pair *pairs;
     size_t count;
-    uint32_t nodes;
-    double pull;
+    uint32_t photos; /* the scan's own colours too */
+    uint32_t nodes;  /* SPL_GAIN_NODES a photograph */
+    double pull, stiffness;
 };
 
 static bool usable(const uint8_t c[3])
@@ -35,14 +60,16 @@ static bool usable(const uint8_t c[3])
     return true;
 }
 
-static void add_pair(struct pair *pairs, size_t *count, uint16_t i, uint16_t j, const uint8_t a[3], const uint8_t b[3])
+static void add_pair(struct pair *pairs, size_t *count, const struct spl_candidate *a, const struct spl_candidate *b)
 {
-    if (*count == pairs_max || !usable(a) || !usable(b))
+    if (*count == pairs_max || !usable(a->color) || !usable(b->color))
         return;
     struct pair *p = &pairs[(*count)++];
-    *p = (struct pair){.i = i, .j = j, .brightness = {logf(a[1]), logf(b[1])}};
+    *p = (struct pair){.photo = {a->photo, b->photo}, .brightness = {logf(a->color[1]), logf(b->color[1])}};
+    memcpy(p->place[0], a->place, sizeof a->place);
+    memcpy(p->place[1], b->place, sizeof b->place);
     for (int c = 0; c < 3; c++)
-        p->difference[c] = logf((float)a[c] / (float)b[c]);
+        p->difference[c] = logf((float)a->color[c] / (float)b->color[c]);
 }
 
 /* An even subsample: every splat's best against its others, and against its own colour. */
@@ -57,21 +84,57 @@ static size_t collect(const struct spl_candidates *candidates, const uint8_t (*o
         if (list[0].photo == SPL_NO_PHOTO)
             continue;
         for (uint32_t k = 1; k < candidates->depth && list[k].photo != SPL_NO_PHOTO; k++)
-            add_pair(pairs, &count, list[0].photo, list[k].photo, list[0].color, list[k].color);
-        if (own)
-            add_pair(pairs, &count, list[0].photo, scan, list[0].color, own[s]);
+            add_pair(pairs, &count, &list[0], &list[k]);
+        if (own) {
+            struct spl_candidate scanned = {.photo = scan, .place = {spl_gain_middle[0], spl_gain_middle[1]}};
+            memcpy(scanned.color, own[s], sizeof scanned.color);
+            add_pair(pairs, &count, &list[0], &scanned);
+        }
     }
     return count;
+}
+
+static double value_at(const double *x, const struct pair *p, int side)
+{
+    struct corners c = find_corners(p->place[side]);
+    const double *of = x + (size_t)p->photo[side] * SPL_GAIN_NODES;
+    double sum = 0;
+    for (int i = 0; i < 4; i++)
+        sum += (double)c.share[i] * of[c.node[i]];
+    return sum;
+}
+
+static void add_at(double *x, const struct pair *p, int side, double value)
+{
+    struct corners c = find_corners(p->place[side]);
+    double *of = x + (size_t)p->photo[side] * SPL_GAIN_NODES;
+    for (int i = 0; i < 4; i++)
+        of[c.node[i]] += (double)c.share[i] * value;
+}
+
+static void stiffen(const struct system *s, const double *x, double *out, uint32_t a, uint32_t b)
+{
+    double flow = s->stiffness * (x[a] - x[b]);
+    out[a] += flow;
+    out[b] -= flow;
 }
 
 static void multiply(const struct system *s, const double *x, double *out)
 {
     for (uint32_t n = 0; n < s->nodes; n++)
         out[n] = s->pull * x[n];
-    for (size_t p = 0; p < s->count; p++) {
-        double flow = (double)s->pairs[p].weight * (x[s->pairs[p].i] - x[s->pairs[p].j]);
-        out[s->pairs[p].i] += flow;
-        out[s->pairs[p].j] -= flow;
+    for (uint32_t n = 0; n < s->nodes; n++) {
+        uint32_t in = n % SPL_GAIN_NODES;
+        if (in % SPL_GAIN_ACROSS)
+            stiffen(s, x, out, n, n - 1);
+        if (in >= SPL_GAIN_ACROSS)
+            stiffen(s, x, out, n, n - SPL_GAIN_ACROSS);
+    }
+    for (size_t k = 0; k < s->count; k++) {
+        const struct pair *p = &s->pairs[k];
+        double flow = (double)p->weight * (value_at(x, p, 0) - value_at(x, p, 1));
+        add_at(out, p, 0, flow);
+        add_at(out, p, 1, -flow);
     }
 }
 
@@ -93,8 +156,8 @@ static void solve(const struct system *s, int channel, double *x, double *work)
         r[i] = -q[i];
     for (size_t k = 0; k < s->count; k++) {
         double pull = (double)(s->pairs[k].weight * s->pairs[k].difference[channel]);
-        r[s->pairs[k].i] -= pull;
-        r[s->pairs[k].j] += pull;
+        add_at(r, &s->pairs[k], 0, -pull);
+        add_at(r, &s->pairs[k], 1, pull);
     }
     memcpy(p, r, n * sizeof *p);
     double size = dot(r, r, n), first = size;
@@ -114,28 +177,28 @@ static void solve(const struct system *s, int channel, double *x, double *work)
 
 static double residual(const struct pair *p, const double *const x[3], int c)
 {
-    return (double)p->difference[c] + x[c][p->i] - x[c][p->j];
+    return (double)p->difference[c] + value_at(x[c], p, 0) - value_at(x[c], p, 1);
 }
 
 /* Deviation and agreement of each node with those that it was compared with. */
 static void judge(const struct system *s, const double *const x[3], struct spl_gain *gains, double *sums)
 {
-    memset(sums, 0, s->nodes * 6 * sizeof *sums); /* n, a, b, aa, bb, ab */
-    for (uint32_t n = 0; n < s->nodes; n++)
+    memset(sums, 0, s->photos * 6 * sizeof *sums); /* n, a, b, aa, bb, ab */
+    for (uint32_t n = 0; n < s->photos; n++)
         gains[n].deviation = 0;
     for (size_t k = 0; k < s->count; k++) {
         const struct pair *p = &s->pairs[k];
         double r = residual(p, x, 1);
         for (int side = 0; side < 2; side++) {
             double a = (double)p->brightness[side], b = (double)p->brightness[!side];
-            double *sum = sums + 6 * (side ? p->j : p->i);
+            double *sum = sums + 6 * p->photo[side];
             const double add[6] = {1, a, b, a * a, b * b, a * b};
             for (int i = 0; i < 6; i++)
                 sum[i] += add[i];
-            gains[side ? p->j : p->i].deviation += r * r;
+            gains[p->photo[side]].deviation += r * r;
         }
     }
-    for (uint32_t n = 0; n < s->nodes; n++) {
+    for (uint32_t n = 0; n < s->photos; n++) {
         const double *sum = sums + 6 * n;
         double count = fmax(sum[0], 1), aa = sum[3] - sum[1] * sum[1] / count, bb = sum[4] - sum[2] * sum[2] / count;
         double ab = sum[5] - sum[1] * sum[2] / count;
@@ -148,22 +211,24 @@ static void judge(const struct system *s, const double *const x[3], struct spl_g
 int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)[3], uint32_t photos,
                    struct spl_gain *gains, struct spl_error *err)
 {
-    uint32_t nodes = photos + 1;
+    uint32_t all = photos + 1, nodes = all * SPL_GAIN_NODES;
     struct pair *pairs = spl_alloc_raw(pairs_max, sizeof *pairs, err);
-    double *memory = spl_alloc(nodes, 12 * sizeof *memory, err);
+    double *memory = spl_alloc(nodes, 6 * sizeof *memory, err);
     int rc = pairs && memory ? SPL_OK : SPL_E_NOMEM;
     if (rc)
         goto done;
     double *x[3] = {memory, memory + nodes, memory + 2 * nodes}, *work = memory + 3 * nodes;
     const double *const solved[3] = {x[0], x[1], x[2]};
-    struct system s = {.pairs = pairs, .nodes = nodes, .count = collect(candidates, own, (uint16_t)photos, pairs)};
+    struct system s = {
+        .pairs = pairs, .photos = all, .nodes = nodes, .count = collect(candidates, own, (uint16_t)photos, pairs)};
     s.pull = anchor * ((double)s.count / nodes + 1);
+    s.stiffness = stiffness * ((double)s.count / nodes + 1);
     for (int round = 0; round < rounds; round++) {
         for (size_t k = 0; k < s.count; k++) {
             double worst = 0;
             for (int c = 0; c < 3; c++)
                 worst = fmax(worst, fabs(residual(&pairs[k], solved, c)));
-            pairs[k].weight = (float)(1 / (1 + worst * worst / (scale * scale)));
+            pairs[k].weight = (float)(1 / (1 + worst * worst / (scales[round] * scales[round])));
         }
         for (int c = 0; c < 3; c++)
             solve(&s, c, x[c], work);
@@ -171,13 +236,15 @@ int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)
     judge(&s, solved, gains, work);
     for (int c = 0; c < 3; c++) {
         double mean = 0, used = 0;
-        for (uint32_t n = 0; n < photos; n++) {
-            mean += gains[n].shared ? x[c][n] : 0;
-            used += gains[n].shared > 0;
+        for (uint32_t n = 0; n < photos * SPL_GAIN_NODES; n++) {
+            bool shared = gains[n / SPL_GAIN_NODES].shared > 0;
+            mean += shared ? x[c][n] : 0;
+            used += shared;
         }
         for (uint32_t n = 0; n < nodes; n++) {
-            double value = gains[n].shared ? x[c][n] - mean / fmax(used, 1) : 0;
-            gains[n].factor[c] = (float)exp(fmin(fmax(value, -log_max), log_max));
+            struct spl_gain *gain = &gains[n / SPL_GAIN_NODES];
+            double value = gain->shared ? x[c][n] - mean / fmax(used, 1) : 0;
+            gain->factor[n % SPL_GAIN_NODES][c] = (float)exp(fmin(fmax(value, -log_max), log_max));
         }
     }
 done:
@@ -191,8 +258,20 @@ bool spl_gain_contradicts(const struct spl_gain *gain)
     return gain->shared >= enough && gain->deviation > 0.25 && gain->agreement < 0.25;
 }
 
-void spl_gain_apply(const struct spl_gain *gain, const uint8_t in[3], float out[3])
+void spl_gain_get(const struct spl_gain *gain, const uint8_t place[2], float factor[3])
 {
+    struct corners corners = find_corners(place);
+    for (int c = 0; c < 3; c++) {
+        factor[c] = 0;
+        for (int i = 0; i < 4; i++)
+            factor[c] += corners.share[i] * gain->factor[corners.node[i]][c];
+    }
+}
+
+void spl_gain_apply(const struct spl_gain *gain, const uint8_t place[2], const uint8_t in[3], float out[3])
+{
+    float factor[3];
+    spl_gain_get(gain, place, factor);
     for (int c = 0; c < 3; c++)
-        out[c] = fminf((float)in[c] * gain->factor[c], 255);
+        out[c] = fminf((float)in[c] * factor[c], 255);
 }

@@ -15,15 +15,14 @@
 enum { probes = 5, levels_max = 6 };
 _Static_assert(1 << (levels_max - 1) == SPL_TEXTURE_SIZE_MAX, "one level more than halvings");
 
-struct spl_tone spl_tone_find(const struct spl_gain *gain, const uint8_t seen[3], const uint8_t color[3])
+struct spl_tone spl_tone_find(const struct spl_gain *gain, const struct spl_candidate *seen, const uint8_t color[3])
 {
     struct spl_tone tone;
     float out[3];
-    spl_gain_apply(gain, seen, out);
-    for (int c = 0; c < 3; c++) {
-        tone.factor[c] = gain->factor[c];
+    spl_gain_get(gain, seen->place, tone.factor);
+    spl_gain_apply(gain, seen->place, seen->color, out);
+    for (int c = 0; c < 3; c++)
         tone.offset[c] = (float)color[c] - out[c];
-    }
     return tone;
 }
 

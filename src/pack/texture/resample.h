@@ -10,8 +10,8 @@ struct spl_tone {
     float factor[3], offset[3];
 };
 
-/* The tone that makes the disc's colour in `photo`, `seen`, after its gain the splat's `color`. */
-struct spl_tone spl_tone_find(const struct spl_gain *gain, const uint8_t seen[3], const uint8_t color[3]);
+/* The tone that makes the disc's colour in the photograph, after its gain, the splat's `color`. */
+struct spl_tone spl_tone_find(const struct spl_gain *gain, const struct spl_candidate *seen, const uint8_t color[3]);
 
 /* Fills out[3 * size * size] (planes as in sparse/dictionary.h; size a power of two, at most SPL_TEXTURE_SIZE_MAX) over
  * the square [-r, r] squared of the splat's tangent frame: bilinear, in the level of the photograph that a texel's

@@ -61,7 +61,7 @@ static struct spl_tone find_tone(const struct take *take, uint64_t id)
     uint32_t k = 0;
     while (k + 1 < take->candidates->depth && list[k].photo != take->index)
         k++;
-    return spl_tone_find(&take->gains[take->index], list[k].color, take->chosen->color[id]);
+    return spl_tone_find(&take->gains[take->index], &list[k], take->chosen->color[id]);
 }
 
 static bool is_chosen(const struct take *take, uint32_t chunk)

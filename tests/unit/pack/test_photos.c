@@ -113,17 +113,17 @@ static void what_hides_a_splat_is_seen(void **state)
     assert_int_equal(spl_photo_see(&photo, (double[]){0, -3, 0}, 0.05), SPL_SIGHT_HIDDEN); /* behind the eye */
     /* a splat that is hidden is no candidate, one in the clear is, one seen from the side is not */
     struct spl_world_splat splat = {.position = {0.4, 0, 0}, .splat = {.normal = {0, 1, 0}, .radius = 0.02f}};
-    uint8_t color[3];
-    double clear = spl_candidate_judge(&photo, &splat, color);
-    assert_true(clear > 0 && color[0] == 90);
+    struct spl_candidate color;
+    double clear = spl_candidate_judge(&photo, &splat, &color);
+    assert_true(clear > 0 && color.color[0] == 90 && color.place[1] == 128 && color.place[0] > 128);
     splat.position[0] = -0.4;
-    assert_true(spl_candidate_judge(&photo, &splat, color) == 0);
+    assert_true(spl_candidate_judge(&photo, &splat, &color) == 0);
     splat.position[0] = 0.4;
     memcpy(splat.splat.normal, (float[]){0.70710678f, 0.70710678f, 0}, sizeof splat.splat.normal);
-    double slanted = spl_candidate_judge(&photo, &splat, color);
+    double slanted = spl_candidate_judge(&photo, &splat, &color);
     assert_true(slanted > 0 && slanted < clear);
     memcpy(splat.splat.normal, (float[]){0, 0, 1}, sizeof splat.splat.normal);
-    assert_true(spl_candidate_judge(&photo, &splat, color) == 0);
+    assert_true(spl_candidate_judge(&photo, &splat, &color) == 0);
     spl_photo_close(&photo);
 }
 
@@ -147,6 +147,45 @@ static void the_best_are_kept_in_any_order(void **state)
     }
     for (double w = 1e-6; w < 1e6; w *= 3)
         assert_true(fabs(spl_candidate_weight(spl_candidate_score(w)) / w - 1) < 0.001);
+}
+
+static struct spl_gain flat_gain(float r, float g, float b)
+{
+    struct spl_gain gain = {0};
+    for (int n = 0; n < SPL_GAIN_NODES; n++) {
+        gain.factor[n][0] = r;
+        gain.factor[n][1] = g;
+        gain.factor[n][2] = b;
+    }
+    return gain;
+}
+
+/* Glare on one corner of one photograph is taken off it, and off nothing else. */
+static void glare_is_found_where_it_is(void **state)
+{
+    (void)state;
+    struct spl_candidates candidates;
+    struct spl_gain gains[4];
+    float factor[3];
+    assert_int_equal(spl_candidates_init(&candidates, 30000, 3, NULL), 0);
+    for (uint64_t s = 0; s < candidates.splats; s++)
+        for (uint16_t photo = 0; photo < 3; photo++) {
+            uint8_t x = (uint8_t)(s * 7 % 256), y = (uint8_t)(s / 36 * 13 % 256);
+            bool glare = photo == 1 && x > 153 && y > 127;
+            struct spl_candidate c = {.photo = photo, .score = (uint16_t)(33000 - (s + photo) % 3), .place = {x, y}};
+            memset(c.color, (int)(50 + s % 61), 3);
+            c.color[0] = (uint8_t)(c.color[0] * (glare ? 1.6 : 1));
+            spl_candidates_add(&candidates, s, &c);
+        }
+    assert_int_equal(spl_gains_find(&candidates, NULL, 3, gains, NULL), 0);
+    float clear[3];
+    spl_gain_get(&gains[1], (uint8_t[]){240, 230}, factor);
+    spl_gain_get(&gains[0], (uint8_t[]){240, 230}, clear);
+    assert_true(fabsf(factor[0] / clear[0] * 1.6f - 1) < 0.08f && fabsf(factor[1] / clear[1] - 1) < 0.02f);
+    spl_gain_get(&gains[1], (uint8_t[]){20, 20}, factor);
+    spl_gain_get(&gains[0], (uint8_t[]){20, 20}, clear);
+    assert_true(fabsf(factor[0] / clear[0] - 1) < 0.05f);
+    spl_candidates_finish(&candidates);
 }
 
 /* Splat s is seen by photographs s % photos and the next, which saw it by their factors; every tenth wrongly. */
@@ -177,11 +216,11 @@ static void exposures_are_found_among_outliers(void **state)
     assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
     assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0); /* nothing is seen: nothing changes */
     for (int i = 0; i < 6; i++)
-        assert_true(gains[i].factor[0] == 1 && gains[i].shared == 0 && !spl_gain_contradicts(&gains[i]));
+        assert_true(gains[i].factor[0][0] == 1 && gains[i].shared == 0 && !spl_gain_contradicts(&gains[i]));
     fill(&candidates, 5, factor, false);
     assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0);
     for (int i = 0; i < 5; i++) {
-        assert_true(fabs((double)gains[i].factor[1] / factor[i] - 1) < 0.03);
+        assert_true(fabs((double)gains[i].factor[7][1] / factor[i] - 1) < 0.03);
         assert_false(spl_gain_contradicts(&gains[i]));
     }
     spl_candidates_finish(&candidates);
@@ -208,14 +247,14 @@ static void the_majority_gives_the_colour_and_neighbours_lend(void **state)
     struct spl_stage stage = {.threads = 2};
     struct spl_gain gains[4];
     for (int i = 0; i < 4; i++)
-        gains[i] = (struct spl_gain){.factor = {1, 1, 1}};
+        gains[i] = flat_gain(1, 1, 1);
     assert_int_equal(spl_splats_init(&splats, dataset, NULL), 0);
     assert_int_equal(spl_candidates_init(&candidates, splats.count, 4, NULL), 0);
     /* splat 0: the best is a passer-by, two others agree; splat 1: all agree, the best gives the detail; 2 to 9: none
      */
     static const struct spl_candidate seen[2][3] = {
-        {{0, 33200, {250, 0, 0}}, {1, 33100, {100, 100, 100}}, {2, 33000, {110, 100, 100}}},
-        {{0, 34000, {100, 100, 100}}, {1, 33000, {120, 100, 100}}, {2, 31000, {90, 100, 100}}},
+        {{0, 33200, {250, 0, 0}, {0, 0}}, {1, 33100, {100, 100, 100}, {0, 0}}, {2, 33000, {110, 100, 100}, {0, 0}}},
+        {{0, 34000, {100, 100, 100}, {0, 0}}, {1, 33000, {120, 100, 100}, {0, 0}}, {2, 31000, {90, 100, 100}, {0, 0}}},
     };
     for (uint64_t s = 0; s < 2; s++)
         for (int k = 0; k < 3; k++)
@@ -232,7 +271,7 @@ static void the_majority_gives_the_colour_and_neighbours_lend(void **state)
     spl_chosen_finish(&chosen);
     uint8_t(*own)[3] = calloc(splats.count, 3);
     memset(own, 80, splats.count * 3);
-    gains[3] = (struct spl_gain){.factor = {1.5f, 1, 1}};
+    gains[3] = flat_gain(1.5f, 1, 1);
     assert_int_equal(spl_chosen_init(&chosen, &splats, &candidates, gains, 3, (const uint8_t(*)[3])own, &stage, NULL),
                      0);
     assert_true(chosen.color[5][0] == 120 && chosen.color[5][1] == 80); /* its own, evened out */
@@ -273,9 +312,10 @@ static void textures_show_the_plane_and_not_the_view(void **state)
     struct spl_photo photo;
     assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
     const struct spl_world_splat splat = {.position = {0.1, 0, 0.05}, .splat = {.normal = {0, -1, 0}, .radius = 0.12f}};
-    const struct spl_gain gain = {.factor = {1, 1, 0.5f}};
-    const uint8_t seen[3] = {100, 100, 100}, color[3] = {100, 110, 50};
-    const struct spl_tone tone = spl_tone_find(&gain, seen, color);
+    const struct spl_gain gain = flat_gain(1, 1, 0.5f);
+    const struct spl_candidate seen = {.color = {100, 100, 100}};
+    const uint8_t color[3] = {100, 110, 50};
+    const struct spl_tone tone = spl_tone_find(&gain, &seen, color);
     assert_true(tone.offset[0] == 0 && tone.offset[1] == 10 && tone.offset[2] == 0);
     static uint8_t texture[SPL_TEXTURE_VALUES_MAX];
     float u[3], v[3];
@@ -326,6 +366,7 @@ int main(void)
         cmocka_unit_test(what_hides_a_splat_is_seen),
         cmocka_unit_test(the_best_are_kept_in_any_order),
         cmocka_unit_test(exposures_are_found_among_outliers),
+        cmocka_unit_test(glare_is_found_where_it_is),
         cmocka_unit_test(textures_show_the_plane_and_not_the_view),
         cmocka_unit_test(the_majority_gives_the_colour_and_neighbours_lend),
     };
