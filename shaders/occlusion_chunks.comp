@@ -8,7 +8,7 @@ layout(local_size_x = SPL_WORKGROUP) in;
 
 layout(std430, binding = SPL_BIND_BOUNDS) readonly buffer bounds_buffer { spl_chunk_bounds bounds[]; };
 layout(std430, binding = SPL_BIND_CHUNKS) buffer chunk_buffer { spl_draw_chunk draw_chunks[]; };
-layout(std430, binding = SPL_BIND_TILES) readonly buffer tile_buffer { uint tiles[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_ID) tile_texels; /* SPL_BIND_TILES */
 
 void main()
 {
@@ -22,7 +22,7 @@ void main()
     uint near = floatBitsToUint(bounds[chunk].near);
     for (uint y = first.y; y <= last.y; y++)
         for (uint x = first.x; x <= last.x; x++)
-            if (near <= tiles[y * columns + x])
+            if (near <= imageLoad(tile_texels, int(y * columns + x)).x)
                 return;
     draw_chunks[chunk].count = 0u;
 }

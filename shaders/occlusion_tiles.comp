@@ -6,7 +6,7 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 layout(std430, binding = SPL_BIND_TILES) writeonly buffer tile_buffer { uint tiles[]; };
 
 void main()
@@ -22,6 +22,6 @@ void main()
     uint greatest = 0u;
     for (uint y = first.y; y < end.y; y++)
         for (uint x = first.x; x < end.x; x++)
-            greatest = max(greatest, depth[y * frame.width + x]);
+            greatest = max(greatest, imageLoad(depth_texels, int(y * frame.width + x)).x);
     tiles[tile] = greatest;
 }

@@ -15,11 +15,13 @@ layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
 layout(constant_id = 1) const uint PASS = 0;
 
 #ifdef SPL_ATOMICS_64
-layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint64_t depth[]; };
+layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint64_t depth[]; };
 #else
-layout(std430, binding = SPL_BIND_DEPTH) buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint depth[]; };
 layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint payloads[]; };
 #endif
+
+coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* what is read may be old, never too near */
 
 uint payload(spl_draw_chunk chunk, splat s)
 {
@@ -42,13 +44,13 @@ void draw(spl_draw_chunk chunk, splat s)
         return;
     uint at = sample_index(ivec2(center)), bits = floatBitsToUint(p.z);
 #ifdef SPL_ATOMICS_64
-    if (bits <= uint(depth[at] >> 32))
+    if (bits <= imageLoad(depth_texels, int(2u * at + 1u)).x)
         atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload(chunk, s)));
 #else
     if (PASS == 0) {
-        if (bits < depth[at])
+        if (bits < imageLoad(depth_texels, int(at)).x)
             atomicMin(depth[at], bits);
-    } else if (bits == depth[at]) {
+    } else if (bits == imageLoad(depth_texels, int(at)).x) {
         atomicMin(payloads[at], payload(chunk, s));
     }
 #endif

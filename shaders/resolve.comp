@@ -8,9 +8,6 @@
  *   coverage  float, share of the samples that hold something */
 #version 450
 #extension GL_GOOGLE_include_directive : require
-#ifdef SPL_ATOMICS_64
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#endif
 #include "common/frame.glsl"
 #include "common/octahedral.glsl"
 
@@ -18,31 +15,34 @@ layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
 layout(constant_id = 1) const uint POINTS = 0;
 
-#ifdef SPL_ATOMICS_64
-layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint64_t depth[]; };
-#else
-layout(std430, binding = SPL_BIND_DEPTH) readonly buffer depth_buffer { uint depth[]; };
-#endif
-layout(std430, binding = SPL_BIND_ID) readonly buffer id_buffer { uint ids[]; };
-layout(std430, binding = SPL_BIND_SUMS) readonly buffer sums_buffer { uvec4 sums[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics and method points payload, depth */
+SPL_TEXEL_BUFFER(SPL_TEXELS_ID) id_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) sums_texels;
 layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 
 uint depth_word(uint at)
 {
 #ifdef SPL_ATOMICS_64
-    return uint(depth[at] >> 32);
+    return imageLoad(depth_texels, int(2u * at + 1u)).x;
 #else
-    return depth[at];
+    return imageLoad(depth_texels, int(at)).x;
 #endif
 }
 
 uint payload(uint at)
 {
 #ifdef SPL_ATOMICS_64
-    return uint(depth[at] & 0xffffffffUL);
+    return imageLoad(depth_texels, int(2u * at)).x;
 #else
-    return ids[at];
+    return imageLoad(id_texels, int(at)).x;
 #endif
+}
+
+uvec4 load_sums(uint at)
+{
+    int word = 4 * int(at);
+    return uvec4(imageLoad(sums_texels, word).x, imageLoad(sums_texels, word + 1).x, imageLoad(sums_texels, word + 2).x,
+                 imageLoad(sums_texels, word + 3).x);
 }
 
 /* View depth of a covered sample. */
@@ -51,7 +51,7 @@ float sample_depth(uint at)
     float first = uintBitsToFloat(depth_word(at));
     if (POINTS != 0u)
         return first;
-    uvec4 sum = sums[at];
+    uvec4 sum = load_sums(at);
     precise float offset = (float(sum.y) * 512.0 + float(sum.x)) / float(sum.w);
     precise float z = first - first * (offset * (1.0 / 262144.0));
     return z;
@@ -61,7 +61,7 @@ vec3 sample_normal(uint at)
 {
     if (POINTS != 0u)
         return unpack_normal(payload(at));
-    uvec4 sum = sums[at];
+    uvec4 sum = load_sums(at);
     return normalize(vec3(sum.xyz) / float(sum.w) - 127.5);
 }
 
@@ -69,7 +69,7 @@ uvec3 sample_color(uint at)
 {
     if (POINTS != 0u)
         return (uvec3(payload(at)) >> uvec3(0u, 8u, 16u)) & 255u;
-    uvec4 sum = sums[at];
+    uvec4 sum = load_sums(at);
     return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
 }
 

@@ -52,7 +52,9 @@
 #define SPL_TEXELS_CHUNKS 2 /* SPL_BIND_CHUNKS, SPL_CHUNK_WORDS each */
 #define SPL_TEXELS_TEXTURES 3 /* SPL_BIND_TEXTURES */
 #define SPL_TEXELS_ATOMS 4  /* SPL_BIND_ATOMS */
-#define SPL_TEXELS_COUNT 5
+#define SPL_TEXELS_ID SPL_TEXELS_ATOMS /* SPL_BIND_ID and _TILES, the same binding */
+#define SPL_TEXELS_SUMS 5   /* SPL_BIND_SUMS */
+#define SPL_TEXELS_COUNT 6
 #ifdef VULKAN
 #define SPL_TEXELS(index) (SPL_BIND_COUNT + index)
 #else

@@ -80,7 +80,7 @@ struct spl_gpu_backend {
 /* The binding that each texel buffer of a dispatch shows. */
 static const uint8_t spl_gpu_texels_of[SPL_TEXELS_COUNT] = {
     [SPL_TEXELS_PAGE] = SPL_BIND_PAGE, [SPL_TEXELS_DEPTH] = SPL_BIND_DEPTH, [SPL_TEXELS_CHUNKS] = SPL_BIND_CHUNKS,
-    [SPL_TEXELS_TEXTURES] = SPL_BIND_TEXTURES, [SPL_TEXELS_ATOMS] = SPL_BIND_ATOMS};
+    [SPL_TEXELS_TEXTURES] = SPL_BIND_TEXTURES, [SPL_TEXELS_ATOMS] = SPL_BIND_ATOMS, [SPL_TEXELS_SUMS] = SPL_BIND_SUMS};
 
 extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;
 
