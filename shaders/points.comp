@@ -60,6 +60,12 @@ void main()
 {
     load_frame();
     splat_run run = load_splat_run();
-    for (uint i = run.first; i < run.end; i += SPL_LANES)
-        draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
+    uint i = run.first;
+    for (;;) {
+        if (i < run.end)
+            draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
+        i += SPL_LANES;
+        if (i >= run.end)
+            break;
+    }
 }

@@ -73,6 +73,12 @@ uvec3 sample_color(uint at)
     return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
 }
 
+/* The i-th sample, row by row, of the pixel whose first is `corner`; a side is a power of two. */
+uint pixel_sample(ivec2 corner, uint i)
+{
+    return sample_index(corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample)));
+}
+
 void main()
 {
     load_frame();
@@ -84,11 +90,9 @@ void main()
     uint covered = 0u, nearest = SPL_NOTHING, id = SPL_NOTHING;
     uvec3 color = uvec3(0u);
     vec3 normal = vec3(0.0);
-    for (int y = 0; y < int(side); y++) {
-        for (int x = 0; x < int(side); x++) {
-            uint at = sample_index(corner + ivec2(x, y)), bits = depth_word(at);
-            if (bits == SPL_NOTHING)
-                continue;
+    for (uint i = 0u;;) { /* the end is asked for at the end: see splat_depth.comp */
+        uint at = pixel_sample(corner, i), bits = depth_word(at);
+        if (bits != SPL_NOTHING) {
             covered++;
             if (LAYER == SPL_RESOLVE_COLOR)
                 color += sample_color(at);
@@ -98,6 +102,8 @@ void main()
                 id = bits == nearest ? min(id, payload(at)) : payload(at);
             nearest = min(nearest, bits);
         }
+        if (++i >= side * side)
+            break;
     }
 
     uint value = SPL_NOTHING;
@@ -110,14 +116,14 @@ void main()
     } else if (LAYER == SPL_RESOLVE_DEPTH || LAYER == SPL_RESOLVE_RANGE) {
         float sum = 0.0, count = 0.0;
         float limit = uintBitsToFloat(nearest) * 1.01;
-        for (int y = 0; y < int(side) && covered != 0u; y++) {
-            for (int x = 0; x < int(side); x++) {
-                uint at = sample_index(corner + ivec2(x, y)), bits = depth_word(at);
-                if (bits == SPL_NOTHING || uintBitsToFloat(bits) > limit)
-                    continue;
+        for (uint i = 0u;;) {
+            uint at = pixel_sample(corner, i), bits = depth_word(at);
+            if (bits != SPL_NOTHING && uintBitsToFloat(bits) <= limit) {
                 sum += sample_depth(at);
                 count += 1.0;
             }
+            if (++i >= side * side)
+                break;
         }
         if (covered != 0u) {
             precise float z = sum / count;

@@ -14,15 +14,19 @@ void draw(splat_run run, splat s)
         return;
     disc d = make_disc(s, run.low, run.high);
     ivec2 at = d.first;
-    while (at.y <= d.last.y) {
+    /* The end is asked for at the end, here and in main(): software drivers leave a loop only there, so that a question at its
+     * start costs every group of lanes another round, with all of them off. */
+    for (;;) {
         float z;
-        if (disc_sample(d, at, z) < 1.0) {
+        if (disc_sample(d, at, z) < 1.0 && at.y <= d.last.y) {
             precise float pushed = z + d.margin;
             uint index = sample_index(at), bits = floatBitsToUint(pushed);
             if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */
                 atomicMin(depth[index], bits);
         }
         next_sample(d, at);
+        if (at.y > d.last.y)
+            break;
     }
 }
 
@@ -30,6 +34,12 @@ void main()
 {
     load_frame();
     splat_run run = load_splat_run();
-    for (uint i = run.first; i < run.end; i += SPL_LANES)
-        draw(run, load_splat(run.chunk, i, false));
+    uint i = run.first;
+    for (;;) {
+        if (i < run.end)
+            draw(run, load_splat(run.chunk, i, false));
+        i += SPL_LANES;
+        if (i >= run.end)
+            break;
+    }
 }

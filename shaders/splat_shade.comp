@@ -82,12 +82,12 @@ void draw(splat_run run, splat s)
     splat_texture t = load_texture(run.chunk, s, value);
 #endif
     ivec2 sample_at = d.first;
-    while (sample_at.y <= d.last.y) {
+    for (;;) {
         float z;
         vec3 offset;
         float distance = disc_sample(d, sample_at, z, offset);
         uint at = sample_index(sample_at);
-        if (distance < 1.0) {
+        if (distance < 1.0 && sample_at.y <= d.last.y) {
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
 #ifdef SPL_TEXTURED
             if (z <= first)
@@ -97,6 +97,8 @@ void draw(splat_run run, splat s)
                 shade(at, first, z, distance, z + d.margin, value, run.chunk.first_id + s.index);
         }
         next_sample(d, sample_at);
+        if (sample_at.y > d.last.y)
+            break;
     }
 }
 
@@ -104,6 +106,12 @@ void main()
 {
     load_frame();
     splat_run run = load_splat_run();
-    for (uint i = run.first; i < run.end; i += SPL_LANES)
-        draw(run, load_splat(run.chunk, i, false));
+    uint i = run.first;
+    for (;;) {
+        if (i < run.end)
+            draw(run, load_splat(run.chunk, i, false));
+        i += SPL_LANES;
+        if (i >= run.end)
+            break;
+    }
 }
