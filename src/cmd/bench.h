@@ -1,5 +1,5 @@
 /* What the files of 'splatd bench' share: bench.c reads the options, bench_table.c prints frame times, bench_sweep.c
- * runs the comparison with a reference. */
+ * runs the comparison with a reference, bench_textures.c that of texture coders. */
 #ifndef SPL_CMD_BENCH_H
 #define SPL_CMD_BENCH_H
 
@@ -28,5 +28,8 @@ struct spl_cmd_bench_sweep {
 
 /* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */
 int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_dataset *dataset, struct spl_error *err);
+
+/* splatd bench --textures, argv[0] being that option: coders of the textures in a file beside each other. */
+int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err);
 
 #endif

@@ -110,7 +110,7 @@ static double to_y(const struct layout *l, double psnr)
     return TOP + (HEIGHT - TOP - BOTTOM) * fmin(fmax(share, 0), 1);
 }
 
-static void write_axes(const struct layout *l)
+static void write_axes(const struct layout *l, const struct spl_chart *chart)
 {
     static const double steps[] = {0.5, 1, 2, 5, 10, 20, 50}, coarse[] = {1, 2, 5}, fine[] = {1, 1.5, 2, 3, 4, 5, 6, 8};
     size_t s = 0;
@@ -131,8 +131,9 @@ static void write_axes(const struct layout *l)
                         "text-anchor=\"middle\">%g</text>\n",
                         x, TOP, HEIGHT - BOTTOM, x, HEIGHT - BOTTOM + 18, v);
         }
-    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\" text-anchor=\"end\">milliseconds a frame</text>\n",
-            WIDTH - RIGHT, HEIGHT - BOTTOM + 38);
+    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\" text-anchor=\"end\">", WIDTH - RIGHT, HEIGHT - BOTTOM + 38);
+    spl_markup_text(l->out, chart->axis ? chart->axis : "milliseconds a frame");
+    fputs("</text>\n", l->out);
     fprintf(l->out,
             "<text class=\"soft\" transform=\"translate(15 %d) rotate(-90)\" text-anchor=\"end\">PSNR, dB</text>\n",
             TOP);
@@ -150,8 +151,9 @@ static void write_curves(const struct layout *l)
     }
 }
 
-static void write_points(const struct layout *l)
+static void write_points(const struct layout *l, const struct spl_chart *chart)
 {
+    const char *unit = chart->unit ? chart->unit : "ms";
     for (size_t i = 0; i < l->place_count; i++) {
         const struct place *at = &l->places[i];
         const struct spl_chart_point *p = at->point;
@@ -164,9 +166,9 @@ static void write_points(const struct layout *l)
         fputs(p->label[0] ? " " : "", l->out);
         spl_markup_text(l->out, p->label);
         if (isfinite(p->psnr))
-            fprintf(l->out, ": %.2f dB, %.4g ms", p->psnr, p->ms);
+            fprintf(l->out, ": %.2f dB, %.4g %s", p->psnr, p->ms, unit);
         else
-            fprintf(l->out, ": equal, %.4g ms", p->ms);
+            fprintf(l->out, ": equal, %.4g %s", p->ms, unit);
         fputs(p->detail[0] ? "; " : "", l->out);
         spl_markup_text(l->out, p->detail);
         fprintf(l->out, "</title><circle class=\"s%u ", color);
@@ -239,8 +241,9 @@ static void write_legend(const struct layout *l, const struct spl_chart *chart)
         fputs("</text>\n", l->out);
         x += w;
     }
-    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\">labels: lod; filled: on the front</text>\n", LEFT,
-            HEIGHT - BOTTOM + 38);
+    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\">", LEFT, HEIGHT - BOTTOM + 38);
+    spl_markup_text(l->out, chart->note ? chart->note : "labels: lod; filled: on the front");
+    fputs("</text>\n", l->out);
 }
 
 static void write_chart(struct layout *l, const struct spl_chart *chart)
@@ -259,10 +262,10 @@ static void write_chart(struct layout *l, const struct spl_chart *chart)
     spl_markup_text(l->out, chart->subtitle);
     fputs("</text>\n", l->out);
     write_legend(l, chart);
-    write_axes(l);
+    write_axes(l, chart);
     write_curves(l);
     write_labels(l);
-    write_points(l);
+    write_points(l, chart);
     fputs("</svg>\n", l->out);
 }
 

@@ -27,6 +27,9 @@ struct spl_chart_curve {
 
 struct spl_chart {
     const char *title, *subtitle;
+    const char *axis; /* what `ms` is, where it is no time of a frame; NULL = milliseconds a frame */
+    const char *unit; /* of a point's `ms`; NULL = "ms" */
+    const char *note; /* below the plot; NULL = what labels are of a chart of frames */
     const struct spl_chart_curve *curves; /* borrowed */
     size_t curve_count;
 };

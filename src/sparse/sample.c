@@ -21,6 +21,8 @@ enum {
     axes_min = 64,
     sample_min = 256,
     batch_min = 8192,
+    textures_an_atom = 16, /* with fewer no atom earns its bytes; some more are begun with */
+    few_atoms = 64,
 };
 
 /* A share of all energy: outside the axes that are kept. */
@@ -180,7 +182,9 @@ int spl_training_init(struct spl_training *t, const struct spl_texture_source *s
     *t = (struct spl_training){
         .settings = settings, .population = source->count, .threads = spl_thread_count(settings->threads)};
     t->n = t->m = spl_texture_values(source->size);
-    t->count = settings->dictionary < source->count ? settings->dictionary : (uint32_t)source->count;
+    uint64_t most = settings->lambda > 0 ? source->count / textures_an_atom + few_atoms : source->count;
+    t->count = settings->dictionary < most ? settings->dictionary : (uint32_t)most;
+    t->count = t->count < source->count ? t->count : (uint32_t)source->count;
     uint64_t axes_bytes = 8ull * t->n * t->n + (uint64_t)t->n * (read_textures + 4 * SPL_BLOCK_TEXTURES);
     if (axes_bytes > settings->memory_bytes)
         return spl_fail_field(err, SPL_E_LIMIT, "memory",

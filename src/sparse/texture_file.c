@@ -1,0 +1,133 @@
+/* Textures out of memory and back, a thousand at a time. Files are read as often as a training wants, so sizes are held
+ * against the file's own at open and a short read afterwards is an error. */
+#include "sparse/texture_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "base/memory.h"
+
+enum { copied_textures = 1024 };
+static const char magic[8] = {'S', 'P', 'L', 'T', 'E', 'X', 'T', '1'};
+
+int spl_texture_file_write(const char *path, const struct spl_texture_source *source, uint64_t splats,
+                           uint32_t photographs, uint64_t pixels, struct spl_error *err)
+{
+    struct spl_texture_file_header header = {
+        .size = source->size, .photographs = photographs, .count = source->count, .splats = splats, .pixels = pixels};
+    size_t n = spl_texture_values(source->size), length = strlen(path) + sizeof ".part";
+    uint8_t *buffer = spl_alloc_raw(copied_textures * n, 1, err);
+    char *part = spl_alloc(length, 1, err);
+    int rc = SPL_E_NOMEM, fd = -1;
+    if (!buffer || !part)
+        goto done;
+    memcpy(header.magic, magic, sizeof magic);
+    memcpy(part, path, strlen(path));
+    memcpy(part + strlen(path), ".part", sizeof ".part");
+    rc = 0;
+    fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (fd < 0 || spl_write_all(fd, &header, sizeof header))
+        rc = spl_fail_errno(err, errno, "%s", part);
+    for (uint64_t first = 0; !rc && first < source->count; first += copied_textures) {
+        uint64_t left = source->count - first;
+        uint32_t count = left < copied_textures ? (uint32_t)left : copied_textures;
+        rc = source->read(source->context, first, count, buffer, err);
+        if (!rc && spl_write_all(fd, buffer, count * n))
+            rc = spl_fail_errno(err, errno, "%s", part);
+    }
+    if (!rc && rename(part, path))
+        rc = spl_fail_errno(err, errno, "%s", path);
+    if (rc && fd >= 0)
+        unlink(part);
+done:
+    if (fd >= 0)
+        close(fd);
+    free(buffer);
+    free(part);
+    return rc;
+}
+
+/* All `length` bytes at `offset`; 0, -1 with errno, or 1 where the file ends. */
+static int read_all(int fd, void *out, size_t length, uint64_t offset)
+{
+    for (uint8_t *to = out; length;) {
+        ssize_t got = pread(fd, to, length, (off_t)offset);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0)
+            return got ? -1 : 1;
+        to += got;
+        offset += (size_t)got;
+        length -= (size_t)got;
+    }
+    return 0;
+}
+
+static int read_textures(void *context, uint64_t first, uint32_t count, uint8_t *out, struct spl_error *err)
+{
+    const struct spl_texture_file *file = context;
+    size_t n = spl_texture_values(file->header.size);
+    int rc = read_all(file->fd, out, count * n, sizeof file->header + first * n);
+    if (rc < 0)
+        return spl_fail_errno(err, errno, "%s", file->path);
+    return rc ? spl_fail(err, SPL_E_INPUT, "%s: ends within texture %llu", file->path, (unsigned long long)first) : 0;
+}
+
+static int judge(const struct spl_texture_file *file, uint64_t bytes, struct spl_error *err)
+{
+    const struct spl_texture_file_header *h = &file->header;
+    if (memcmp(h->magic, magic, sizeof magic))
+        return spl_fail(err, SPL_E_INPUT, "%s: holds no textures; 'splatd pack --keep-textures' writes them",
+                        file->path);
+    if (h->size < 1 || h->size > SPL_TEXTURE_SIZE_MAX)
+        return spl_fail_field(err, SPL_E_INPUT, "size", "%s: size of textures is %u, not 1..%d", file->path, h->size,
+                              SPL_TEXTURE_SIZE_MAX);
+    uint64_t n = spl_texture_values(h->size);
+    if (h->count > (bytes - sizeof *h) / n || bytes != sizeof *h + h->count * n)
+        return spl_fail_field(err, SPL_E_INPUT, "count",
+                              "%s: says %llu textures of %llu bytes, has %llu bytes: write it again", file->path,
+                              (unsigned long long)h->count, (unsigned long long)n, (unsigned long long)bytes);
+    if (h->splats < h->count)
+        return spl_fail_field(err, SPL_E_INPUT, "splats", "%s: says %llu textures on %llu splats", file->path,
+                              (unsigned long long)h->count, (unsigned long long)h->splats);
+    return 0;
+}
+
+int spl_texture_file_open(const char *path, struct spl_texture_file *file, struct spl_error *err)
+{
+    struct stat stat;
+    int rc = SPL_E_NOMEM;
+    *file = (struct spl_texture_file){.fd = -1, .path = strdup(path)};
+    if (!file->path)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory: a file's name");
+    file->fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (file->fd < 0 && errno == ENOENT)
+        rc = spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path);
+    else if (file->fd < 0 || fstat(file->fd, &stat))
+        rc = spl_fail_errno(err, errno, "%s", path);
+    else if (!S_ISREG(stat.st_mode) || (uint64_t)stat.st_size < sizeof file->header ||
+             read_all(file->fd, &file->header, sizeof file->header, 0))
+        rc = spl_fail(err, SPL_E_INPUT, "%s: holds no textures; 'splatd pack --keep-textures' writes them", path);
+    else
+        rc = judge(file, (uint64_t)stat.st_size, err);
+    if (rc)
+        spl_texture_file_close(file);
+    else
+        file->source = (struct spl_texture_source){
+            .count = file->header.count, .size = file->header.size, .read = read_textures, .context = file};
+    return rc;
+}
+
+void spl_texture_file_close(struct spl_texture_file *file)
+{
+    if (file->fd >= 0)
+        close(file->fd);
+    free(file->path);
+    *file = (struct spl_texture_file){.fd = -1};
+}

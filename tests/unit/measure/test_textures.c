@@ -1,0 +1,164 @@
+/* The baselines' blocks, files of textures and what is refused of them, and the comparison of coders on few textures.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include "measure/blocks.h"
+#include "measure/textures.h"
+#include "sparse/texture_file.h"
+#include "unit/sparse/plant.h"
+
+static double block_error(void (*code)(const uint8_t[16][3], uint8_t[16][3]), uint8_t in[16][3])
+{
+    uint8_t out[16][3];
+    double sum = 0;
+    code((const uint8_t(*)[3])in, out);
+    for (int i = 0; i < 16; i++)
+        for (int c = 0; c < 3; c++)
+            sum += (out[i][c] - in[i][c]) * (out[i][c] - in[i][c]);
+    return sum / 48;
+}
+
+static void test_blocks(void **state)
+{
+    uint8_t flat[16][3], two[16][3], ramp[16][3];
+    double bc1 = 0, bc7 = 0;
+    (void)state;
+    for (int i = 0; i < 16; i++) {
+        memcpy(flat[i], (uint8_t[]){200, 100, 50}, 3);
+        memcpy(two[i], i % 3 ? (uint8_t[]){255, 255, 255} : (uint8_t[]){0, 0, 0}, 3);
+        memcpy(ramp[i], (uint8_t[]){(uint8_t)(40 + 10 * i), (uint8_t)(200 - 8 * i), 90}, 3);
+    }
+    assert_true(block_error(spl_block_bc1, flat) < 4);
+    assert_true(block_error(spl_block_bc7, flat) < 0.7);
+    assert_true(block_error(spl_block_bc1, two) == 0);
+    assert_true(block_error(spl_block_bc7, two) < 0.5);
+    assert_true(block_error(spl_block_bc1, ramp) > 20); /* four colours for sixteen */
+    assert_true(block_error(spl_block_bc7, ramp) < 1);
+    for (uint64_t round = 0; round < 200; round++) {
+        uint8_t noise[16][3];
+        for (int i = 0; i < 48; i++)
+            noise[i / 3][i % 3] = (uint8_t)(100 + spl_random_at(round, (uint64_t)i) % 60);
+        bc1 += block_error(spl_block_bc1, noise);
+        bc7 += block_error(spl_block_bc7, noise);
+    }
+    assert_true(bc7 < bc1 && bc1 < 200 * 60 * 60 / 12.0);
+}
+
+static char path[64];
+
+static void write_bytes(const void *bytes, size_t length)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    fclose(file);
+}
+
+static void expect_refused(const void *bytes, size_t length, const char *said)
+{
+    struct spl_texture_file file;
+    struct spl_error err = {0};
+    write_bytes(bytes, length);
+    assert_int_equal(spl_texture_file_open(path, &file, &err), SPL_E_INPUT);
+    if (!strstr(err.message, said) || !strstr(err.message, path))
+        fail_msg("%s does not say %s", err.message, said);
+}
+
+static void test_file(void **state)
+{
+    struct plant p = plant_make(8, 5, 3000, 2, 0.5f);
+    struct spl_texture_file file;
+    struct spl_error err = {0};
+    uint8_t bytes[40 + 2 * 192] = {0}, back[192];
+    (void)state;
+    assert_int_equal(spl_texture_file_open(path, &file, &err), SPL_E_NOT_FOUND);
+    expect_refused(bytes, sizeof bytes, "holds no textures");
+    expect_refused("SPLTEXT1", 8, "holds no textures");
+    struct spl_texture_file_header header = {.magic = "SPLTEXT", .size = 8, .count = 2, .splats = 2};
+    header.magic[7] = '1';
+    assert_int_equal(sizeof header, 40);
+    memcpy(bytes, &header, sizeof header);
+    expect_refused(bytes, sizeof bytes - 1, "says 2 textures");
+    header.count = UINT64_MAX / 192 + 1;
+    memcpy(bytes, &header, sizeof header);
+    expect_refused(bytes, sizeof bytes, "says ");
+    header.count = 2;
+    header.size = 33;
+    memcpy(bytes, &header, sizeof header);
+    expect_refused(bytes, sizeof bytes, "not 1..32");
+    header.size = 8;
+    header.splats = 1;
+    memcpy(bytes, &header, sizeof header);
+    expect_refused(bytes, sizeof bytes, "on 1 splats");
+
+    err = (struct spl_error){0};
+    assert_int_equal(spl_texture_file_write(path, plant_source(&p), 5000, 3, 777, &err), 0);
+    assert_int_equal(spl_texture_file_open(path, &file, &err), 0);
+    assert_int_equal(file.source.count, 3000);
+    assert_int_equal(file.header.splats, 5000);
+    assert_int_equal(file.header.pixels, 777);
+    assert_int_equal(file.source.read(file.source.context, 2999, 1, back, &err), 0);
+    assert_memory_equal(back, p.textures + 2999 * 192, 192);
+    assert_int_equal(truncate(path, 1000), 0);
+    assert_int_equal(file.source.read(file.source.context, 2999, 1, back, &err), SPL_E_INPUT);
+    spl_texture_file_close(&file);
+    err = (struct spl_error){0};
+    assert_int_equal(spl_texture_file_write("/nowhere/at/all", plant_source(&p), 5000, 3, 777, &err), SPL_E_IO);
+    plant_finish(&p);
+}
+
+static void test_measure(void **state)
+{
+    struct plant p = plant_make(8, 40, 1200, 2, 1), few = plant_make(4, 1, 2, 1, 1);
+    struct spl_textures_options o = {
+        .source = plant_source(&p), .splats = 2400, .pixels = 100000, .epochs = 3, .memory_bytes = 1 << 28, .seed = 1};
+    static struct spl_textures_report report;
+    struct spl_error err = {0};
+    char *svg;
+    size_t length;
+    (void)state;
+    if (spl_textures_measure(&o, &report, &err))
+        fail_msg("%s", err.message);
+    assert_true(report.batches_epochs >= 1 && report.ksvd_epochs >= 1);
+    assert_int_equal(report.adaptives, 4);
+    assert_string_equal(report.row[0].name, "colours only");
+    assert_true(report.row[0].codes == 0 && report.row[0].psnr < 30);
+    assert_true(isinf(report.row[1].psnr)); /* LOD 0 */
+    assert_true(fabs(report.row[1].codes - 4 * 100000 / 2400.0) < 1e-6);
+    assert_true(report.row[2].psnr > report.row[3].psnr && report.row[3].psnr > report.row[4].psnr);
+    const struct spl_textures_row *first = &report.row[report.first_adaptive], *last = first + 3;
+    assert_true(last->psnr > first->psnr && last->codes > first->codes);
+    double between = spl_textures_bytes_at(&report, (first[2].psnr + last->psnr) / 2);
+    assert_true(between > first->codes && between <= last->codes + last->dictionary);
+    assert_true(isnan(spl_textures_bytes_at(&report, 99)));
+    assert_int_equal(spl_textures_chart_rate(&report, &svg, &length, &err), 0);
+    assert_non_null(strstr(svg, "bytes a splat"));
+    assert_non_null(strstr(svg, "paper D12W4"));
+    assert_null(strstr(svg, "milliseconds"));
+    free(svg);
+    assert_int_equal(spl_textures_chart_training(&report, &svg, &length, &err), 0);
+    assert_non_null(strstr(svg, "k-SVD"));
+    free(svg);
+    o.source = plant_source(&few); /* smaller than two blocks */
+    assert_int_equal(spl_textures_measure(&o, &report, &err), SPL_E_INPUT);
+    plant_finish(&p);
+    plant_finish(&few);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_blocks),
+        cmocka_unit_test(test_file),
+        cmocka_unit_test(test_measure),
+    };
+    snprintf(path, sizeof path, "/tmp/spl-textures-%ld", (long)getpid());
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    unlink(path);
+    return failed;
+}
