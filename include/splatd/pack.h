@@ -34,6 +34,7 @@ struct spl_photo_options {
     uint64_t memory_bytes;     /* of this pass; 0 = 2 GiB */
     enum spl_texture_coding textures;
     double texture_quality;    /* dB at which a splat takes no further atom; 0 = 40 */
+    const char *keep_textures; /* a file for the textures before they are coded (sparse/texture_file.h); NULL = none */
     /* Each photograph that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
     void (*refused)(void *context, const struct spl_error *why);
     /* After each epoch of training; may be NULL. `psnr` of the sample, dB. */

@@ -43,6 +43,7 @@ static void usage(FILE *out)
         "                           of poses, or a list of views; in the scan's coordinates\n"
         "      --images DIR         where the photographs lie; default: where MODEL says\n"
         "      --keep-going         photographs that cannot be used are named and left out\n"
+        "      --keep-textures FILE as they are before coding too, for 'splatd bench --textures FILE'\n"
         "      --memory MIB         of the photographs' pass (default 2048)\n"
         "      --device D           that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name\n"
         "      --threads N          default: all cores; the file does not depend on it\n\n"
@@ -154,7 +155,8 @@ int spl_cmd_pack(int argc, char **argv)
         opt_memory,
         opt_device,
         opt_textures,
-        opt_quality
+        opt_quality,
+        opt_keep_textures
     };
     static const struct option options[] = {
         {"output", required_argument, NULL, 'o'},
@@ -170,6 +172,7 @@ int spl_cmd_pack(int argc, char **argv)
         {"device", required_argument, NULL, opt_device},
         {"textures", required_argument, NULL, opt_textures},
         {"texture-quality", required_argument, NULL, opt_quality},
+        {"keep-textures", required_argument, NULL, opt_keep_textures},
         {"help", no_argument, NULL, 'h'},
         {0},
     };
@@ -221,6 +224,9 @@ int spl_cmd_pack(int argc, char **argv)
         case opt_quality:
             result = spl_cmd_parse_real("--texture-quality", optarg, 20, 60, &photos.texture_quality, &err);
             break;
+        case opt_keep_textures:
+            photos.keep_textures = optarg;
+            break;
         case opt_device:
             photos.device = optarg;
             break;
@@ -244,8 +250,12 @@ int spl_cmd_pack(int argc, char **argv)
     }
     if (photos.cameras) {
         o.photos = &photos;
-    } else if (photos.images || photos.refused || photos.memory_bytes || photos.device) {
+    } else if (photos.images || photos.refused || photos.memory_bytes || photos.device || photos.keep_textures) {
         fprintf(stderr, "splatd: photographs need their poses: --cameras MODEL\n");
+        return 2;
+    }
+    if (photos.keep_textures && photos.textures == SPL_TEXTURES_NONE) {
+        fprintf(stderr, "splatd: --keep-textures with --textures none keeps nothing: leave one of them out\n");
         return 2;
     }
     o.inputs = (const char *const *)&argv[optind];

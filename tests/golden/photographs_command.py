@@ -149,12 +149,22 @@ with tempfile.TemporaryDirectory() as folder:
         return sum((g - sum(grey) / len(grey)) ** 2 for g in grey) / len(grey)
 
     for coding in ("adaptive",):
-        said = pack("--textures", coding, "--texture-quality", "36")
+        said = pack("--textures", coding, "--texture-quality", "36", "--keep-textures", "images/kept")
         found = re.search(r"(\d+) textures of (\d+) x \d+: resampled at ([\d.]+) dB, coded at ([\d.]+) dB", said)
         assert found and int(found[1]) > 1000 and float(found[3]) > 30 and float(found[4]) > 25, said
         assert "epoch 1" in said and "atoms a splat: 0:" in said, said
         assert spread(8) > 1.3 * spread(0), (coding, spread(8), spread(0))
         assert run("info", "wall.spld", "--json").count("resampling_psnr") <= 1
+
+    # the textures as they were before: coders beside each other
+    table = run("bench", "--textures", "images/kept", "-o", "coders", "--epochs", "2")
+    rows = {line[:24].strip(): line.split() for line in table.splitlines()}
+    assert "colours only" in rows and "LOD 0 BC1" in rows and "paper D12W4" in rows, table
+    assert sorted(os.listdir("coders")) == ["rate.svg", "textures.csv", "training.csv", "training.svg"]
+    done = subprocess.run([SPLATD, "bench", "--textures", "wall.spld", "-o", "coders"], stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2 and "no textures" in done.stderr, done.stderr
+    shutil.rmtree("coders")
+    os.unlink("images/kept")
 
     model = ("--cameras", "views.json")
     for arguments, words in ((("--images", "."), "--cameras"), (("--keep-going",), "--cameras"),

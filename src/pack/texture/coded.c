@@ -15,6 +15,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "dataset/texture.h"
+#include "sparse/texture_file.h"
 
 static const struct {
     uint32_t dictionary, weight_bits;
@@ -62,6 +63,15 @@ static int read_textures(void *context, uint64_t first, uint32_t count, uint8_t 
         out += run * textures->values;
     }
     return rc;
+}
+
+int spl_textures_keep(const struct spl_textures *textures, const char *path, uint64_t splats, uint32_t photographs,
+                      uint64_t pixels, struct spl_error *err)
+{
+    struct reader reader = {textures};
+    const struct spl_texture_source source = {
+        .count = textures->count, .size = textures->size, .read = read_textures, .context = &reader};
+    return spl_texture_file_write(path, &source, splats, photographs, pixels, err);
 }
 
 struct reporting {

@@ -291,6 +291,17 @@ static int take_textures(struct pass *pass, const struct spl_dataset *dataset, s
     return rc ? rc : spl_textures_list(textures, pass->splats.count, err);
 }
 
+static int keep_textures(const struct pass *pass, const struct spl_textures *textures, struct spl_error *err)
+{
+    uint64_t pixels = 0;
+    for (uint32_t i = 0; i < pass->report->photographs; i++)
+        pixels +=
+            pass->dropped[i] ? 0 : (uint64_t)pass->list->views[i].camera.width * pass->list->views[i].camera.height;
+    return pass->options->keep_textures ? spl_textures_keep(textures, pass->options->keep_textures, pass->splats.count,
+                                                            pass->report->photographs, pixels, err)
+                                        : SPL_OK;
+}
+
 /* What META says of the textures. */
 static json_t *describe(const struct pass *pass, const struct spl_coded *coded)
 {
@@ -328,7 +339,7 @@ static int write_textured(struct pass *pass, const struct spl_dataset *dataset, 
             pass->uses[pass->chosen.photo[id]]++;
     if (rc || (rc = choose_size(pass, dataset, err)) ||
         (rc = spl_textures_init(&textures, output, pass->splats.count, pass->report->texture_size, err)) ||
-        (rc = take_textures(pass, dataset, &textures, err)) ||
+        (rc = take_textures(pass, dataset, &textures, err)) || (rc = keep_textures(pass, &textures, err)) ||
         (rc = spl_coded_init(&coded, &textures, &pass->splats, pass->options, &pass->chosen, pass->stage, err)))
         goto done;
     report_codes(pass->report, &coded);

@@ -54,6 +54,10 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
                    struct spl_error *err);
 void spl_coded_finish(struct spl_coded *coded);
 
+/* Writes the listed textures to `path`, for measuring coders; `photographs` and their `pixels` are told with them. */
+int spl_textures_keep(const struct spl_textures *textures, const char *path, uint64_t splats, uint32_t photographs,
+                      uint64_t pixels, struct spl_error *err);
+
 /* For spl_dataset_retexture(); the context is a struct spl_coded_chunks. */
 struct spl_coded_chunks {
     const struct spl_coded *coded;
