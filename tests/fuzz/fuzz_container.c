@@ -2,9 +2,10 @@
  * does, computes every hash, patches header and table, and opens the result. What opens is decoded to the last splat,
  * from pages copied to blocks of their exact size.
  *
- * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify), one byte n, n patches of three bytes (offset
- * low, high; xor) into header and table, four little-endian 32 bit sizes, then META, NODE, CHNK and PAGE of those sizes
- * (shortened or missing as the input ends; the page keeps its size up to 64 KiB, with zeroes). */
+ * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures), one byte n, n patches of three
+ * bytes (offset low, high; xor) into header and table, four little-endian 32 bit sizes, with textures seven, then META,
+ * NODE, CHNK and PAGE, and with textures ATOM, CTEX and TEXP, of those sizes (shortened or missing as the input ends;
+ * the page keeps its size up to 64 KiB, with zeroes). */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -18,19 +19,21 @@
 #include "base/error.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "dataset/dictionary.h"
+#include "dataset/texture.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-enum { flag_rehash = 1, flag_verify = 2, section_count = 4 };
+enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, plain_sections = 4, section_count = 7 };
 
 struct head {
     struct spl_file_header header;
     struct spl_section table[section_count];
 };
 
-static void rehash(struct head *head)
+static void rehash(struct head *head, size_t table_bytes)
 {
-    head->header.table_hash = XXH3_64bits(head->table, sizeof head->table);
+    head->header.table_hash = XXH3_64bits(head->table, table_bytes);
     head->header.header_hash = XXH3_64bits(&head->header, offsetof(struct spl_file_header, header_hash));
 }
 
@@ -39,22 +42,25 @@ static void put(int fd, const void *bytes, size_t size, uint64_t offset)
     spl_assert(pwrite(fd, bytes, size, (off_t)offset) == (ssize_t)size);
 }
 
-/* The page first, as the writer has it; then META, NODE, CHNK, the table. */
+/* The page first, as the writer has it; then META, NODE, CHNK, textures, the table. */
 static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches,
                     unsigned patch_count)
 {
-    static const uint32_t types[section_count] = {SPL_SECTION_PAGE, SPL_SECTION_META, SPL_SECTION_NODES,
-                                                  SPL_SECTION_CHUNKS};
+    static const uint32_t types[section_count] = {SPL_SECTION_PAGE,    SPL_SECTION_META,  SPL_SECTION_NODES,
+                                                  SPL_SECTION_CHUNKS,  SPL_SECTION_ATOMS, SPL_SECTION_CHUNK_TEXTURES,
+                                                  SPL_SECTION_TEXTURES};
+    const int count = flags & flag_textures ? section_count : plain_sections;
+    const size_t table_bytes = (size_t)count * sizeof(struct spl_section);
     uint32_t wanted[section_count] = {0};
     const uint8_t *part[section_count];
-    size_t header_bytes = size < 16 ? size : 16;
+    size_t sizes = (size_t)count * 4, header_bytes = size < sizes ? size : sizes;
     memcpy(wanted, data, header_bytes);
     data += header_bytes;
     size -= header_bytes;
     static uint8_t page[1 << 16];
     uint32_t page_bytes = wanted[3];
     memset(page, 0, sizeof page);
-    for (int i = 0; i < section_count; i++) {
+    for (int i = 0; i < count; i++) {
         part[i] = data;
         wanted[i] = wanted[i] < size ? wanted[i] : (uint32_t)size;
         data += wanted[i];
@@ -66,26 +72,53 @@ static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, co
     struct head head = {.header = {.magic = SPL_FILE_MAGIC,
                                    .version = SPL_FILE_VERSION,
                                    .header_bytes = sizeof(struct spl_file_header),
-                                   .section_count = section_count}};
+                                   .section_count = (uint32_t)count}};
     uint64_t offset = SPL_FILE_ALIGNMENT;
-    for (int i = 0; i < section_count; i++) {
-        int from = (i + 3) % section_count; /* the input has the page last */
+    for (int i = 0; i < count; i++) {
+        int from = i < plain_sections ? (i + 3) % plain_sections : i; /* the input has the page behind CHNK */
         head.table[i] = (struct spl_section){
             .type = types[i], .offset = offset, .bytes = wanted[from], .hash = XXH3_64bits(part[from], wanted[from])};
         put(fd, part[from], wanted[from], offset);
         offset = (offset + wanted[from] + 63) / 64 * 64;
     }
     head.header.table_offset = offset;
-    head.header.file_bytes = offset + sizeof head.table;
-    rehash(&head);
+    head.header.file_bytes = offset + table_bytes;
+    rehash(&head, table_bytes);
     for (unsigned i = 0; i < patch_count; i++) {
         size_t at = patches[3 * i] | (size_t)patches[3 * i + 1] << 8;
-        ((uint8_t *)&head)[at % sizeof head] ^= patches[3 * i + 2];
+        ((uint8_t *)&head)[at % (sizeof head.header + table_bytes)] ^= patches[3 * i + 2];
     }
     if (flags & flag_rehash)
-        rehash(&head);
-    put(fd, head.table, sizeof head.table, offset);
+        rehash(&head, table_bytes);
+    put(fd, head.table, table_bytes, offset);
     put(fd, &head.header, sizeof head.header, 0);
+}
+
+/* Of every page that may be read: codes within the dictionary, whose expansion fits its place. */
+static void decode_textures(const struct spl_dataset *dataset)
+{
+    uint32_t node_count, chunk_count;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(dataset);
+    if (!dictionary->count)
+        return;
+    uint32_t *atoms = malloc(spl_dataset_get_info(dataset)->dictionary_bytes);
+    spl_dictionary_expand(dictionary, atoms);
+    free(atoms);
+    for (uint32_t n = 0; n < node_count; n++) {
+        uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, nodes[n].page));
+        bool readable = !spl_dataset_read_textures(dataset, nodes[n].page, words, NULL);
+        for (uint32_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+            struct spl_chunk_code code;
+            uint32_t texture = spl_dataset_get_chunk_textures(dataset)[c];
+            spl_texture_decode(words + spl_texture_word(texture), spl_texture_planes(texture), chunks[c].count, &code);
+            for (uint32_t i = 0; i < code.splats; i++)
+                for (uint32_t t = 0; t < code.splat[i].count; t++)
+                    spl_assert(code.splat[i].atom[t] < dictionary->count && isfinite(code.plane[t].step));
+        }
+        free(words);
+    }
 }
 
 static void decode_all(const struct spl_dataset *dataset)
@@ -109,6 +142,7 @@ static void decode_all(const struct spl_dataset *dataset)
             }
         free(page);
     }
+    decode_textures(dataset);
     struct spl_camera camera;
     spl_assert(!spl_dataset_get_default_camera(dataset, 640, 480, &camera, NULL));
 }

@@ -18,6 +18,7 @@
 #include <splatd/synth.h>
 
 #include "picture.h"
+#include "support/make_textures.h"
 #include "views.h"
 
 enum { SKIPPED = 77, REPEATS = 100, POINTS = 60000, SEED = 1 };
@@ -42,7 +43,13 @@ static struct spl_dataset *make_courtyard(void)
     unlink(scan);
     unlink(packed); /* stays mapped until it is closed */
     rmdir(folder);
-    return dataset;
+    if (!dataset)
+        return NULL;
+    struct spl_dictionary dictionary = make_dictionary(100, 16, SEED);
+    struct spl_dataset *textured = make_textured(dataset, &dictionary, 4, SEED);
+    spl_dictionary_finish(&dictionary);
+    spl_dataset_close(dataset);
+    return textured;
 }
 
 /* NULL with a message where this machine or build lacks the backend. */
@@ -76,6 +83,7 @@ static struct spl_view make_view(const struct golden *golden)
     view.layers = 1u << golden->layer;
     view.lod = golden->lod;
     view.supersample = golden->supersample;
+    view.atoms = golden->atoms;
     memcpy(view.background, golden->background, sizeof view.background);
     return view;
 }

@@ -21,6 +21,7 @@ struct golden {
     uint8_t background[4];
     double shift;             /* of the principal point from the middle, pixels */
     struct tolerance tolerance;
+    uint32_t atoms;           /* of the textures that every splat has; 0 = its colour */
 };
 
 static const struct golden goldens[] = {
@@ -43,6 +44,10 @@ static const struct golden goldens[] = {
      * sample does */
     {"sky-transparent", {0, -2, 1.5}, {-1, 3, 6}, 60, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 4, {0, 0, 0, 0}, 0,
      {16, 0.004}},
+    /* textures of smooth random atoms, nearest texels and, in front, interpolated ones; a fragment between two texels may take
+     * either */
+    {"wall-textured", {1.2, 6.9, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 13.25,
+     {2, 0.004}, 8},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 
