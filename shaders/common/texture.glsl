@@ -33,7 +33,7 @@ struct splat_texture {
 };
 
 /* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; atom 0 of weight 0 where it has
- * none. Whatever is read past the splats that have one is not used: out of bounds there are zeros. */
+ * none: then the code that is read is another's, or none at all, and not used. */
 void load_atom(uint word, uint t, uint index, out uint atom, out float weight)
 {
     uint header_at = word + t * SPL_TEXTURE_PLANE_WORDS, own = index >> 5, bit = index & 31u;
