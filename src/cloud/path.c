@@ -68,30 +68,6 @@ int spl_path_fail(const struct spl_path_reader *reader, size_t index, int rc, co
     return spl_fail_field(err, rc, field, "%s[%zu]: %s", reader->list, index, why->message);
 }
 
-int spl_path_get_number(const json_t *object, const char *name, double *out, struct spl_error *err)
-{
-    const json_t *json = json_object_get(object, name);
-    if (!json_is_number(json))
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be a number; it is %s", name, spl_json_type_name(json));
-    *out = json_number_value(json);
-    return 0;
-}
-
-int spl_path_get_numbers(const json_t *object, const char *name, unsigned count, double *out, struct spl_error *err)
-{
-    const json_t *json = json_object_get(object, name);
-    if (!json_is_array(json) || json_array_size(json) != count)
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array of %u numbers; it is %s of %zu", name, count,
-                              spl_json_type_name(json), json_array_size(json));
-    for (unsigned i = 0; i < count; i++) {
-        if (!json_is_number(json_array_get(json, i)))
-            return spl_fail_field(err, SPL_E_INPUT, name, "number %u of %s is %s", i + 1, name,
-                                  spl_json_type_name(json_array_get(json, i)));
-        out[i] = json_number_value(json_array_get(json, i));
-    }
-    return 0;
-}
-
 static int read_own_key(struct spl_path_reader *reader, json_t *view, struct spl_error *err)
 {
     static const char *const others[] = {"camera", "time", NULL}, *const sides[] = {"width", "height"};
@@ -100,7 +76,7 @@ static int read_own_key(struct spl_path_reader *reader, json_t *view, struct spl
     if (time && !json_is_number(time))
         return spl_fail_field(err, SPL_E_INPUT, "time", "time must be a number, not %s", spl_json_type_name(time));
     for (int i = 0; i < 2; i++) // a field of view needs the shape of the outcome
-        if (!json_object_get(view, sides[i]) && !json_object_get(camera, sides[i]))
+        if (!json_object_get(view, sides[i]) && !json_object_get(camera, sides[i]) && !spl_camera_form_has_size(camera))
             json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
     int rc = spl_camera_from_json(view, others, reader->options->defaults, reader->options->limits, &out, err);
     return rc ? rc : spl_path_take(reader, &out, time ? json_number_value(time) : NAN, err);

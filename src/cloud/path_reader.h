@@ -29,16 +29,9 @@ int spl_path_take(struct spl_path_reader *reader, struct spl_camera *camera, dou
 int spl_path_fail(const struct spl_path_reader *reader, size_t index, int rc, const struct spl_error *why,
                   struct spl_error *err);
 
-/* A number, and `count` numbers in an array, of an object. */
-int spl_path_get_number(const json_t *object, const char *name, double *out, struct spl_error *err);
-int spl_path_get_numbers(const json_t *object, const char *name, unsigned count, double *out, struct spl_error *err);
-
 /* path_formats.c */
 int spl_path_read_nerfstudio(struct spl_path_reader *reader, const json_t *json, struct spl_error *err);
 int spl_path_read_open3d(struct spl_path_reader *reader, const json_t *json, struct spl_error *err);
-
-/* A camera of Open3D's trajectory, near and far left as they are. */
-int spl_path_get_open3d(const json_t *frame, struct spl_camera *camera, struct spl_error *err);
 
 /* path_text.c */
 int spl_path_read_tum(struct spl_path_reader *reader, struct spl_source *source, struct spl_error *err);

@@ -184,7 +184,7 @@ static int add_open3d(struct spl_view_list *list, const char *path, const char *
 {
     struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
     struct spl_photograph_options here = photographs ? *photographs : (struct spl_photograph_options){0};
-    int rc = spl_path_get_open3d(frame, &camera, err);
+    int rc = spl_camera_from_open3d(frame, &camera, err);
     if (!rc)
         rc = spl_camera_check(&camera, err);
     if (!rc && (uint64_t)camera.width * camera.height > spl_view_list_limits.pixels)

@@ -18,6 +18,15 @@ static const struct {
 #undef PARAM
 };
 
+int spl_value_claim(struct spl_value *value, const char *name, struct spl_error *err)
+{
+    if (value->given)
+        return spl_fail_field(err, SPL_E_INPUT, name, "'%s' is given twice%s%s", name,
+                              value->source ? ", also by " : "", value->source ? value->source : "");
+    value->given = true;
+    return 0;
+}
+
 void spl_kind_get_count(enum spl_value_kind kind, unsigned *least, unsigned *most)
 {
     static const unsigned counts[SPL_KIND_END] = {
@@ -132,10 +141,10 @@ static int collect(struct spl_value values[SPL_CAMERA_PARAMS], json_t *object, e
             continue;
         if ((param = find(name, place, err)) < 0)
             return param;
-        if (values[param].given)
-            return spl_fail_field(err, SPL_E_INPUT, name, "'%s' is given twice", name);
-        values[param].given = true;
-        if ((rc = spl_value_from_json(&values[param], params[param].kind, json, name, err)))
+        if ((rc = spl_value_claim(&values[param], name, err)) ||
+            (rc = params[param].kind == SPL_KIND_FORM
+                      ? spl_camera_form_from_json(values, (enum spl_camera_param)param, json, err)
+                      : spl_value_from_json(&values[param], params[param].kind, json, name, err)))
             return rc;
     }
     return 0;

@@ -21,7 +21,8 @@ enum spl_value_kind {
     SPL_KIND_NUMBERS,
     SPL_KIND_AXES,
     SPL_KIND_MODEL,
-    SPL_KIND_END, /* the service's own kinds go on from here */
+    SPL_KIND_FORM, /* an object that stands for other values; only in JSON */
+    SPL_KIND_END,  /* the service's own kinds go on from here */
 };
 
 enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16 };
@@ -38,7 +39,8 @@ enum { SPL_VALUE_NUMBERS = 16 };
 struct spl_value {
     bool given;
     unsigned count;
-    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0] */
+    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov: glTF's aspect ratio in n[1] */
+    const char *source;          /* the member of a form that said it, a literal; NULL: the parameter itself */
 };
 
 /* What stands in for parameters that were left out: the default view of a dataset. */
@@ -51,6 +53,9 @@ struct spl_camera_limits {
     uint32_t side_px;
     uint64_t pixels;
 };
+
+/* Marks a value as given under `name`; refuses the second time. */
+int spl_value_claim(struct spl_value *value, const char *name, struct spl_error *err);
 
 /* How many numbers a value of `kind` has: [*least, *most]; 0, 0 for kinds given as text. */
 void spl_kind_get_count(enum spl_value_kind kind, unsigned *least, unsigned *most);
@@ -65,6 +70,25 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
 /* One JSON value of a kind below SPL_KIND_END, checked. */
 int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const json_t *json, const char *name,
                         struct spl_error *err);
+
+/* A form (gltf, open3d, ros), itself claimed by the caller, to the values that it stands for; these are claimed here.
+ * `json` is borrowed. Errors name the member: "gltf.perspective.yfov". */
+int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum spl_camera_param form,
+                              const json_t *json, struct spl_error *err);
+
+#define SPL_GLTF_ASPECT "gltf.perspective.aspectRatio"
+
+/* Whether a "camera" object has a form that says width and height. */
+bool spl_camera_form_has_size(const json_t *camera);
+
+/* One camera of Open3D's trajectories, near and far left as they are; errors name width, height, intrinsic_matrix,
+ * extrinsic. Not yet through spl_camera_check(). */
+int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct spl_error *err);
+
+/* A number, and `count` numbers in an array, of an object. What stands before the last dot of `path` is for messages
+ * only. */
+int spl_json_get_number(const json_t *object, const char *path, double *out, struct spl_error *err);
+int spl_json_get_numbers(const json_t *object, const char *path, unsigned count, double *out, struct spl_error *err);
 
 /* "an object", "text", …: for messages. */
 const char *spl_json_type_name(const json_t *json);

@@ -6,6 +6,7 @@
 #include "geom/camera_json.h"
 
 #include <math.h>
+#include <string.h>
 
 static const char *const names[SPL_CAMERA_PARAMS] = {
 #define PARAM(name, alias, kind, places, help) #name,
@@ -25,10 +26,17 @@ static double get(const struct spl_value *v, enum spl_camera_param param, double
     return v[param].given ? v[param].n[0] : otherwise;
 }
 
-static int conflict(enum spl_camera_param param, enum spl_camera_param with, struct spl_error *err)
+/* As the request says it. */
+static const char *name_of(const struct spl_value *v, enum spl_camera_param param)
 {
-    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' and '%s' exclude each other", names[param],
-                          names[with]);
+    return v[param].source ? v[param].source : names[param];
+}
+
+static int conflict(const struct spl_value *v, enum spl_camera_param param, enum spl_camera_param with,
+                    struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' and '%s' exclude each other", name_of(v, param),
+                          name_of(v, with));
 }
 
 static int missing(enum spl_camera_param param, enum spl_camera_param because, struct spl_error *err)
@@ -37,10 +45,30 @@ static int missing(enum spl_camera_param param, enum spl_camera_param because, s
                           names[because]);
 }
 
+/* glTF's aspect ratio is that of the image: it decides what is left out, and may differ by the rounding to pixels. */
+static int apply_aspect(const struct spl_value *v, double size[2], struct spl_error *err)
+{
+    double aspect = v[SPL_CAMERA_fov].n[1];
+    if (aspect == 0)
+        return 0;
+    if (!given(v, SPL_CAMERA_width))
+        size[0] = fmax(1, round(size[1] * aspect));
+    else if (!given(v, SPL_CAMERA_height))
+        size[1] = fmax(1, round(size[0] / aspect));
+    if (fabs(size[1] * aspect - size[0]) < 0.501 || fabs(size[0] / aspect - size[1]) < 0.501)
+        return 0;
+    return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_ASPECT,
+                          SPL_GLTF_ASPECT " %g contradicts %.0f x %.0f pixels; leave it out, or width or height",
+                          aspect, size[0], size[1]);
+}
+
 static int resolve_size(const struct spl_value *v, const struct spl_camera_limits *limits, uint32_t *width,
                         uint32_t *height, struct spl_error *err)
 {
     double size[2] = {get(v, SPL_CAMERA_width, width_default), get(v, SPL_CAMERA_height, height_default)};
+    int rc = apply_aspect(v, size, err);
+    if (rc)
+        return rc;
     for (int i = 0; i < 2; i++) {
         const char *name = i ? "height" : "width";
         if (size[i] < 1 || size[i] > limits->side_px)
@@ -69,13 +97,13 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
             return missing(SPL_CAMERA_params, SPL_CAMERA_model, err);
         for (int i = 0; i < 4; i++)
             if (given(v, pinhole[i]))
-                return conflict(pinhole[i], SPL_CAMERA_params, err);
+                return conflict(v, pinhole[i], SPL_CAMERA_params, err);
         if (given(v, SPL_CAMERA_fov))
-            return conflict(SPL_CAMERA_fov, SPL_CAMERA_params, err);
+            return conflict(v, SPL_CAMERA_fov, SPL_CAMERA_params, err);
         return spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, NULL, err);
     }
     if (given(v, SPL_CAMERA_fov) && given(v, SPL_CAMERA_fx))
-        return conflict(SPL_CAMERA_fov, SPL_CAMERA_fx, err);
+        return conflict(v, SPL_CAMERA_fov, SPL_CAMERA_fx, err);
     if (given(v, SPL_CAMERA_fy) && !given(v, SPL_CAMERA_fx))
         return missing(SPL_CAMERA_fx, SPL_CAMERA_fy, err);
     camera->fx = get(v, SPL_CAMERA_fx, camera->fx);
@@ -97,12 +125,12 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
             continue;
         for (enum spl_camera_param other = SPL_CAMERA_matrix; other <= SPL_CAMERA_t; other++)
             if (given(v, other))
-                return conflict(look_at[i], other, err);
+                return conflict(v, look_at[i], other, err);
     }
     if (given(v, SPL_CAMERA_matrix)) {
         for (int i = 0; i < 2; i++)
             if (given(v, colmap[i]))
-                return conflict(colmap[i], SPL_CAMERA_matrix, err);
+                return conflict(v, colmap[i], SPL_CAMERA_matrix, err);
         if (!given(v, SPL_CAMERA_convention))
             return missing(SPL_CAMERA_convention, SPL_CAMERA_matrix, err);
         return spl_camera_set_matrix(camera, v[SPL_CAMERA_matrix].n, (enum spl_axes)v[SPL_CAMERA_convention].n[0], err);
@@ -122,16 +150,18 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
 {
     bool free_pose = given(v, SPL_CAMERA_matrix) || given(v, SPL_CAMERA_q) || given(v, SPL_CAMERA_t);
     if (!free_pose && !given(v, SPL_CAMERA_eye))
-        return spl_fail_field(err, SPL_E_INPUT, "eye", "a pose is missing: eye and target, matrix, or q and t");
+        return spl_fail_field(err, SPL_E_INPUT, "eye",
+                              "a pose is missing: eye and target, matrix, q and t, gltf.matrix or open3d");
     if (!free_pose && !given(v, SPL_CAMERA_target))
         return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
     if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "intrinsics are missing: fov, fx, or model and params");
+        return spl_fail_field(err, SPL_E_INPUT, "fov",
+                              "intrinsics are missing: fov, fx, model and params, gltf.perspective, open3d or ros");
     return 0;
 }
 
-int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
-                           const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err)
+static int resolve(const struct spl_value *values, const struct spl_camera_defaults *defaults,
+                   const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err)
 {
     static const struct spl_camera_defaults fallback = {
         .up = {0, 0, 1}, .fov = 60, .near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
@@ -149,4 +179,18 @@ int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], con
     if (given(values, SPL_CAMERA_near) && !given(values, SPL_CAMERA_far) && camera->far <= camera->near)
         camera->far = INFINITY;
     return spl_camera_check(camera, err);
+}
+
+/* A value's fault is that of the member that said it. */
+int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
+                           const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = resolve(values, defaults, limits, camera, &why);
+    if (!rc)
+        return 0;
+    for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
+        if (values[i].source && !strcmp(why.field, names[i]))
+            return spl_fail_field(err, rc, values[i].source, "%s: %s", values[i].source, why.message);
+    return spl_fail_field(err, rc, why.field, "%s", why.message);
 }

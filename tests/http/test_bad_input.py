@@ -39,6 +39,11 @@ BODIES = [
     ('{"camera":{"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}', "convention"),
     ('{"camera":{"q":[0,0,0,0],"t":[0,0,0]}}', "q"), ('{"camera":{"q":[1,0,0,0]}}', "t"),
     ('{"camera":{"model":"OPENCV","params":[1,1,1,1,0.1,0,0,0]}}', "params"),
+    ('{"camera":{"gltf":{"perspective":{"yfov":60,"znear":1}}}}', "gltf.perspective.yfov"),
+    ('{"camera":{"gltf":{"orthographic":{}}}}', "gltf.orthographic"), ('{"camera":{"gltf":{"matrix":[0]}}}', "gltf.matrix"),
+    ('{"camera":{"gltf":{"perspective":{"yfov":1,"znear":1,"aspectRatio":2}}},"width":8,"height":8}',
+     "gltf.perspective.aspectRatio"), ('{"camera":{"open3d":{}}}', "open3d.intrinsic"),
+    ('{"camera":{"ros":{"k":[5,0,2,0,5,2,0,0,1],"d":[0.1],"width":4,"height":4}}}', "ros.d"), ('{"gltf":{}}', "gltf"),
     ('{"budget":0}', "budget"), ('{"budget":"0ms"}', "budget"), ('{"budget":[5]}', "budget"),
     ('{"budget":true}', "budget"), ('{"psnr":"38"}', "psnr"), ('{"camera":{"psnr":38}}', "psnr"), ("[" * 100000, "body"),
 ]

@@ -1,5 +1,6 @@
 """What each route answers when all is well: listings, every format of every layer, every form of a camera."""
 import json
+import math
 import os
 import pathlib
 import re
@@ -9,6 +10,7 @@ import zlib
 import openapi
 from harness import REAL, VIEW, WALL, Daemon, run
 
+PICK = VIEW.replace("/view", "/pick")
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
 WEBP = os.environ["SPLATD_WEBP"] == "1"
 COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
@@ -159,6 +161,42 @@ def test_camera_forms_give_the_same_bytes():
             reply = d.post({"camera": form, **size})
             assert reply.status == 200, reply.body
             assert reply.body == first.body, (form, reply.headers["Splatd-Camera"], first.headers["Splatd-Camera"])
+
+
+def test_cameras_of_other_programs_are_the_same_camera():
+    rotation = [0, 0, -1, 1, 0, 0, 0, -1, 0]  # rows are the world's axes; columns right, down, forward
+    size = dict(width=64, height=48)
+    node = [0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 3, 0, 1, 1]  # right, up, backward, place
+    extrinsic = [0, 0, -1, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 1, 3, 1]
+    pose = dict(matrix=[0, 0, -1, 3, 1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1], convention="opencv")
+    zeros = dict(d=[0] * 5, distortion_model="plumb_bob", **size)
+    fov = math.degrees(2 * math.atan(24 / 50))
+    lens = dict(yfov=math.radians(fov), aspectRatio=4 / 3, znear=0.25, zfar=50)
+    around = dict(near=0.25, far=50)
+    forms = [
+        {"gltf": {"type": "perspective", "perspective": lens, "matrix": node}, **size},
+        {"gltf": {"perspective": lens}, "eye": [3, 0, 1], "target": [0, 0, 1], "up": [0, 0, 1], "height": 48},
+        {"gltf": {"matrix": node}, "fx": 50, **around, **size},
+        {"open3d": {"class_name": "PinholeCameraParameters", "version_major": 1, "version_minor": 0, "extrinsic": extrinsic,
+                    "intrinsic": {"intrinsic_matrix": [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1], **size}}, **around},
+        {"ros": {"k": [50, 0, 31.5, 0, 50, 23.5, 0, 0, 1], **zeros}, **pose, **around},
+        {"ros": {"p": [50, 0, 31.5, 0, 0, 50, 23.5, 0, 0, 0, 1, 0], **zeros}, **pose, **around},
+    ]
+    with Daemon(REAL) as d:
+        first = json.loads(d.view(eye="3,0,1", target="0,0,1", up="0,0,1", fx=50, **around, **size).headers["Splatd-Camera"])
+        assert first["rotation"] == [rotation[3 * j + i] for i in range(3) for j in range(3)]
+        for form in forms:
+            for path, rest in ((VIEW, {"format": "raw"}), (PICK, {"x": 32, "y": 24})):
+                reply = d.post({"camera": form, **rest}, path)
+                assert reply.status == 200, (form, reply.body)
+                used = json.loads(reply.headers["Splatd-Camera"])
+                for name, wanted in first.items():
+                    wanted, got = (v if isinstance(v, list) else [v] for v in (wanted, used[name]))
+                    assert len(wanted) == len(got) and max(abs(a - b) for a, b in zip(wanted, got)) < 1e-12, (form, name, got)
+        views = d.post({"views": [{"camera": form} for form in forms], "format": "raw"}, VIEW + "s")
+        assert views.status == 200 and views.headers["Splatd-Failed"] == "0", views.body[:500]
+        ortho = d.post({"camera": {"gltf": {"orthographic": {"xmag": 1, "ymag": 1, "znear": 1, "zfar": 9}}}})
+        assert ortho.status == 400 and "perspective" in ortho.json()["detail"], ortho.body
 
 
 def test_a_body_says_all_that_a_query_does():

@@ -57,8 +57,10 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
         enum param param = spl_param_find(name, place, err);
         if (param == PARAM_COUNT)
             return SPL_E_INPUT;
-        if ((rc = spl_values_claim(values, param, name, err)) ||
-            (rc = parse_value(&values->v[param], spl_params[param].kind, json, name, err)))
+        int kind = spl_params[param].kind;
+        if ((rc = spl_value_claim(&values->v[param], name, err)) ||
+            (rc = kind == SPL_KIND_FORM ? spl_camera_form_from_json(values->v, (enum spl_camera_param)param, json, err)
+                                        : parse_value(&values->v[param], kind, json, name, err)))
             return rc;
     }
     return 0;

@@ -87,7 +87,7 @@ static int parse_pair(struct values *values, const char *pair, size_t length, en
     if (!equals)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s has no value; write %s=…", name, name);
     struct spl_value *value = &values->v[param];
-    if ((rc = spl_values_claim(values, param, name, err)))
+    if ((rc = spl_value_claim(&values->v[param], name, err)))
         return rc;
     if ((rc = spl_percent_decode(equals + 1, length - name_length - 1, text, sizeof text, name, err)))
         return rc;

@@ -41,14 +41,6 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
     return PARAM_COUNT;
 }
 
-int spl_values_claim(struct values *values, enum param param, const char *name, struct spl_error *err)
-{
-    if (values->v[param].given)
-        return spl_fail_field(err, SPL_E_INPUT, name, "'%s' is given twice", spl_params[param].name);
-    values->v[param].given = true;
-    return 0;
-}
-
 int spl_hex_digit(char c)
 {
     return c >= '0' && c <= '9'   ? c - '0'

@@ -47,9 +47,6 @@ int spl_hex_digit(char c);
 /* The parameter called `name` in `place`; PARAM_COUNT and a filled `err` for one that is unknown there. */
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err);
 
-/* Marks `param` as given under `name`; refuses the second time. */
-int spl_values_claim(struct values *values, enum param param, const char *name, struct spl_error *err);
-
 /* Text to the numbers of a choice, a flag, a colour or a duration. */
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err);
 

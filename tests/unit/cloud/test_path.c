@@ -80,6 +80,9 @@ static const struct {
      lens_pixel, true, true, 12.5},
     {"splatd, fov", "{\"keyframes\":[{\"camera\":{\"matrix\":" MATRIX ",\"convention\":\"opengl\",\"fov\":60}}]}",
      fov_pixel, false, false, 0},
+    {"splatd, Open3D",
+     "{\"frames\":[{\"camera\":{\"open3d\":{\"extrinsic\":" EXTRINSIC ",\"intrinsic\":" INTRINSIC "}}}]}", lens_pixel,
+     true, false, 0},
 };
 
 static void test_golden_vectors(void **state)
@@ -189,6 +192,9 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[],\"fps\":0}", "fps"},
         {"{\"keyframes\":[],\"closed\":1}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
+        {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
+             "\"znear\":1,\"aspectRatio\":1}}}}"),
+         "keyframes[1].gltf.perspective.aspectRatio"},
         {OWN("5"), "keyframes[1].views"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[0,0,0],\"fov\":60}}"), "keyframes[1].target"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"time\":\"x\"}"), "keyframes[1].time"},

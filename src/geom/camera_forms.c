@@ -1,0 +1,319 @@
+/* Cameras as other programs write them, as one member of a "camera" object: a glTF 2.0 camera with its node's matrix,
+ * Open3D's PinholeCameraParameters, a ROS CameraInfo.
+ *
+ * A form is turned into values of camera_params.def, each of which keeps the name of the member that said it; what
+ * they mean together, and whether they can be, is camera_values.c's business, as for values that are given one by
+ * one. What a pinhole does not have (skew, distortion, a stereo baseline, parallel rays) is refused here, by name.
+ * Pure functions, any thread. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "geom/camera_json.h"
+
+static const json_t *get(const json_t *object, const char *path)
+{
+    const char *dot = strrchr(path, '.');
+    return json_object_get(object, dot ? dot + 1 : path);
+}
+
+int spl_json_get_number(const json_t *object, const char *path, double *out, struct spl_error *err)
+{
+    const json_t *json = get(object, path);
+    if (!json_is_number(json))
+        return spl_fail_field(err, SPL_E_INPUT, path, "%s must be a number; it is %s", path, spl_json_type_name(json));
+    *out = json_number_value(json);
+    return 0;
+}
+
+int spl_json_get_numbers(const json_t *object, const char *path, unsigned count, double *out, struct spl_error *err)
+{
+    const json_t *json = get(object, path);
+    if (!json_is_array(json) || json_array_size(json) != count)
+        return spl_fail_field(err, SPL_E_INPUT, path, "%s must be an array of %u numbers; it is %s of %zu", path, count,
+                              spl_json_type_name(json), json_array_size(json));
+    for (unsigned i = 0; i < count; i++) {
+        if (!json_is_number(json_array_get(json, i)))
+            return spl_fail_field(err, SPL_E_INPUT, path, "number %u of %s is %s", i + 1, path,
+                                  spl_json_type_name(json_array_get(json, i)));
+        out[i] = json_number_value(json_array_get(json, i));
+    }
+    return 0;
+}
+
+/* In a matrix that is stored by columns the last row is every fourth number. */
+static int check_last_row(const double m[16], const char *name, struct spl_error *err)
+{
+    if (m[3] == 0 && m[7] == 0 && m[11] == 0 && m[15] == 1)
+        return 0;
+    return spl_fail_field(err, SPL_E_INPUT, name,
+                          "the last row of %s is %g %g %g %g instead of 0 0 0 1; it is stored by columns", name, m[3],
+                          m[7], m[11], m[15]);
+}
+
+/* extrinsic is column-major, world to camera: its columns are rows of the inverse's rotation. */
+static int set_extrinsic(struct spl_camera *camera, const double e[16], struct spl_error *err)
+{
+    double inverse[16] = {e[0], e[1], e[2], 0, e[4], e[5], e[6], 0, e[8], e[9], e[10], 0, 0, 0, 0, 1};
+    struct spl_error why = {0};
+    int rc = check_last_row(e, "extrinsic", err);
+    if (rc)
+        return rc;
+    if ((rc = spl_camera_set_matrix(camera, inverse, SPL_AXES_OPENCV, &why)))
+        return spl_fail_field(err, rc, "extrinsic", "extrinsic: %s", why.message);
+    const double *r = camera->rotation;
+    for (int i = 0; i < 3; i++)
+        camera->eye[i] = -(r[i] * e[12] + r[3 + i] * e[13] + r[6 + i] * e[14]);
+    return 0;
+}
+
+int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct spl_error *err)
+{
+    const json_t *intrinsic = json_object_get(json, "intrinsic");
+    double size[2] = {0}, k[9] = {0}, extrinsic[16] = {0};
+    int rc;
+    if ((rc = spl_json_get_number(intrinsic, "width", &size[0], err)) ||
+        (rc = spl_json_get_number(intrinsic, "height", &size[1], err)) ||
+        (rc = spl_json_get_numbers(intrinsic, "intrinsic_matrix", 9, k, err)) ||
+        (rc = spl_json_get_numbers(json, "extrinsic", 16, extrinsic, err)))
+        return rc;
+    for (int i = 0; i < 2; i++)
+        if (!(size[i] >= 1 && size[i] <= 1e6 && size[i] == floor(size[i])))
+            return spl_fail_field(err, SPL_E_INPUT, i ? "height" : "width", "an image side of %g pixels", size[i]);
+    if (k[1] != 0 || k[2] != 0 || k[3] != 0 || k[5] != 0 || k[8] != 1)
+        return spl_fail_field(err, SPL_E_INPUT, "intrinsic_matrix",
+                              "intrinsic_matrix must be fx 0 0 0 fy 0 cx cy 1: by columns, without skew");
+    if ((rc = set_extrinsic(camera, extrinsic, err)))
+        return rc;
+    camera->width = (uint32_t)size[0];
+    camera->height = (uint32_t)size[1];
+    camera->fx = k[0];
+    camera->fy = k[4];
+    camera->cx = k[6] + 0.5; // Open3D's first pixel centre is (0, 0)
+    camera->cy = k[7] + 0.5;
+    return 0;
+}
+
+static int set(struct spl_value *values, enum spl_camera_param param, const char *source, const double *numbers,
+               unsigned count, struct spl_error *err)
+{
+    int rc = spl_value_claim(&values[param], source, err);
+    memcpy(values[param].n, numbers, count * sizeof *numbers);
+    values[param].count = count;
+    values[param].source = source;
+    return rc;
+}
+
+static int set_number(struct spl_value *values, enum spl_camera_param param, const char *source, double number,
+                      struct spl_error *err)
+{
+    return set(values, param, source, &number, 1, err);
+}
+
+/* fx, fy, cx, cy. */
+static int set_lens(struct spl_value *values, const char *source, const double lens[4], struct spl_error *err)
+{
+    int rc = 0;
+    for (int i = 0; !rc && i < 4; i++)
+        rc = set_number(values, (enum spl_camera_param)(SPL_CAMERA_fx + i), source, lens[i], err);
+    return rc;
+}
+
+/* A row-major matrix, camera to world. */
+static int set_pose(struct spl_value *values, const char *source, const double matrix[16], enum spl_axes axes,
+                    struct spl_error *err)
+{
+    int rc = set(values, SPL_CAMERA_matrix, source, matrix, 16, err);
+    return rc ? rc : set_number(values, SPL_CAMERA_convention, source, axes, err);
+}
+
+static int check_object(const json_t *object, const char *path, const char *const *known, struct spl_error *err)
+{
+    const char *name;
+    json_t *value;
+    char list[96] = "", field[64];
+    if (!json_is_object(object))
+        return spl_fail_field(err, SPL_E_INPUT, path, "%s must be an object, not %s", path, spl_json_type_name(object));
+    json_object_foreach((json_t *)object, name, value)
+    {
+        const char *const *k = known;
+        while (*k && strcmp(*k, name))
+            k++;
+        if (*k)
+            continue;
+        for (k = known; *k; k++)
+            strcat(strcat(list, k == known ? "" : ", "), *k);
+        snprintf(field, sizeof field, "%s.%s", path, name);
+        return spl_fail_field(err, SPL_E_INPUT, field, "unknown member '%.60s' of %s; known are %s", name, path, list);
+    }
+    return 0;
+}
+
+static int read_perspective(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"yfov", "aspectRatio", "znear", "zfar", NULL};
+    static const char yfov_name[] = "gltf.perspective.yfov", near_name[] = "gltf.perspective.znear",
+                      far_name[] = "gltf.perspective.zfar";
+    double yfov = 0, aspect = 0, near = 0, far = INFINITY;
+    int rc;
+    if ((rc = check_object(json, "gltf.perspective", known, err)) ||
+        (rc = spl_json_get_number(json, yfov_name, &yfov, err)) ||
+        (rc = spl_json_get_number(json, near_name, &near, err)) ||
+        (json_object_get(json, "zfar") && (rc = spl_json_get_number(json, far_name, &far, err))) ||
+        (json_object_get(json, "aspectRatio") && (rc = spl_json_get_number(json, SPL_GLTF_ASPECT, &aspect, err))))
+        return rc;
+    if (json_object_get(json, "aspectRatio") && !(aspect >= 1e-4 && aspect <= 1e4))
+        return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_ASPECT, SPL_GLTF_ASPECT " %g is outside 0.0001 to 10000",
+                              aspect);
+    const double fov[2] = {yfov * (180 / M_PI), aspect};
+    if ((rc = set(values, SPL_CAMERA_fov, yfov_name, fov, 2, err)) ||
+        (rc = set_number(values, SPL_CAMERA_near, near_name, near, err)))
+        return rc;
+    return set_number(values, SPL_CAMERA_far, far_name, far, err);
+}
+
+static int read_gltf(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"type", "perspective", "matrix", "orthographic", NULL};
+    static const char matrix_name[] = "gltf.matrix";
+    const json_t *type = json_object_get(json, "type"), *lens = json_object_get(json, "perspective"),
+                 *node = json_object_get(json, "matrix");
+    const char *kind = type ? json_string_value(type) : "perspective";
+    double m[16] = {0}, rows[16];
+    int rc = check_object(json, "gltf", known, err);
+    if (rc)
+        return rc;
+    if (json_object_get(json, "orthographic") || (kind && !strcmp(kind, "orthographic")))
+        return spl_fail_field(
+            err, SPL_E_INPUT, "gltf.orthographic",
+            "gltf.orthographic: only pinholes are drawn; give perspective, with a small yfov from far "
+            "away for nearly parallel rays");
+    if (!kind || strcmp(kind, "perspective"))
+        return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf.type must be perspective, not %.32s",
+                              kind ? kind : spl_json_type_name(type));
+    if (!lens && !node)
+        return spl_fail_field(err, SPL_E_INPUT, "gltf", "gltf holds neither perspective nor matrix");
+    if (lens && (rc = read_perspective(lens, values, err)))
+        return rc;
+    if (!node)
+        return 0;
+    if ((rc = spl_json_get_numbers(json, matrix_name, 16, m, err)) || (rc = check_last_row(m, matrix_name, err)))
+        return rc;
+    for (int i = 0; i < 16; i++)
+        rows[i] = m[i % 4 * 4 + i / 4];
+    return set_pose(values, matrix_name, rows, SPL_AXES_OPENGL, err);
+}
+
+static int read_open3d(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"class_name", "version_major", "version_minor", "extrinsic", "intrinsic", NULL};
+    static const char *const inner[] = {"width", "height", "intrinsic_matrix", NULL};
+    struct spl_camera camera = {0};
+    struct spl_error why = {0};
+    char field[96];
+    int rc;
+    if ((rc = check_object(json, "open3d", known, err)) ||
+        (rc = check_object(json_object_get(json, "intrinsic"), "open3d.intrinsic", inner, err)))
+        return rc;
+    if ((rc = spl_camera_from_open3d(json, &camera, &why))) {
+        snprintf(field, sizeof field, "open3d.%s%s", strcmp(why.field, "extrinsic") ? "intrinsic." : "", why.field);
+        return spl_fail_field(err, rc, field, "open3d: %s", why.message);
+    }
+    const double *r = camera.rotation, *eye = camera.eye, lens[4] = {camera.fx, camera.fy, camera.cx, camera.cy},
+                 pose[16] = {r[0], r[3], r[6], eye[0], r[1], r[4], r[7], eye[1], r[2], r[5], r[8], eye[2], 0, 0, 0, 1};
+    if ((rc = set_lens(values, "open3d.intrinsic.intrinsic_matrix", lens, err)) ||
+        (rc = set_number(values, SPL_CAMERA_width, "open3d.intrinsic.width", camera.width, err)) ||
+        (rc = set_number(values, SPL_CAMERA_height, "open3d.intrinsic.height", camera.height, err)))
+        return rc;
+    return set_pose(values, "open3d.extrinsic", pose, SPL_AXES_OPENCV, err);
+}
+
+/* k (3 columns) or p (4), row-major: fx 0 cx [0], 0 fy cy [0], 0 0 1 [0]. */
+static int read_ros_matrix(const json_t *json, const char *name, unsigned columns, double lens[4],
+                           struct spl_error *err)
+{
+    double m[12] = {0};
+    int rc = spl_json_get_numbers(json, name, 3 * columns, m, err);
+    for (unsigned i = 0; !rc && i < 3 * columns; i++) {
+        unsigned row = i / columns, column = i % columns;
+        bool any = row < 2 && (column == row || column == 2);
+        if (!any && m[i] != (row == 2 && column == 2))
+            return spl_fail_field(err, SPL_E_INPUT, name, "number %u of %s is %g instead of %d: %s", i + 1, name, m[i],
+                                  row == 2 && column == 2,
+                                  column == 3 ? "a stereo baseline belongs into the pose" : "row-major, without skew");
+    }
+    for (int i = 0; !rc && i < 2; i++) {
+        lens[i] = m[i * (int)columns + i];
+        lens[2 + i] = m[i * (int)columns + 2] + 0.5; // ROS's first pixel centre is (0, 0)
+    }
+    return rc;
+}
+
+/* What bends the raw image's rays. */
+static int check_ros_distortion(const json_t *json, struct spl_error *err)
+{
+    const json_t *d = json_object_get(json, "d"), *model = json_object_get(json, "distortion_model");
+    const char *name = model ? json_string_value(model) : "";
+    if (d && !json_is_array(d))
+        return spl_fail_field(err, SPL_E_INPUT, "ros.d", "ros.d must be an array of numbers, not %s",
+                              spl_json_type_name(d));
+    for (size_t i = 0; i < json_array_size(d); i++) {
+        const json_t *number = json_array_get(d, i);
+        if (!json_is_number(number))
+            return spl_fail_field(err, SPL_E_INPUT, "ros.d", "number %zu of ros.d is %s", i + 1,
+                                  spl_json_type_name(number));
+        if (json_number_value(number) != 0)
+            return spl_fail_field(err, SPL_E_INPUT, "ros.d",
+                                  "ros.d has the distortion coefficient %g; only pinholes are drawn: rectify the image "
+                                  "and give p, without k and d",
+                                  json_number_value(number));
+    }
+    if (!name || (*name && strcmp(name, "plumb_bob") && strcmp(name, "rational_polynomial")))
+        return spl_fail_field(err, SPL_E_INPUT, "ros.distortion_model",
+                              "ros.distortion_model must be plumb_bob or rational_polynomial, not %.32s; rectify the "
+                              "image and give p alone",
+                              name ? name : spl_json_type_name(model));
+    return 0;
+}
+
+static int read_ros(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"k", "p", "d", "distortion_model", "width", "height", NULL};
+    double size[2] = {0}, k[4] = {0}, p[4] = {0};
+    bool raw = json_object_get(json, "k"), rectified = json_object_get(json, "p");
+    int rc;
+    if ((rc = check_object(json, "ros", known, err)) || (rc = check_ros_distortion(json, err)) ||
+        (rc = spl_json_get_number(json, "ros.width", &size[0], err)) ||
+        (rc = spl_json_get_number(json, "ros.height", &size[1], err)))
+        return rc;
+    if (!raw && !rectified)
+        return spl_fail_field(err, SPL_E_INPUT, "ros.k", "ros has neither k nor p, so no focal length");
+    if ((raw && (rc = read_ros_matrix(json, "ros.k", 3, k, err))) ||
+        (rectified && (rc = read_ros_matrix(json, "ros.p", 4, p, err))))
+        return rc;
+    for (int i = 0; raw && rectified && i < 4; i++)
+        if (k[i] != p[i])
+            return spl_fail_field(err, SPL_E_INPUT, "ros.p",
+                                  "ros.k and ros.p are two cameras; give k for the raw image or p for the rectified");
+    for (int i = 0; i < 2; i++) {
+        enum spl_camera_param side = i ? SPL_CAMERA_height : SPL_CAMERA_width;
+        const char *name = i ? "ros.height" : "ros.width";
+        if ((rc = set_number(values, side, name, size[i], err)) ||
+            (rc = spl_value_check(&values[side], SPL_KIND_COUNT, name, err)))
+            return rc;
+    }
+    return set_lens(values, raw ? "ros.k" : "ros.p", raw ? k : p, err);
+}
+
+int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum spl_camera_param form,
+                              const json_t *json, struct spl_error *err)
+{
+    return form == SPL_CAMERA_gltf     ? read_gltf(json, values, err)
+           : form == SPL_CAMERA_open3d ? read_open3d(json, values, err)
+                                       : read_ros(json, values, err);
+}
+
+bool spl_camera_form_has_size(const json_t *camera)
+{
+    return json_object_get(camera, "open3d") || json_object_get(camera, "ros");
+}

@@ -1,0 +1,211 @@
+/* The cameras of other programs, as their files have them: the golden pose of test_camera.c (yaw 35, pitch 70, roll 8
+ * degrees), whose world point lands on its pixel in each form; and what each form refuses, by the member's name. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "geom/camera_json.h"
+
+#define NODE                                                                                                           \
+    "[0.78387787227503695,0.60698607043454015,0.13077993598406572,0,"                                                  \
+    "-0.30826946648440512,0.19761352719368059,0.93054759679636629,0,"                                                  \
+    "0.53898554469575628,-0.76975113132005719,0.34202014332566873,0,2.5,-3.5,1.75,1]"
+#define EXTRINSIC                                                                                                      \
+    "[0.78387787227503695,0.30826946648440512,-0.53898554469575628,0,"                                                 \
+    "0.60698607043454015,-0.19761352719368059,0.76975113132005719,0,"                                                  \
+    "0.13077993598406572,-0.93054759679636629,-0.34202014332566873,0,"                                                 \
+    "-0.06410832213881687,0.16613728300474614,4.6401280721795111,1]"
+#define POSE                                                                                                           \
+    "\"matrix\":[0.78387787227503695,0.30826946648440512,-0.53898554469575628,2.5,"                                    \
+    "0.60698607043454015,-0.19761352719368059,0.76975113132005719,-3.5,"                                               \
+    "0.13077993598406572,-0.93054759679636629,-0.34202014332566873,1.75,0,0,0,1],\"convention\":\"opencv\""
+#define SIZE "\"width\":640,\"height\":480"
+#define I16 "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]"
+#define LENS "\"perspective\":{\"yfov\":1,\"znear\":0.5}"
+#define GLTF(members) "{\"camera\":{\"gltf\":{" members "}," SIZE "}}"
+#define PERSPECTIVE(members) GLTF("\"matrix\":" I16 ",\"perspective\":{" members "}")
+#define K "[500,0,330.75,0,510,228,0,0,1]"
+#define P "[500,0,330.75,0,0,510,228,0,0,0,1,0]"
+#define OPEN3D(extrinsic, intrinsic)                                                                                   \
+    "{\"camera\":{\"open3d\":{\"extrinsic\":" extrinsic ",\"intrinsic\":{" intrinsic "}},\"near\":1}}"
+#define INTRINSIC SIZE ",\"intrinsic_matrix\":[500,0,0,0,510,0,330.75,228,1]"
+#define ROS(members) "{\"camera\":{" POSE ",\"ros\":{" SIZE "," members "},\"near\":1}}"
+
+static int read_camera(const char *text, const struct spl_camera_defaults *defaults, struct spl_camera *camera,
+                       struct spl_error *err)
+{
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    static const char *const none[] = {"camera", NULL};
+    json_t *json = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
+    if (!json)
+        fail_msg("no JSON: %s", text);
+    *err = (struct spl_error){0};
+    int rc = spl_camera_from_json(json, none, defaults, &limits, camera, err);
+    json_decref(json);
+    return rc;
+}
+
+static void every_form_hits_the_golden_pixel(void **state)
+{
+    (void)state;
+    static const double point[3] = {-0.577054497069, 3.30876147309, -1.46753054758};
+    static const struct {
+        const char *text;
+        double u, v, near, far;
+    } rows[] = {
+        /* fy = 240 / tan 0.5, the point at 0.1625 and 0.0875 of the depth beside the axis */
+        {GLTF("\"type\":\"perspective\",\"matrix\":" NODE ",\"perspective\":{\"yfov\":1,\"znear\":0.5,"
+              "\"zfar\":90,\"aspectRatio\":1.3333334}"),
+         391.38902114678562, 278.44024215596149, 0.5, 90},
+        {GLTF("\"matrix\":" NODE "," LENS), 391.38902114678562, 278.44024215596149, 0.5, INFINITY},
+        {"{\"camera\":{\"gltf\":{\"matrix\":" NODE
+         "},\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5,\"near\":1}," SIZE "}",
+         412.5, 273.125, 1, INFINITY},
+        {OPEN3D(EXTRINSIC, INTRINSIC), 412.5, 273.125, 1, INFINITY},
+        {ROS("\"k\":" K ",\"d\":[0,0,0,0,0],\"distortion_model\":\"plumb_bob\""), 412.5, 273.125, 1, INFINITY},
+        {ROS("\"p\":" P ",\"d\":[]"), 412.5, 273.125, 1, INFINITY},
+        {ROS("\"k\":" K ",\"p\":" P), 412.5, 273.125, 1, INFINITY},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_camera camera;
+        struct spl_error err;
+        double pixel[2], depth;
+        if (read_camera(rows[i].text, NULL, &camera, &err))
+            fail_msg("%s: %s: %s", rows[i].text, err.field, err.message);
+        assert_true(camera.width == 640 && camera.height == 480);
+        assert_true(camera.near == rows[i].near && camera.far == rows[i].far);
+        assert_true(spl_camera_project(&camera, point, pixel, &depth));
+        if (!(fabs(pixel[0] - rows[i].u) < 1e-9 && fabs(pixel[1] - rows[i].v) < 1e-9 && fabs(depth - 8) < 1e-9))
+            fail_msg("%s: pixel %.12f %.12f depth %.12f", rows[i].text, pixel[0], pixel[1], depth);
+    }
+}
+
+static void an_aspect_ratio_decides_the_side_that_is_left_out(void **state)
+{
+    (void)state;
+#define ASPECT(aspect, rest)                                                                                           \
+    "{\"camera\":{\"gltf\":{\"matrix\":" I16 ",\"perspective\":{\"yfov\":1,\"znear\":1,\"aspectRatio\":" aspect        \
+    "}}" rest "}}"
+    static const struct {
+        const char *text;
+        uint32_t width, height; /* 0: refused */
+    } rows[] = {
+        {ASPECT("1.5", ""), 1080, 720},
+        {ASPECT("1.5", ",\"width\":300"), 300, 200},
+        {ASPECT("0.5", ",\"height\":300"), 150, 300},
+        {ASPECT("1.7777", ",\"width\":1280,\"height\":720"), 1280, 720},
+        {ASPECT("1.78", ",\"width\":1280,\"height\":720"), 0, 0},
+        {ASPECT("0.75", ",\"width\":1280,\"height\":960"), 0, 0},
+        {ASPECT("0.001", ""), 1, 720},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_camera camera;
+        struct spl_error err;
+        int rc = read_camera(rows[i].text, NULL, &camera, &err);
+        if (rc != (rows[i].width ? 0 : SPL_E_INPUT))
+            fail_msg("%s: %d %s", rows[i].text, rc, err.message);
+        if (!rc && (camera.width != rows[i].width || camera.height != rows[i].height || camera.fx != camera.fy))
+            fail_msg("%s: %u x %u", rows[i].text, camera.width, camera.height);
+        assert_string_equal(err.field, rc ? "gltf.perspective.aspectRatio" : "");
+    }
+}
+
+static void faults_carry_the_members_name(void **state)
+{
+    (void)state;
+    static const char *const rows[][2] = {
+        {"{\"camera\":{\"gltf\":5}}", "gltf"},
+        {GLTF(""), "gltf"},
+        {GLTF("\"perspective\":[]"), "gltf.perspective"},
+        {GLTF("\"type\":5," LENS), "gltf.type"},
+        {GLTF("\"type\":\"panorama\"," LENS), "gltf.type"},
+        {GLTF("\"type\":\"orthographic\""), "gltf.orthographic"},
+        {GLTF("\"orthographic\":{\"xmag\":1,\"ymag\":1,\"znear\":1,\"zfar\":9}"), "gltf.orthographic"},
+        {GLTF("\"translation\":[1,2,3]," LENS), "gltf.translation"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"xfov\":1"), "gltf.perspective.xfov"},
+        {PERSPECTIVE("\"znear\":1"), "gltf.perspective.yfov"},
+        {PERSPECTIVE("\"yfov\":\"1\",\"znear\":1"), "gltf.perspective.yfov"},
+        {PERSPECTIVE("\"yfov\":0,\"znear\":1"), "gltf.perspective.yfov"},
+        {PERSPECTIVE("\"yfov\":60,\"znear\":1"), "gltf.perspective.yfov"}, /* degrees */
+        {PERSPECTIVE("\"yfov\":1"), "gltf.perspective.znear"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":0"), "gltf.perspective.znear"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":2,\"zfar\":1"), "gltf.perspective.zfar"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":2,\"zfar\":null"), "gltf.perspective.zfar"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"aspectRatio\":0"), "gltf.perspective.aspectRatio"},
+        {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"aspectRatio\":1e300"), "gltf.perspective.aspectRatio"},
+        {GLTF("\"matrix\":[1,2,3]," LENS), "gltf.matrix"},
+        {GLTF("\"matrix\":[1,0,0,4,0,1,0,5,0,0,1,6,0,0,0,1]," LENS), "gltf.matrix"}, /* row-major */
+        {GLTF("\"matrix\":[1,0,0,0,0,1,0,0,0,0,-1,0,0,0,0,1]," LENS), "gltf.matrix"},
+        {GLTF("\"matrix\":[2,0,0,0,0,2,0,0,0,0,2,0,0,0,0,1]," LENS), "gltf.matrix"},
+        {GLTF("\"matrix\":[0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1]," LENS), "gltf.matrix"},
+        {GLTF("\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,2e12,0,0,1]," LENS), "gltf.matrix"},
+        {"{\"camera\":{\"gltf\":{\"matrix\":" I16 "," LENS "},\"matrix\":" I16 ",\"convention\":\"opengl\"}}",
+         "matrix"},
+        {"{\"camera\":{\"matrix\":" I16 ",\"convention\":\"opengl\",\"gltf\":{\"matrix\":" I16 "," LENS "}}}",
+         "gltf.matrix"},
+        {"{\"camera\":{\"gltf\":{" LENS "}},\"near\":1}", "gltf.perspective.znear"},
+        {"{\"camera\":{\"gltf\":{" LENS "}}}", "eye"},
+        {"{\"camera\":{\"gltf\":{\"matrix\":" I16 "}}}", "fov"},
+        {"{\"camera\":{\"gltf\":{\"matrix\":" I16 "," LENS "},\"eye\":[1,2,3]}}", "eye"},
+        {"{\"gltf\":{},\"camera\":{}}", "gltf"},
+        {OPEN3D("[1]", INTRINSIC), "open3d.extrinsic"},
+        {OPEN3D("[1,0,0,5,0,1,0,0,0,0,1,0,0,0,0,1]", INTRINSIC), "open3d.extrinsic"},
+        {OPEN3D("[1,0,0,0,0,1,0,0,0,0,-1,0,0,0,0,1]", INTRINSIC), "open3d.extrinsic"},
+        {OPEN3D("[1,0,0,0,0,1,0,0,0,0,1,0,0,0,1e13,1]", INTRINSIC), "open3d.extrinsic"},
+        {OPEN3D(I16, ""), "open3d.intrinsic.width"},
+        {OPEN3D(I16, INTRINSIC ",\"fx\":5"), "open3d.intrinsic.fx"},
+        {OPEN3D(I16, "\"width\":9000,\"height\":4,\"intrinsic_matrix\":[5,0,0,0,5,0,2,2,1]"), "open3d.intrinsic.width"},
+        {OPEN3D(I16, "\"width\":4,\"height\":0.5,\"intrinsic_matrix\":[5,0,0,0,5,0,2,2,1]"), "open3d.intrinsic.height"},
+        {OPEN3D(I16, SIZE ",\"intrinsic_matrix\":[5,0,2,0,5,2,0,0,1]"), "open3d.intrinsic.intrinsic_matrix"},
+        {OPEN3D(I16, SIZE ",\"intrinsic_matrix\":[0,0,0,0,5,0,2,2,1]"), "open3d.intrinsic.intrinsic_matrix"},
+        {OPEN3D(I16, SIZE ",\"intrinsic_matrix\":[5,5]"), "open3d.intrinsic.intrinsic_matrix"},
+        {"{\"camera\":{\"open3d\":{\"extrinsic\":" I16 "}}}", "open3d.intrinsic"},
+        {"{\"camera\":{\"open3d\":{\"parameters\":[]}}}", "open3d.parameters"},
+        {"{\"width\":640,\"camera\":{\"open3d\":{\"extrinsic\":" I16 ",\"intrinsic\":{" INTRINSIC "}}}}",
+         "open3d.intrinsic.width"},
+        {"{\"camera\":{\"ros\":[]}}", "ros"},
+        {ROS("\"r\":[]"), "ros.r"},
+        {ROS("\"d\":[]"), "ros.k"},
+        {ROS("\"k\":[500]"), "ros.k"},
+        {ROS("\"k\":[500,1,330,0,510,228,0,0,1]"), "ros.k"},
+        {ROS("\"k\":[500,0,0,0,510,0,330,228,1]"), "ros.k"}, /* column-major */
+        {ROS("\"k\":[0,0,0,0,0,0,0,0,0]"), "ros.k"},
+        {ROS("\"k\":[0,0,0,0,0,0,0,0,1]"), "ros.k"},
+        {ROS("\"p\":[500,0,330,-40,0,510,228,0,0,0,1,0]"), "ros.p"},
+        {ROS("\"p\":[-500,0,330,0,0,510,228,0,0,0,1,0]"), "ros.p"},
+        {ROS("\"k\":[499,0,330.75,0,510,228,0,0,1],\"p\":" P), "ros.p"},
+        {ROS("\"k\":" K ",\"d\":[0,0,0,0.01]"), "ros.d"},
+        {ROS("\"k\":" K ",\"d\":[\"0\"]"), "ros.d"},
+        {ROS("\"k\":" K ",\"d\":0"), "ros.d"},
+        {ROS("\"k\":" K ",\"distortion_model\":\"equidistant\""), "ros.distortion_model"},
+        {ROS("\"k\":" K ",\"distortion_model\":null"), "ros.distortion_model"},
+        {"{\"camera\":{" POSE ",\"ros\":{\"k\":" K ",\"width\":0,\"height\":4}}}", "ros.width"},
+        {"{\"camera\":{" POSE ",\"ros\":{\"k\":" K ",\"width\":4,\"height\":4.5}}}", "ros.height"},
+        {"{\"camera\":{" POSE ",\"ros\":{\"k\":" K ",\"width\":4}}}", "ros.height"},
+        {"{\"camera\":{" POSE ",\"fov\":60,\"ros\":{\"k\":" K "," SIZE "}}}", "fov"},
+        {"{\"camera\":{" POSE ",\"fx\":60,\"ros\":{\"k\":" K "," SIZE "}}}", "ros.k"},
+        {"{\"camera\":{\"ros\":{\"k\":" K "," SIZE "}}}", "eye"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_camera camera;
+        struct spl_error err;
+        int rc = read_camera(rows[i][0], NULL, &camera, &err);
+        if (rc != SPL_E_INPUT || strcmp(err.field, rows[i][1]) || !err.message[0])
+            fail_msg("%s: %d, field '%s' instead of '%s': %s", rows[i][0], rc, err.field, rows[i][1], err.message);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_form_hits_the_golden_pixel),
+        cmocka_unit_test(an_aspect_ratio_decides_the_side_that_is_left_out),
+        cmocka_unit_test(faults_carry_the_members_name),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
