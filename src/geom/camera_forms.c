@@ -1,5 +1,5 @@
 /* Cameras as other programs write them, as one member of a "camera" object: a glTF 2.0 camera with its node's matrix,
- * Open3D's PinholeCameraParameters, a ROS CameraInfo.
+ * Open3D's PinholeCameraParameters, a ROS CameraInfo, a frame of nerfstudio.
  *
  * A form is turned into values of camera_params.def, each of which keeps the name of the member that said it; what
  * they mean together, and whether they can be, is camera_values.c's business, as for values that are given one by
@@ -131,7 +131,7 @@ static int check_object(const json_t *object, const char *path, const char *cons
 {
     const char *name;
     json_t *value;
-    char list[96] = "", field[64];
+    char list[128] = "", field[64];
     if (!json_is_object(object))
         return spl_fail_field(err, SPL_E_INPUT, path, "%s must be an object, not %s", path, spl_json_type_name(object));
     json_object_foreach((json_t *)object, name, value)
@@ -305,15 +305,81 @@ static int read_ros(const json_t *json, struct spl_value *values, struct spl_err
     return set_lens(values, raw ? "ros.k" : "ros.p", raw ? k : p, err);
 }
 
+static int read_transform(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char name[] = "nerfstudio.transform_matrix";
+    const json_t *rows = json_object_get(json, "transform_matrix");
+    double m[16];
+    for (size_t i = 0; i < 16; i++) {
+        const json_t *row = json_array_get(rows, i / 4), *number = json_array_get(row, i % 4);
+        if (json_array_size(rows) != 4 || json_array_size(row) != 4 || !json_is_number(number))
+            return spl_fail_field(err, SPL_E_INPUT, name, "%s must be 4 rows of 4 numbers; row %zu, column %zu is %s",
+                                  name, i / 4 + 1, i % 4 + 1, spl_json_type_name(number));
+        m[i] = json_number_value(number);
+    }
+    return set_pose(values, name, m, SPL_AXES_OPENGL, err);
+}
+
+/* A frame with its own lens, as nerfstudio and instant-ngp know it; what stands beside `frames` is copied into it. */
+static int read_nerfstudio(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"camera_model", "fl_x", "fl_y", "cx", "cy", "w",  "h",
+                                        "k1",           "k2",   "k3",   "k4", "p1", "p2", "transform_matrix",
+                                        "file_path",    NULL};
+    static const struct {
+        const char *name;
+        enum spl_camera_param param;
+        enum spl_value_kind kind;
+        bool needed;
+    } lens[] = {
+        {"nerfstudio.w", SPL_CAMERA_width, SPL_KIND_COUNT, true},
+        {"nerfstudio.h", SPL_CAMERA_height, SPL_KIND_COUNT, true},
+        {"nerfstudio.fl_x", SPL_CAMERA_fx, SPL_KIND_NUMBER, true},
+        {"nerfstudio.fl_y", SPL_CAMERA_fy, SPL_KIND_NUMBER, false},
+        {"nerfstudio.cx", SPL_CAMERA_cx, SPL_KIND_NUMBER, false},
+        {"nerfstudio.cy", SPL_CAMERA_cy, SPL_KIND_NUMBER, false},
+    };
+    const json_t *model = json_object_get(json, "camera_model");
+    const char *kind = model ? json_string_value(model) : "OPENCV";
+    char field[64];
+    int rc = check_object(json, "nerfstudio", known, err);
+    if (rc)
+        return rc;
+    if (!kind || (strcmp(kind, "OPENCV") && strcmp(kind, "PINHOLE") && strcmp(kind, "SIMPLE_PINHOLE")))
+        return spl_fail_field(err, SPL_E_INPUT, "nerfstudio.camera_model",
+                              "nerfstudio.camera_model must be PINHOLE, SIMPLE_PINHOLE or OPENCV, not %.32s; undistort "
+                              "the images, only pinholes are drawn",
+                              kind ? kind : spl_json_type_name(model));
+    for (int i = 7; i < 13; i++) { /* k1 to p2 */
+        const json_t *bent = json_object_get(json, known[i]);
+        snprintf(field, sizeof field, "nerfstudio.%s", known[i]);
+        if (bent && !(json_is_number(bent) && json_number_value(bent) == 0))
+            return spl_fail_field(err, SPL_E_INPUT, field,
+                                  "%s must be 0: undistort the images, only pinholes are drawn", field);
+    }
+    for (size_t i = 0; i < sizeof lens / sizeof *lens; i++) {
+        struct spl_value *value = &values[lens[i].param];
+        double number = 0;
+        if (!lens[i].needed && !get(json, lens[i].name))
+            continue;
+        if ((rc = spl_json_get_number(json, lens[i].name, &number, err)) ||
+            (rc = set_number(values, lens[i].param, lens[i].name, number, err)) ||
+            (rc = spl_value_check(value, lens[i].kind, lens[i].name, err)))
+            return rc;
+    }
+    return read_transform(json, values, err);
+}
+
 int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum spl_camera_param form,
                               const json_t *json, struct spl_error *err)
 {
     return form == SPL_CAMERA_gltf     ? read_gltf(json, values, err)
            : form == SPL_CAMERA_open3d ? read_open3d(json, values, err)
-                                       : read_ros(json, values, err);
+           : form == SPL_CAMERA_ros    ? read_ros(json, values, err)
+                                       : read_nerfstudio(json, values, err);
 }
 
 bool spl_camera_form_has_size(const json_t *camera)
 {
-    return json_object_get(camera, "open3d") || json_object_get(camera, "ros");
+    return json_object_get(camera, "open3d") || json_object_get(camera, "ros") || json_object_get(camera, "nerfstudio");
 }

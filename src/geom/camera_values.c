@@ -151,12 +151,13 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
     bool free_pose = given(v, SPL_CAMERA_matrix) || given(v, SPL_CAMERA_q) || given(v, SPL_CAMERA_t);
     if (!free_pose && !given(v, SPL_CAMERA_eye))
         return spl_fail_field(err, SPL_E_INPUT, "eye",
-                              "a pose is missing: eye and target, matrix, q and t, gltf.matrix or open3d");
+                              "a pose is missing: eye and target, matrix, q and t, gltf.matrix, open3d or nerfstudio");
     if (!free_pose && !given(v, SPL_CAMERA_target))
         return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
     if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model))
-        return spl_fail_field(err, SPL_E_INPUT, "fov",
-                              "intrinsics are missing: fov, fx, model and params, gltf.perspective, open3d or ros");
+        return spl_fail_field(
+            err, SPL_E_INPUT, "fov",
+            "intrinsics are missing: fov, fx, model and params, gltf.perspective, open3d, ros or nerfstudio");
     return 0;
 }
 

@@ -43,7 +43,8 @@ BODIES = [
     ('{"camera":{"gltf":{"orthographic":{}}}}', "gltf.orthographic"), ('{"camera":{"gltf":{"matrix":[0]}}}', "gltf.matrix"),
     ('{"camera":{"gltf":{"perspective":{"yfov":1,"znear":1,"aspectRatio":2}}},"width":8,"height":8}',
      "gltf.perspective.aspectRatio"), ('{"camera":{"open3d":{}}}', "open3d.intrinsic"),
-    ('{"camera":{"ros":{"k":[5,0,2,0,5,2,0,0,1],"d":[0.1],"width":4,"height":4}}}', "ros.d"), ('{"gltf":{}}', "gltf"),
+    ('{"camera":{"ros":{"k":[5,0,2,0,5,2,0,0,1],"d":[0.1],"width":4,"height":4}}}', "ros.d"),
+    ('{"camera":{"nerfstudio":{"transform_matrix":[[1,0,0,0]],"fl_x":5,"w":4,"h":4}}}', "nerfstudio.transform_matrix"), ('{"gltf":{}}', "gltf"),
     ('{"budget":0}', "budget"), ('{"budget":"0ms"}', "budget"), ('{"budget":[5]}', "budget"),
     ('{"budget":true}', "budget"), ('{"psnr":"38"}', "psnr"), ('{"camera":{"psnr":38}}', "psnr"), ("[" * 100000, "body"),
 ]

@@ -181,6 +181,9 @@ def test_cameras_of_other_programs_are_the_same_camera():
                     "intrinsic": {"intrinsic_matrix": [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1], **size}}, **around},
         {"ros": {"k": [50, 0, 31.5, 0, 50, 23.5, 0, 0, 1], **zeros}, **pose, **around},
         {"ros": {"p": [50, 0, 31.5, 0, 0, 50, 23.5, 0, 0, 0, 1, 0], **zeros}, **pose, **around},
+        {"nerfstudio": {"camera_model": "OPENCV", "file_path": "images/1.jpg", "w": 64, "h": 48, "fl_x": 50, "fl_y": 50, "cx": 32,
+                        "cy": 24, **{name: 0 for name in ("k1", "k2", "k3", "k4", "p1", "p2")},
+                        "transform_matrix": [node[i::4] for i in range(4)]}, **around},
     ]
     with Daemon(REAL) as d:
         first = json.loads(d.view(eye="3,0,1", target="0,0,1", up="0,0,1", fx=50, **around, **size).headers["Splatd-Camera"])

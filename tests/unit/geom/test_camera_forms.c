@@ -36,6 +36,9 @@
 #define INTRINSIC SIZE ",\"intrinsic_matrix\":[500,0,0,0,510,0,330.75,228,1]"
 #define ROS(members) "{\"camera\":{" POSE ",\"ros\":{" SIZE "," members "},\"near\":1}}"
 
+#define ROWS "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"
+#define FRAME(members, rows) "{\"camera\":{\"nerfstudio\":{" members ",\"transform_matrix\":" rows "},\"near\":1}}"
+
 static int read_camera(const char *text, const struct spl_camera_defaults *defaults, struct spl_camera *camera,
                        struct spl_error *err)
 {
@@ -70,6 +73,12 @@ static void every_form_hits_the_golden_pixel(void **state)
         {ROS("\"k\":" K ",\"d\":[0,0,0,0,0],\"distortion_model\":\"plumb_bob\""), 412.5, 273.125, 1, INFINITY},
         {ROS("\"p\":" P ",\"d\":[]"), 412.5, 273.125, 1, INFINITY},
         {ROS("\"k\":" K ",\"p\":" P), 412.5, 273.125, 1, INFINITY},
+        {FRAME("\"w\":640,\"h\":480,\"fl_x\":500,\"fl_y\":510,\"cx\":331.25,\"cy\":228.5,\"k1\":0,\"p2\":0,"
+               "\"camera_model\":\"PINHOLE\",\"file_path\":\"a.png\"",
+               "[[0.78387787227503695,-0.30826946648440512,0.53898554469575628,2.5],"
+               "[0.60698607043454015,0.19761352719368059,-0.76975113132005719,-3.5],"
+               "[0.13077993598406572,0.93054759679636629,0.34202014332566873,1.75],[0,0,0,1]]"),
+         412.5, 273.125, 1, INFINITY},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_camera camera;
@@ -190,6 +199,24 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{" POSE ",\"fov\":60,\"ros\":{\"k\":" K "," SIZE "}}}", "fov"},
         {"{\"camera\":{" POSE ",\"fx\":60,\"ros\":{\"k\":" K "," SIZE "}}}", "ros.k"},
         {"{\"camera\":{\"ros\":{\"k\":" K "," SIZE "}}}", "eye"},
+        {"{\"camera\":{\"nerfstudio\":0}}", "nerfstudio"},
+        {FRAME("\"frames\":[]", ROWS), "nerfstudio.frames"},
+        {FRAME("\"h\":4,\"fl_x\":5", ROWS), "nerfstudio.w"},
+        {FRAME("\"w\":4,\"h\":4.5,\"fl_x\":5", ROWS), "nerfstudio.h"},
+        {FRAME("\"w\":4,\"h\":0,\"fl_x\":5", ROWS), "nerfstudio.h"},
+        {FRAME("\"w\":4,\"h\":4", ROWS), "nerfstudio.fl_x"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":0", ROWS), "nerfstudio.fl_x"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"fl_y\":-5", ROWS), "nerfstudio.fl_y"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"cx\":\"2\"", ROWS), "nerfstudio.cx"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"k4\":0.1", ROWS), "nerfstudio.k4"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"p2\":null", ROWS), "nerfstudio.p2"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"camera_model\":\"OPENCV_FISHEYE\"", ROWS), "nerfstudio.camera_model"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", I16), "nerfstudio.transform_matrix"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]"), "nerfstudio.transform_matrix"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"),
+         "nerfstudio.transform_matrix"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[4,5,6,1]]"),
+         "nerfstudio.transform_matrix"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_camera camera;
