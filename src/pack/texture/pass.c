@@ -242,8 +242,12 @@ static int even_out(struct pass *pass, struct spl_error *err)
     }
 }
 
+/* Resampling may lose this much more than a texture is coded to: the limit of eight atoms keeps coding below its aim,
+ * and texels that are four times as many cost more bytes than they show. */
+static const double resampling_slack = 2; /* dB */
+
 /* Leaves are what is looked at closely; those of the photograph that most splats chose stand for all. The smallest
- * size whose resampling loses less than coding will. */
+ * size whose resampling loses hardly more than coding will. */
 static int choose_size(struct pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
 {
     double quality = pass->options->texture_quality > 0 ? pass->options->texture_quality : 40;
@@ -263,7 +267,7 @@ static int choose_size(struct pass *pass, const struct spl_dataset *dataset, str
         double mean = error[k].squared / fmax((double)error[k].values, 1);
         pass->report->texture_size = 8u << k;
         pass->report->resampling_psnr = mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
-        if (pass->report->resampling_psnr > quality)
+        if (pass->report->resampling_psnr > quality - resampling_slack)
             break;
     }
     return SPL_OK;
