@@ -1,9 +1,7 @@
-/* All frames of a tour as one ZIP file, made by libarchive while it is sent: entries are stored, since images are
- * compressed already, and read one at a time, so that nothing lies on disk twice and one frame lies in memory.
+/* All frames of a tour as one ZIP file, made while it is sent: frames are read one at a time, so that nothing lies on
+ * disk twice and one frame lies in memory.
  *
  * Invariant: `piece` holds what libarchive has written and MHD has not taken. Owned by the loop's thread. */
-#include <archive.h>
-#include <archive_entry.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +9,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "service/tour/tour.h"
+#include "service/zip.h"
 
 struct zip {
     struct spl_tour *tour; // held; its `readers`
@@ -38,23 +37,6 @@ static la_ssize_t on_write(struct archive *archive, void *context, const void *b
     return (la_ssize_t)length;
 }
 
-static bool add_entry(struct zip *zip, const char *name, const uint8_t *bytes, size_t length)
-{
-    struct archive_entry *entry = archive_entry_new();
-    if (!entry)
-        return false;
-    archive_entry_set_pathname(entry, name);
-    archive_entry_set_filetype(entry, AE_IFREG);
-    archive_entry_set_perm(entry, 0644);
-    archive_entry_set_size(entry, (la_int64_t)length);
-    archive_entry_set_mtime(entry, (time_t)zip->tour->ended_s, 0);
-    bool good = archive_write_header(zip->archive, entry) == ARCHIVE_OK &&
-                archive_write_data(zip->archive, bytes, length) == (la_ssize_t)length &&
-                archive_write_finish_entry(zip->archive) == ARCHIVE_OK;
-    archive_entry_free(entry);
-    return good;
-}
-
 /* The next frame that was made, or the directory behind the last. */
 static bool make_piece(struct zip *zip)
 {
@@ -71,7 +53,7 @@ static bool make_piece(struct zip *zip)
     spl_tour_file_name(tour, zip->next++, name);
     if (spl_tour_store_read(tour->tours->directory, tour->name, name, SIZE_MAX / 2, &bytes, &length, NULL))
         return false;
-    bool good = add_entry(zip, name, bytes, length);
+    bool good = spl_zip_add(zip->archive, name, bytes, length, (time_t)tour->ended_s);
     free(bytes);
     return good;
 }
@@ -118,9 +100,8 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour)
         return;
     zip->tour = tour;
     zip->connection = request->connection;
-    struct archive *archive = zip->archive = archive_write_new();
-    if (!archive || archive_write_set_format_zip(archive) || archive_write_zip_set_compression_store(archive) ||
-        archive_write_set_bytes_per_block(archive, 0) || archive_write_open(archive, zip, NULL, on_write, NULL)) {
+    zip->archive = spl_zip_open(zip, on_write);
+    if (!zip->archive) {
         zip_free(zip);
         return;
     }

@@ -1,20 +1,18 @@
 /* Bodies of several files.
  *
  * The boundary of multipart is one random string for ever: 128 bits that no image holds but by design of its owner, and
- * equal requests keep equal bytes. Entries of a ZIP file have no time for the same reason, and are stored, since images
- * are compressed already. */
+ * equal requests keep equal bytes. Entries of a ZIP file have no time for the same reason. */
 #include "service/view/bundle.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <archive.h>
-#include <archive_entry.h>
 #include <jansson.h>
 
 #include "base/memory.h"
 #include "service/headers.h"
+#include "service/zip.h"
 
 #define BOUNDARY "splatd-b1f64e2a9c7d4e0583a6d7f25c10e98b"
 
@@ -55,21 +53,6 @@ static la_ssize_t on_write(struct archive *archive, void *context, const void *b
     return (la_ssize_t)fwrite(bytes, 1, length, context);
 }
 
-static bool add_entry(struct archive *zip, const char *name, const void *bytes, size_t length)
-{
-    struct archive_entry *entry = archive_entry_new();
-    if (!entry)
-        return false;
-    archive_entry_set_pathname(entry, name);
-    archive_entry_set_filetype(entry, AE_IFREG);
-    archive_entry_set_perm(entry, 0644);
-    archive_entry_set_size(entry, (la_int64_t)length);
-    bool good = archive_write_header(zip, entry) == ARCHIVE_OK &&
-                (!length || archive_write_data(zip, bytes, length) == (la_ssize_t)length);
-    archive_entry_free(entry);
-    return good;
-}
-
 static char *make_index(const struct spl_part *parts, size_t count)
 {
     json_t *index = json_array();
@@ -87,15 +70,12 @@ static char *make_index(const struct spl_part *parts, size_t count)
 
 static int write_zip(FILE *stream, const struct spl_part *parts, size_t count, struct spl_error *err)
 {
-    struct archive *zip = archive_write_new();
+    struct archive *zip = spl_zip_open(stream, on_write);
     char *index = make_index(parts, count);
-    bool good = zip && index && archive_write_set_format_zip(zip) == ARCHIVE_OK &&
-                archive_write_zip_set_compression_store(zip) == ARCHIVE_OK &&
-                archive_write_set_bytes_in_last_block(zip, 1) == ARCHIVE_OK &&
-                archive_write_open(zip, stream, NULL, on_write, NULL) == ARCHIVE_OK;
+    bool good = zip && index;
     for (size_t i = 0; good && i < count; i++)
-        good = add_entry(zip, parts[i].name, parts[i].bytes, parts[i].length);
-    good = good && add_entry(zip, "index.json", index, strlen(index)) && archive_write_close(zip) == ARCHIVE_OK;
+        good = spl_zip_add(zip, parts[i].name, parts[i].bytes, parts[i].length, 0);
+    good = good && spl_zip_add(zip, "index.json", index, strlen(index), 0) && archive_write_close(zip) == ARCHIVE_OK;
     int rc = good ? 0 : spl_fail(err, SPL_E_NOMEM, "out of memory for a ZIP file of %zu images", count);
     archive_write_free(zip);
     free(index);
