@@ -80,7 +80,7 @@ static bool find_color(const struct spl_photo *photo, const struct spl_world_spl
         for (int c = 0; c < 3; c++)
             p[c] = s->position[c] + (double)s->splat.radius * (a * (double)u[c] + b * (double)v[c]);
         if (!spl_distortion_project(&photo->view->camera, &photo->view->distortion, p, pixel, &depth) ||
-            !spl_photo_sample(photo, pixel, footprint, rgb))
+            !spl_pyramid_sample(&photo->pixels, pixel, footprint, rgb))
             continue;
         for (int c = 0; c < 3; c++)
             sum[c] += weight * rgb[c];

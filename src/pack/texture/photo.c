@@ -1,8 +1,7 @@
 /* A photograph, its pyramid, and the depths of the splats from its eye.
  *
  * The depth map is drawn by the renderer from the dataset that is textured, so what hides a splat is what hides it in a
- * frame. It is a pinhole's: a distorted photograph gets one that holds all that its lens saw. Levels are averages in
- * sRGB as stored, weighted by alpha, so that a transparent sky does not bleed into what stands before it. */
+ * frame. It is a pinhole's: a distorted photograph gets one that holds all that its lens saw. */
 #include "pack/texture/photo.h"
 
 #include <math.h>
@@ -15,42 +14,14 @@
 enum { black = 6, border_steps = 32 };
 static const double widest = 5; /* tangent of the angle off the axis to which depth is drawn */
 
-static int make_levels(struct spl_photo *photo, struct spl_error *err)
-{
-    for (uint32_t l = 1; l < SPL_PHOTO_LEVELS_MAX && (photo->width[l - 1] > 1 || photo->height[l - 1] > 1); l++) {
-        uint32_t w = photo->width[l - 1], h = photo->height[l - 1];
-        uint32_t width = photo->width[l] = (w + 1) / 2, height = photo->height[l] = (h + 1) / 2;
-        uint8_t *out = photo->texels[l] = spl_alloc_raw((size_t)width * height, 4, err);
-        if (!out)
-            return SPL_E_NOMEM;
-        photo->levels = l + 1;
-        for (uint32_t y = 0; y < height; y++)
-            for (uint32_t x = 0; x < width; x++, out += 4) {
-                unsigned sum[4] = {0};
-                for (int i = 0; i < 4; i++) {
-                    uint32_t sx = 2 * x + (uint32_t)(i % 2), sy = 2 * y + (uint32_t)(i / 2);
-                    const uint8_t *in =
-                        photo->texels[l - 1] + 4 * ((size_t)(sy < h ? sy : h - 1) * w + (sx < w ? sx : w - 1));
-                    for (int c = 0; c < 3; c++)
-                        sum[c] += (unsigned)in[c] * in[3];
-                    sum[3] += in[3];
-                }
-                for (int c = 0; c < 3; c++)
-                    out[c] = (uint8_t)(sum[3] ? (sum[c] + sum[3] / 2) / sum[3] : 0);
-                out[3] = (uint8_t)((sum[3] + 2) / 4);
-            }
-    }
-    return SPL_OK;
-}
-
 /* Mean difference of neighbours in green. */
 static double contrast(const struct spl_photo *photo, uint32_t level)
 {
     uint64_t sum = 0;
-    uint32_t w = photo->width[level], h = photo->height[level];
+    uint32_t w = photo->pixels.width[level], h = photo->pixels.height[level];
     for (uint32_t y = 0; y < h; y++)
         for (uint32_t x = 1; x < w; x++) {
-            const uint8_t *p = photo->texels[level] + 4 * ((size_t)y * w + x);
+            const uint8_t *p = photo->pixels.texels[level] + 4 * ((size_t)y * w + x);
             sum += (uint64_t)abs(p[1] - p[-3]);
         }
     return (double)sum / ((double)w * h);
@@ -59,16 +30,16 @@ static double contrast(const struct spl_photo *photo, uint32_t level)
 /* A sharp photograph differs from pixel to pixel as much at full size as at half size, a blurred one half as much. */
 static double find_sharpness(const struct spl_photo *photo)
 {
-    double half = photo->levels > 2 ? contrast(photo, 1) : 0;
+    double half = photo->pixels.levels > 2 ? contrast(photo, 1) : 0;
     double ratio = half > 0 ? contrast(photo, 0) / half : 1;
     return fmin(fmax((ratio - 0.4) / 0.4, 0.2), 1);
 }
 
 static bool is_black(const struct spl_photo *photo)
 {
-    size_t count = (size_t)photo->width[0] * photo->height[0];
+    size_t count = (size_t)photo->pixels.width[0] * photo->pixels.height[0];
     for (size_t i = 0; i < count; i++) {
-        const uint8_t *p = photo->texels[0] + 4 * i;
+        const uint8_t *p = photo->pixels.texels[0] + 4 * i;
         if (p[3] && (p[0] > black || p[1] > black || p[2] > black))
             return false;
     }
@@ -80,20 +51,16 @@ int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, s
 {
     const struct spl_camera *camera = &view->camera;
     const char *path = view->photograph ? view->photograph : view->name;
-    *photo = (struct spl_photo){.view = view, .levels = 1};
-    photo->texels[0] = pixels->pixels;
-    photo->width[0] = pixels->width;
-    photo->height[0] = pixels->height;
-    *pixels = (struct spl_image){0};
-    int rc = SPL_OK;
-    if (photo->width[0] != camera->width || photo->height[0] != camera->height)
+    *photo = (struct spl_photo){.view = view};
+    int rc = spl_pyramid_init(&photo->pixels, pixels, err);
+    if (rc)
+        return rc;
+    if (photo->pixels.width[0] != camera->width || photo->pixels.height[0] != camera->height)
         rc = spl_fail_field(err, SPL_E_INPUT, "width",
                             "%s: %u x %u pixels; its camera says %u x %u: scale the photograph or its lens", path,
-                            photo->width[0], photo->height[0], camera->width, camera->height);
+                            photo->pixels.width[0], photo->pixels.height[0], camera->width, camera->height);
     else if (is_black(photo))
         rc = spl_fail(err, SPL_E_INPUT, "%s: nothing but black", path);
-    if (!rc)
-        rc = make_levels(photo, err);
     if (!rc)
         photo->sharpness = find_sharpness(photo);
     if (rc)
@@ -203,48 +170,9 @@ int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, s
 
 void spl_photo_close(struct spl_photo *photo)
 {
-    for (uint32_t l = 0; l < SPL_PHOTO_LEVELS_MAX; l++)
-        free(photo->texels[l]);
+    spl_pyramid_finish(&photo->pixels);
     spl_image_finish(&photo->depth);
     *photo = (struct spl_photo){0};
-}
-
-/* Adds `share` of the bilinear colour of a level to sum[4], premultiplied. */
-static void add_bilinear(const struct spl_photo *photo, uint32_t level, const double pixel[2], float share,
-                         float sum[4])
-{
-    int w = (int)photo->width[level], h = (int)photo->height[level];
-    double x = ldexp(pixel[0], -(int)level) - 0.5, y = ldexp(pixel[1], -(int)level) - 0.5;
-    int x0 = (int)floor(x), y0 = (int)floor(y);
-    float fx = (float)(x - x0), fy = (float)(y - y0);
-    for (int i = 0; i < 4; i++) {
-        int sx = x0 + i % 2, sy = y0 + i / 2;
-        sx = sx < 0 ? 0 : sx < w ? sx : w - 1;
-        sy = sy < 0 ? 0 : sy < h ? sy : h - 1;
-        const uint8_t *p = photo->texels[level] + 4 * ((size_t)sy * (size_t)w + (size_t)sx);
-        float weight = share * (i % 2 ? fx : 1 - fx) * (i / 2 ? fy : 1 - fy) * (float)p[3];
-        for (int c = 0; c < 3; c++)
-            sum[c] += weight * (float)p[c];
-        sum[3] += weight;
-    }
-}
-
-bool spl_photo_sample(const struct spl_photo *photo, const double pixel[2], double footprint, float rgb[3])
-{
-    if (!(pixel[0] >= 0 && pixel[0] <= photo->width[0] && pixel[1] >= 0 && pixel[1] <= photo->height[0]))
-        return false;
-    double level = footprint > 1 ? log2(footprint) : 0;
-    level = fmin(level, photo->levels - 1);
-    uint32_t l = (uint32_t)level;
-    float sum[4] = {0}, rest = (float)(level - l);
-    add_bilinear(photo, l, pixel, 1 - rest, sum);
-    if (rest > 0 && l + 1 < photo->levels)
-        add_bilinear(photo, l + 1, pixel, rest, sum);
-    if (sum[3] < 128)
-        return false;
-    for (int c = 0; c < 3; c++)
-        rgb[c] = sum[c] / sum[3];
-    return true;
 }
 
 enum spl_sight spl_photo_see(const struct spl_photo *photo, const double p[3], double slack)

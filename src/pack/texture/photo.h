@@ -6,16 +6,14 @@
 #include <splatd/render.h>
 
 #include "cloud/views.h"
-
-enum { SPL_PHOTO_LEVELS_MAX = 16 };
+#include "image/pyramid.h"
 
 struct spl_photo {
     const struct spl_named_view *view; // borrowed
-    uint32_t levels, width[SPL_PHOTO_LEVELS_MAX], height[SPL_PHOTO_LEVELS_MAX];
-    uint8_t *texels[SPL_PHOTO_LEVELS_MAX]; /* RGBA; level 0 is the file, each next one half of it */
-    struct spl_camera depth_camera;        /* the same eye, a pinhole that holds the whole of the photograph */
-    struct spl_image depth;                /* of the splats; NaN = nothing */
-    double sharpness;                      /* 0.2 (blurred) to 1 */
+    struct spl_pyramid pixels;
+    struct spl_camera depth_camera; /* the same eye, a pinhole that holds the whole of the photograph */
+    struct spl_image depth;         /* of the splats; NaN = nothing */
+    double sharpness;               /* 0.2 (blurred) to 1 */
 };
 
 /* Loads the view's photograph and renders the dataset's depth, at most `depth_side` samples a side. Refuses what is no
@@ -32,10 +30,6 @@ int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, s
 
 /* What an opened photograph holds. */
 uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side);
-
-/* The colour (0..255) at `pixel`, averaged over about `footprint` pixels; false outside and where most of it is
- * transparent. */
-bool spl_photo_sample(const struct spl_photo *photo, const double pixel[2], double footprint, float rgb[3]);
 
 /* How world point `p` at view depth `depth` lies to the splats in front of it. `slack`: metres that count as the same
  * surface. */

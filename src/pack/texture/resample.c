@@ -74,7 +74,7 @@ static bool take(const struct spl_photo *photo, const struct spl_tone *tone, con
     for (int i = 0; i < 3; i++)
         c[i] = f->origin[i] + a * f->u[i] + b * f->v[i];
     if (!spl_distortion_place(&photo->view->camera, &photo->view->distortion, c, pixel) ||
-        !spl_photo_sample(photo, pixel, footprint, rgb))
+        !spl_pyramid_sample(&photo->pixels, pixel, footprint, rgb))
         return false;
     for (int i = 0; i < 3; i++)
         rgb[i] = fminf(fmaxf(rgb[i] * tone->factor[i] + tone->offset[i], 0), 255);

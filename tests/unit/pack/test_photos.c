@@ -48,7 +48,7 @@ static void what_is_no_photograph_of_the_camera_is_refused(void **state)
     struct spl_image image = make_image(side, side - 1, 9, 9);
     assert_int_equal(spl_photo_init(&photo, &view, &image, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "a.png: 64 x 63"));
-    assert_null(photo.texels[0]);
+    assert_null(photo.pixels.texels[0]);
     err = (struct spl_error){0};
     image = make_image(side, side, 3, 3);
     assert_int_equal(spl_photo_init(&photo, &view, &image, &err), SPL_E_INPUT);
@@ -78,14 +78,14 @@ static void samples_follow_the_footprint_and_leave_the_sky_out(void **state)
     }
     assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
     float rgb[3];
-    assert_true(spl_photo_sample(&photo, (double[]){10.5, 50.5}, 1, rgb) && rgb[0] == 40);
-    assert_true(spl_photo_sample(&photo, (double[]){50.5, 50.5}, 1, rgb) && rgb[0] == 200);
-    assert_true(spl_photo_sample(&photo, (double[]){32, 50}, 1, rgb) && fabsf(rgb[0] - 120) < 0.01f);
-    assert_true(spl_photo_sample(&photo, (double[]){34.5, 50}, 16, rgb) && rgb[0] > 110 && rgb[0] < 180);
-    assert_true(spl_photo_sample(&photo, (double[]){10.5, 32.2}, 1, rgb) && rgb[0] == 40);
-    assert_false(spl_photo_sample(&photo, (double[]){10.5, 10.5}, 1, rgb));
-    assert_false(spl_photo_sample(&photo, (double[]){-0.1, 50}, 1, rgb));
-    assert_false(spl_photo_sample(&photo, (double[]){10, NAN}, 1, rgb));
+    assert_true(spl_pyramid_sample(&photo.pixels, (double[]){10.5, 50.5}, 1, rgb) && rgb[0] == 40);
+    assert_true(spl_pyramid_sample(&photo.pixels, (double[]){50.5, 50.5}, 1, rgb) && rgb[0] == 200);
+    assert_true(spl_pyramid_sample(&photo.pixels, (double[]){32, 50}, 1, rgb) && fabsf(rgb[0] - 120) < 0.01f);
+    assert_true(spl_pyramid_sample(&photo.pixels, (double[]){34.5, 50}, 16, rgb) && rgb[0] > 110 && rgb[0] < 180);
+    assert_true(spl_pyramid_sample(&photo.pixels, (double[]){10.5, 32.2}, 1, rgb) && rgb[0] == 40);
+    assert_false(spl_pyramid_sample(&photo.pixels, (double[]){10.5, 10.5}, 1, rgb));
+    assert_false(spl_pyramid_sample(&photo.pixels, (double[]){-0.1, 50}, 1, rgb));
+    assert_false(spl_pyramid_sample(&photo.pixels, (double[]){10, NAN}, 1, rgb));
     spl_photo_close(&photo);
 }
 
@@ -347,7 +347,7 @@ static void textures_show_the_plane_and_not_the_view(void **state)
     for (int i = 0; i < 200 * 200; i++) {
         depth[i] = i % 200 > (int)middle[0] + 4 ? 0.5f : (float)at;
         if (i % 200 > (int)middle[0] + 4)
-            pixels = photo.texels[0] + 4 * (size_t)i, pixels[0] = pixels[1] = pixels[2] = 255;
+            pixels = photo.pixels.texels[0] + 4 * (size_t)i, pixels[0] = pixels[1] = pixels[2] = 255;
     }
     assert_true(spl_texture_resample(&photo, &tone, &splat, 16, texture));
     for (int i = 0; i < 256; i++)
