@@ -118,7 +118,7 @@ struct spl_draw_chunk {
     SPL_F32 radius_min, radius_step;      /* metres, already scaled for the drawn fraction (prune and scale) */
     SPL_U32 geometry_word;                /* offset in the page, 32-bit words */
     SPL_U32 color_word;
-    SPL_U32 geometry_bits;                /* SPL_GEOMETRY_*: widths of x y z u v radius, and the normals' axis */
+    SPL_U32 geometry_bits;                /* SPL_GEOMETRY_*: widths of x y z u v radius, normals' axis, linear */
     SPL_U32 color_bits;                   /* SPL_COLOR_*: widths of y u v and the base of y */
     SPL_U32 color_base;                   /* int16 base of u (low half) and v (high half) */
     SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
@@ -129,9 +129,11 @@ struct spl_draw_chunk {
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
- * axis 27..28: the world axis a that is the octahedron's +z (0 x, 1 y, 2 z), the other two following cyclically; bit 29:
- * the whole vector is negated. Decoding: l = octahedral decode of (u, v), sign = bit 29 ? -1 : 1,
- * n[(a + 1) % 3] = sign * l.x, n[(a + 2) % 3] = sign * l.y, n[a] = sign * l.z. */
+ * axis 27..28: the world axis a that is the octahedron's +z (0 x, 1 y, 2 z), the other two following cyclically; bit
+ * 29: the whole vector is negated. Decoding: l = octahedral decode of (u, v), sign = bit 29 ? -1 : 1, n[(a + 1) % 3] =
+ * sign * l.x, n[(a + 2) % 3] = sign * l.y, n[a] = sign * l.z. Bits 30..31: which splats are linear (lie on a wire, a
+ * pole, a cable): 0 none, SPL_LINEAR_ALL, or SPL_LINEAR_SOME, those whose bit is set in the mask of SPL_LINEAR_WORDS
+ * words right before the colours. */
 #define SPL_GEOMETRY_X 0
 #define SPL_GEOMETRY_Y 5
 #define SPL_GEOMETRY_Z 10
@@ -139,9 +141,13 @@ struct spl_draw_chunk {
 #define SPL_GEOMETRY_V 19
 #define SPL_GEOMETRY_RADIUS 23
 #define SPL_GEOMETRY_AXIS 27
+#define SPL_GEOMETRY_LINEAR 30
+#define SPL_LINEAR_ALL 1
+#define SPL_LINEAR_SOME 2
+#define SPL_LINEAR_WORDS 4 /* SPL_CHUNK_SPLATS / 32 */
 /* color_bits: y 0..3, u 4..7, v 8..11 (0..9 bits each), base of y 16..23. Colour is the reversible transform of 8 bit
- * RGB: u = b - g, v = r - g, y = g + floor((u + v) / 4); decoding: g = y - floor((u + v) / 4), b = u + g, r = v + g, each
- * clamped to 0..255 (which only a forged file needs). */
+ * RGB: u = b - g, v = r - g, y = g + floor((u + v) / 4); decoding: g = y - floor((u + v) / 4), b = u + g, r = v + g,
+ * each clamped to 0..255 (which only a forged file needs). */
 #define SPL_COLOR_Y 0
 #define SPL_COLOR_U 4
 #define SPL_COLOR_V 8
@@ -187,6 +193,7 @@ struct spl_frame_params {
 };
 
 #ifndef SPL_GLSL
+_Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
 _Static_assert(sizeof(struct spl_frame_params) == 128, "spl_frame_params is 128 bytes on both sides");

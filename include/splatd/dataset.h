@@ -21,6 +21,7 @@ enum spl_attribute {
     SPL_ATTRIBUTE_COLOR,
     SPL_ATTRIBUTE_CLASS,
     SPL_ATTRIBUTE_UNCERTAINTY,
+    SPL_ATTRIBUTE_LINEAR,
     SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,
@@ -42,6 +43,8 @@ struct spl_dataset_info {
     double default_eye[3], default_target[3], default_up[3], default_fov; /* a view that shows the dataset */
     double splat_radius;       /* median radius of the leaf splats */
     bool has_color, has_class, has_uncertainty;
+    bool has_surface; /* normals and radii; false: bare points, whose radii are those of a grid of their density */
+    bool has_linear;  /* some splats lie on wires, poles or cables, and are marked */
     uint32_t atoms, texture_size; /* of the dictionary: atoms of texture_size x texture_size texels; 0 = no textures */
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
 };

@@ -175,6 +175,14 @@ splat load_splat(spl_draw_chunk chunk, uint index, bool position_only)
     return s;
 }
 
+/* Whether splat `index` lies on a wire, a pole or a cable. */
+bool is_linear(spl_draw_chunk chunk, uint index)
+{
+    uint mode = chunk.geometry_bits >> SPL_GEOMETRY_LINEAR, some = mode / SPL_LINEAR_SOME;
+    uint mask = page_word(chunk.color_word - some * (SPL_LINEAR_WORDS - (index >> 5)));
+    return (mode & (SPL_LINEAR_ALL | ((mask >> (index & 31u)) << 1))) != 0u;
+}
+
 /* 8 bit sRGB, exact. */
 uvec3 load_color(spl_draw_chunk chunk, uint index)
 {

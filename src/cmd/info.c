@@ -44,6 +44,7 @@ struct report {
     uint32_t level_count;
     double widths[code_count][width_max + 1]; /* shares of the codes */
     uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
+    uint64_t linear;                          /* points on wires, poles and cables */
 };
 
 static void usage(FILE *out)
@@ -107,7 +108,8 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
                 report->widths[k][width] +=
                     (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
             }
-    return spl_dataset_count_atoms(dataset, report->atoms, err);
+    int rc = spl_dataset_count_linear(dataset, &report->linear, err);
+    return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }
 
 static double bytes_per_splat(const struct spl_dataset_info *info, enum spl_attribute attribute)
@@ -152,6 +154,9 @@ static void print_table(const struct report *report)
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
     printf("  given         %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
            info->has_uncertainty ? ", uncertainty" : "");
+    printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
+    printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
+           100.0 * (double)report->linear / (double)info->leaf_splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
@@ -234,7 +239,7 @@ static json_t *to_json(const struct report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b}, s:I, s:o, s:o, s:o, s:o, s:O}",
+        "s:b, s:b}, s:I, s:I, s:o, s:o, s:o, s:o, s:O}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -242,8 +247,10 @@ static json_t *to_json(const struct report *report)
         vector(info->bounds_max), "default_view", "eye", vector(info->default_eye), "target",
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
-        (int)info->has_uncertainty, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes, "by_level",
-        levels, "widths", widths, "textures", textures_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
+        (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
+        "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes, "by_level", levels, "widths", widths,
+        "textures", textures_to_json(report), "sources",
+        json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
 }
 
 static int print_json(const struct report *report, struct spl_error *err)

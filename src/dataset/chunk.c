@@ -325,7 +325,21 @@ static void put_colors(struct bit_writer *w, const struct spl_chunk *chunk, stru
                (unsigned[]){c >> SPL_COLOR_Y & 15, c >> SPL_COLOR_U & 15, c >> SPL_COLOR_V & 15}, 3, chunk->count);
 }
 
-static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes, uint32_t *words)
+/* None and all cost nothing, one bit a splat otherwise. */
+static void encode_linear(const struct spl_splat *splats, uint32_t count, struct spl_chunk *chunk,
+                          uint32_t mask[SPL_LINEAR_WORDS])
+{
+    uint32_t linear = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        mask[i / 32] |= (uint32_t)splats[i].linear << i % 32;
+        linear += splats[i].linear;
+    }
+    uint32_t mode = linear == 0 ? 0 : linear == count ? SPL_LINEAR_ALL : SPL_LINEAR_SOME;
+    chunk->geometry_bits |= mode << SPL_GEOMETRY_LINEAR;
+}
+
+static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes, const uint32_t mask[SPL_LINEAR_WORDS],
+                              uint32_t *words)
 {
     uint32_t g = chunk->geometry_bits, e = chunk->extra_bits;
     struct bit_writer writer = {.words = words};
@@ -335,6 +349,8 @@ static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes
         (unsigned[]){g >> SPL_GEOMETRY_X & 31, g >> SPL_GEOMETRY_Y & 31, g >> SPL_GEOMETRY_Z & 31,
                      g >> SPL_GEOMETRY_U & 15, g >> SPL_GEOMETRY_V & 15, g >> SPL_GEOMETRY_RADIUS & 15},
         6, chunk->count);
+    for (int i = 0; g >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME && i < SPL_LINEAR_WORDS; i++)
+        words[writer.used++] = mask[i];
     put_colors(&writer, chunk, codes);
     put_stream(&writer, (int32_t *[]){codes->classification}, (unsigned[]){e >> SPL_EXTRA_CLASS & 15}, 1, chunk->count);
     put_stream(&writer, (int32_t *[]){codes->uncertainty}, (unsigned[]){e >> SPL_EXTRA_UNCERTAINTY & 15}, 1,
@@ -364,6 +380,8 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
     double position_sum = encode_positions(value, inverse_radius, count, options->position_error, chunk, &codes);
     encode_radii(radius, count, options->radius_error, chunk, &codes);
     double normal_sum = encode_normals(splats, count, options->normal_error, chunk, &codes);
+    uint32_t mask[SPL_LINEAR_WORDS] = {0};
+    encode_linear(splats, count, chunk, mask);
     encode_colors((const uint8_t(*)[3])color, count, chunk, &codes);
     if (options->has_class)
         encode_classes(splats, count, chunk, &codes);
@@ -371,7 +389,7 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
         encode_uncertainties(splats, count, chunk, &codes);
     if (error)
         *error = (struct spl_chunk_error){.position_over_radius = position_sum, .normal_radians = normal_sum};
-    return write_streams(chunk, &codes, words);
+    return write_streams(chunk, &codes, mask, words);
 }
 
 uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, const uint8_t (*color)[3],

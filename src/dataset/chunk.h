@@ -19,6 +19,7 @@ struct spl_splat {
     float uncertainty;    /* eq. 21, >= 0 */
     uint8_t color[3];     /* sRGB */
     uint8_t classification;
+    bool linear; /* lies on a wire, a pole or a cable */
 };
 
 struct spl_chunk_options {
@@ -43,8 +44,11 @@ uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk);
 /* Adds the chunk's bits to each attribute's; header and padding go to SPL_ATTRIBUTE_CHUNK (a dataset adds nodes). */
 void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
 
+/* How many splats are linear; `mask` is the chunk's SPL_LINEAR_WORDS words before its colours. */
+uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *mask);
+
 /* Largest number of words a chunk can need. */
-enum { SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + 4 };
+enum { SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + SPL_LINEAR_WORDS + 4 };
 
 /* Chooses widths and codes for `count` splats (1..128) whose order is kept, writes `words` (room for
  * SPL_CHUNK_WORDS_MAX) and everything in *chunk but geometry_word and first_id, which it zeroes. Positions are doubles

@@ -41,9 +41,29 @@ uint32_t spl_chunk_color_width(const struct spl_chunk *chunk)
     return part(bits, SPL_COLOR_Y, 4) + part(bits, SPL_COLOR_U, 4) + part(bits, SPL_COLOR_V, 4);
 }
 
+static uint32_t linear_words(const struct spl_chunk *chunk)
+{
+    return chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME ? SPL_LINEAR_WORDS : 0;
+}
+
 uint32_t spl_chunk_color_word(const struct spl_chunk *chunk)
 {
-    return chunk->geometry_word + stream_words(chunk, spl_chunk_geometry_width(chunk));
+    return chunk->geometry_word + stream_words(chunk, spl_chunk_geometry_width(chunk)) + linear_words(chunk);
+}
+
+static bool is_linear(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i)
+{
+    if (!linear_words(chunk))
+        return chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_ALL;
+    return page[spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS + i / 32] >> i % 32 & 1;
+}
+
+uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *mask)
+{
+    uint32_t linear = chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_ALL ? chunk->count : 0;
+    for (uint32_t i = 0; i < chunk->count && linear_words(chunk); i++)
+        linear += mask[i / 32] >> i % 32 & 1;
+    return linear;
 }
 
 uint32_t spl_chunk_class_word(const struct spl_chunk *chunk)
@@ -71,14 +91,16 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     uint64_t color = count * spl_chunk_color_width(chunk);
     uint64_t classification = count * class_width(chunk);
     uint64_t uncertainty = count * uncertainty_width(chunk);
+    uint64_t linear = linear_words(chunk) ? count : 0;
     bits[SPL_ATTRIBUTE_POSITION] += position;
     bits[SPL_ATTRIBUTE_NORMAL] += normal;
     bits[SPL_ATTRIBUTE_RADIUS] += radius;
     bits[SPL_ATTRIBUTE_COLOR] += color;
     bits[SPL_ATTRIBUTE_CLASS] += classification;
     bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
+    bits[SPL_ATTRIBUTE_LINEAR] += linear;
     bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_chunk_words(chunk) + 8 * sizeof *chunk - position - normal - radius -
-                                 color - classification - uncertainty;
+                                 color - classification - uncertainty - linear;
 }
 
 /* The next `width` bits (0..24) at *bit of the stream at `words`. */
@@ -115,6 +137,8 @@ void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
     spl_octahedral_decode(u, v, local);
     spl_octahedral_turn_back(local, part(bits, SPL_GEOMETRY_AXIS, 2), part(bits, SPL_GEOMETRY_AXIS + 2, 1),
                              splat->normal);
+
+    splat->linear = is_linear(chunk, page, i);
 
     bits = chunk->color_bits;
     words = page + spl_chunk_color_word(chunk);

@@ -33,6 +33,10 @@ int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index,
 /* Adds every splat to histogram[number of its atoms], 0..SPL_ATOMS_MAX. As read_textures. */
 int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogram, struct spl_error *err);
 
+/* Adds the leaf splats that lie on wires, poles or cables to *linear. SPL_E_CORRUPT when the file was cut short in
+ * place. Any thread; blocks on disk. */
+int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear, struct spl_error *err);
+
 /* The bytes of page `index` (< info.pages) in a map of the file, for tools: touching them raises SIGBUS when the file
  * was cut short in place. */
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
@@ -45,7 +49,8 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, stru
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,
- *   "uncertainty": bool}, "sources" [string], "pack" {...} (optional, free: settings, statistics), "stations"
+ *   "uncertainty": bool, "surface": bool (optional, true)}, "sources" [string], "pack" {...} (optional, free: settings,
+ * statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional). */
 
 #endif

@@ -1,6 +1,6 @@
-/* One splat by its id: which chunk and node hold it. Chunks continue each other's ids, which opening has checked, so a
- * binary search finds the chunk; nodes are looked through. The chunk's words are read from the file, not through a map,
- * so that a file that was cut short in place is no SIGBUS. Any thread. */
+/* One splat by its id: which chunk and node hold it; and the linear splats of all leaves. Chunks continue each other's
+ * ids, which opening has checked, so a binary search finds the chunk; nodes are looked through. Words are read from the
+ * file, not through a map, so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
 #include "dataset/chunk.h"
@@ -48,4 +48,26 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, stru
     chunk.geometry_word = 0;
     spl_chunk_decode(&chunk, words, id - chunk.first_id, splat);
     return true;
+}
+
+int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear, struct spl_error *err)
+{
+    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
+        const struct spl_node *node = &dataset->nodes[n];
+        for (uint32_t c = 0; c < node->chunk_count && !node->child_count; c++) {
+            const struct spl_chunk *chunk = &dataset->chunks[node->first_chunk + c];
+            uint32_t mask[SPL_LINEAR_WORDS];
+            if (!(chunk->geometry_bits >> SPL_GEOMETRY_LINEAR))
+                continue;
+            if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME) {
+                uint64_t word = spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS; // which the page has, as opening saw
+                int rc = spl_dataset_read(dataset, dataset->pages[node->page]->offset + word * sizeof *mask, mask,
+                                          sizeof mask, err);
+                if (rc)
+                    return rc;
+            }
+            *linear += spl_chunk_count_linear(chunk, mask);
+        }
+    }
+    return SPL_OK;
 }

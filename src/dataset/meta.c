@@ -67,6 +67,16 @@ static int get_flag(const struct spl_dataset *dataset, const char *name, bool *o
     return SPL_OK;
 }
 
+/* Optional: a file that does not say so has normals and radii. */
+static int get_surface(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const json_t *value = json_object_get(json_object_get(dataset->meta, "attributes"), "surface");
+    if (value && !json_is_boolean(value))
+        return wrong(dataset, err, "attributes", "must say whether there is a \"surface\", true or false");
+    dataset->info.has_surface = !json_is_false(value);
+    return SPL_OK;
+}
+
 /* Optional. Scanner poses: what a panorama or an orientation refers to. */
 static int check_stations(struct spl_dataset *dataset, struct spl_error *err)
 {
@@ -131,6 +141,8 @@ int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = get_flag(dataset, "class", &info->has_class, err);
     if (!rc)
         rc = get_flag(dataset, "uncertainty", &info->has_uncertainty, err);
+    if (!rc)
+        rc = get_surface(dataset, err);
     if (!rc)
         rc = check_sources(dataset, err);
     if (!rc)

@@ -89,7 +89,7 @@ static const char *judge_chunk(const struct spl_chunk *c)
     if (fabsf(c->normal_u) > 4 || fabsf(c->normal_v) > 4 || c->normal_u + c->normal_step * (float)((1u << u) - 1) > 4 ||
         c->normal_v + c->normal_step * (float)((1u << v) - 1) > 4)
         return "has normals off the octahedron";
-    if ((g >> SPL_GEOMETRY_AXIS & 3) == 3 || g >> (SPL_GEOMETRY_AXIS + 3))
+    if ((g >> SPL_GEOMETRY_AXIS & 3) == 3 || g >> SPL_GEOMETRY_LINEAR > SPL_LINEAR_SOME)
         return "has geometry bits that version 1 does not know";
     int base_u = (int16_t)(c->color_base & 0xffff), base_v = (int16_t)(c->color_base >> 16);
     if ((color >> SPL_COLOR_Y & 15) > 8 || (color >> SPL_COLOR_U & 15) > 9 || (color >> SPL_COLOR_V & 15) > 9 ||
@@ -115,6 +115,7 @@ static int check_chunks(struct spl_dataset *dataset, struct spl_error *err)
         if (info->splats >= UINT32_MAX)
             return wrong(dataset, err, "CHNK", "chunk", i, "ends beyond the largest id");
         spl_chunk_add_bits(chunk, info->attribute_bits);
+        info->has_linear |= chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
     }
     info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 8ull * info->nodes * sizeof(struct spl_node);
     return SPL_OK;

@@ -123,6 +123,7 @@ static void decode_textures(const struct spl_dataset *dataset)
 
 static void decode_all(const struct spl_dataset *dataset)
 {
+    uint64_t linear = 0, decoded = 0;
     uint32_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
@@ -135,6 +136,7 @@ static void decode_all(const struct spl_dataset *dataset)
             for (uint32_t i = 0; i < chunks[c].count; i++) {
                 struct spl_splat s;
                 spl_chunk_decode(&chunks[c], page, i, &s);
+                decoded += s.linear && !nodes[n].child_count;
                 spl_assert(isfinite(s.position[0]) && isfinite(s.position[1]) && isfinite(s.position[2]));
                 spl_assert(s.radius > 0 && isfinite(s.radius) && s.uncertainty >= 0 && isfinite(s.uncertainty));
                 float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];
@@ -142,6 +144,7 @@ static void decode_all(const struct spl_dataset *dataset)
             }
         free(page);
     }
+    spl_assert(!spl_dataset_count_linear(dataset, &linear, NULL) && linear == decoded);
     decode_textures(dataset);
     struct spl_camera camera;
     spl_assert(!spl_dataset_get_default_camera(dataset, 640, 480, &camera, NULL));

@@ -65,8 +65,10 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         size_t left = count - c * SPL_CHUNK_SPLATS;
         uint32_t n = left < SPL_CHUNK_SPLATS ? (uint32_t)left : SPL_CHUNK_SPLATS;
         for (uint32_t i = 0; i < n; i++) {
-            part[i] = (struct spl_splat){
-                .radius = from[i].radius, .uncertainty = from[i].uncertainty, .classification = from[i].classification};
+            part[i] = (struct spl_splat){.radius = from[i].radius,
+                                         .uncertainty = from[i].uncertainty,
+                                         .classification = from[i].classification,
+                                         .linear = from[i].linear};
             memcpy(part[i].normal, from[i].normal, sizeof part[i].normal);
             memcpy(part[i].color, from[i].color, sizeof part[i].color);
             for (int a = 0; a < 3; a++)

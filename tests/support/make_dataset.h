@@ -15,6 +15,7 @@ struct make_splat {
     uint8_t color[3];
     uint8_t classification;
     float uncertainty;
+    bool linear;
 };
 
 /* Writes `count` (> 0) splats to `path` at default errors, with classes and uncertainties.

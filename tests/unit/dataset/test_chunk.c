@@ -89,6 +89,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     assert_true(chunk.step > 0 && chunk.radius_step > 0 && chunk.normal_step > 0);
 
     double position_sum = 0, normal_sum = 0, radius_sum = 0;
+    uint32_t linear = 0;
     for (uint32_t i = 0; i < s->count; i++) {
         const struct spl_splat *in = &s->splats[i];
         struct spl_splat out;
@@ -103,6 +104,8 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
         assert_true(fabs(out.radius - in->radius) <= options->radius_error * in->radius * 1.00001);
         radius_sum += in->radius;
         assert_memory_equal(out.color, in->color, 3);
+        assert_int_equal(out.linear, in->linear);
+        linear += in->linear;
         assert_int_equal(out.classification, options->has_class ? in->classification : 0);
         if (!options->has_uncertainty || in->uncertainty == 0)
             assert_true(out.uncertainty == 0);
@@ -114,6 +117,8 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     assert_true(fabs(position_sum - stated.position_over_radius) <= 1e-5 * position_sum + 1e-12);
     assert_true(fabs(normal_sum - stated.normal_radians) <= 1e-3 * normal_sum + 1e-6);
     assert_true(fabs(chunk.radius_mean - radius_sum / s->count) <= 1e-6 * chunk.radius_mean);
+
+    assert_int_equal(spl_chunk_count_linear(&chunk, page + spl_chunk_color_word(&chunk) - SPL_LINEAR_WORDS), linear);
 
     uint64_t bits[SPL_ATTRIBUTE_COUNT] = {0}, all = 0;
     spl_chunk_add_bits(&chunk, bits);
@@ -251,6 +256,35 @@ static void test_normal_directions(void **state)
     check_sample(&s, &defaults);
 }
 
+/* None and all take no word, anything between the mask; the first and the last splat, and those beside a word's end. */
+static void test_linear(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    static const uint32_t counts[] = {1, 2, 31, 32, 33, 97, SPL_CHUNK_SPLATS};
+    struct sample s;
+    for (size_t row = 0; row < sizeof counts / sizeof *counts; row++) {
+        uint32_t words[SPL_CHUNK_WORDS_MAX], plain;
+        struct spl_chunk chunk;
+        random_state = 17;
+        make_sheet(&s, counts[row], 1, 0.1, 0.01, 0.5, up);
+        plain = spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+        assert_int_equal(chunk.geometry_bits >> SPL_GEOMETRY_LINEAR, 0);
+        for (uint32_t marked = 0; marked < s.count; marked++) {
+            s.splats[marked].linear = true;
+            check_sample(&s, &defaults);
+            uint32_t used = spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+            assert_int_equal(used, plain + (s.count > 1 ? SPL_LINEAR_WORDS : 0));
+            s.splats[marked].linear = false;
+        }
+        for (uint32_t i = 0; i < s.count; i++)
+            s.splats[i].linear = true;
+        check_sample(&s, &defaults);
+        assert_int_equal(spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL), plain);
+        assert_int_equal(chunk.geometry_bits >> SPL_GEOMETRY_LINEAR, SPL_LINEAR_ALL);
+    }
+}
+
 static void test_zero_normal(void **state)
 {
     (void)state;
@@ -350,6 +384,7 @@ int main(void)
         cmocka_unit_test(test_absurd_extent),
         cmocka_unit_test(test_radius_spread),
         cmocka_unit_test(test_normal_directions),
+        cmocka_unit_test(test_linear),
         cmocka_unit_test(test_zero_normal),
         cmocka_unit_test(test_octahedral),
         cmocka_unit_test(test_color_is_lossless),

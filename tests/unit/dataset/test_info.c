@@ -49,7 +49,8 @@ static void make(const char *name, size_t count, int levels)
         splats[i] = (struct make_splat){.position = {0.5 * (double)(i % 100), 0.5 * (double)(i / 100), 0},
                                         .normal = {0, 0, 1},
                                         .radius = 0.5f,
-                                        .color = {(uint8_t)i, 10, 10}};
+                                        .color = {(uint8_t)i, 10, 10},
+                                        .linear = i % 10 == 3};
     snprintf(path, sizeof path, "%s/%s", folder, name);
     make_dataset_file(path, splats, count, levels);
     free(splats);
@@ -64,11 +65,14 @@ static double number(const json_t *json, const char *key)
 static void test_json(void **state)
 {
     (void)state;
-    static const char *const attributes[] = {"position", "radius", "normal", "color", "class", "uncertainty", "chunk"};
+    static const char *const attributes[] = {"position", "radius",      "normal", "color",
+                                             "class",    "uncertainty", "linear", "chunk"};
     char output[8192];
     assert_int_equal(run("--json two.spld", output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL);
     assert_string_equal(json_string_value(json_object_get(json, "id")), "two");
+    assert_true(number(json, "linear") == 400);
+    assert_true(json_is_true(json_object_get(json_object_get(json, "attributes"), "surface")));
     assert_true(number(json, "points") == 4000 && number(json, "splats") == 4500 && number(json, "levels") == 2);
     const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");
     assert_true(json_number_value(json_array_get(max, 0)) == 49.5 && json_number_value(json_array_get(max, 2)) == 0);
@@ -104,6 +108,8 @@ static void test_table(void **state)
     assert_int_equal(run("two.spld one.spld", output, sizeof output), 0);
     assert_non_null(strstr(output, "splats        4,500: 4,000 points and 500 for coarser levels (12.5 %)"));
     assert_non_null(strstr(output, "one  version "));
+    assert_non_null(strstr(output, "linear        400 points on wires, poles and cables (10.00 %)"));
+    assert_non_null(strstr(output, "surface       normals and radii"));
 }
 
 static void test_exit_codes(void **state)
