@@ -4,8 +4,9 @@
 
 #include "pack/texture/photo.h"
 #include "pack/texture/splats.h"
+#include "sparse/texture_file.h"
 
-#define SPL_NO_PHOTO UINT16_MAX
+#define SPL_NO_PHOTO SPL_TEXTURE_NO_PHOTO
 enum { SPL_CANDIDATES_MAX = 4, SPL_PHOTOS_TAKEN_MAX = 65000 };
 
 struct spl_candidate {

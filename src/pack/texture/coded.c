@@ -65,13 +65,13 @@ static int read_textures(void *context, uint64_t first, uint32_t count, uint8_t 
     return rc;
 }
 
-int spl_textures_keep(const struct spl_textures *textures, const char *path, uint64_t splats, uint32_t photographs,
-                      uint64_t pixels, struct spl_error *err)
+int spl_textures_keep(const struct spl_textures *textures, const char *path, const struct spl_texture_origin *origin,
+                      struct spl_error *err)
 {
     struct reader reader = {textures};
     const struct spl_texture_source source = {
         .count = textures->count, .size = textures->size, .read = read_textures, .context = &reader};
-    return spl_texture_file_write(path, &source, splats, photographs, pixels, err);
+    return spl_texture_file_write(path, &source, origin, err);
 }
 
 struct reporting {

@@ -297,13 +297,23 @@ static int take_textures(struct pass *pass, const struct spl_dataset *dataset, s
 
 static int keep_textures(const struct pass *pass, const struct spl_textures *textures, struct spl_error *err)
 {
-    uint64_t pixels = 0;
-    for (uint32_t i = 0; i < pass->report->photographs; i++)
-        pixels +=
-            pass->dropped[i] ? 0 : (uint64_t)pass->list->views[i].camera.width * pass->list->views[i].camera.height;
-    return pass->options->keep_textures ? spl_textures_keep(textures, pass->options->keep_textures, pass->splats.count,
-                                                            pass->report->photographs, pixels, err)
-                                        : SPL_OK;
+    const char *path = pass->options->keep_textures;
+    uint32_t photographs = pass->report->photographs;
+    if (!path)
+        return SPL_OK;
+    const char **names = spl_alloc(photographs, sizeof *names, err);
+    if (!names)
+        return SPL_E_NOMEM;
+    struct spl_texture_origin origin = {
+        .splats = pass->splats.count, .photographs = photographs, .photo = pass->chosen.photo, .names = names};
+    for (uint32_t i = 0; i < photographs; i++) {
+        const struct spl_named_view *view = &pass->list->views[i];
+        names[i] = pass->dropped[i] ? "" : view->name;
+        origin.pixels += pass->dropped[i] ? 0 : (uint64_t)view->camera.width * view->camera.height;
+    }
+    int rc = spl_textures_keep(textures, path, &origin, err);
+    free(names);
+    return rc;
 }
 
 /* What META says of the textures. */

@@ -6,7 +6,7 @@
 
 #include "pack/texture/colors.h"
 #include "pack/texture/resample.h"
-#include "sparse/train.h"
+#include "sparse/texture_file.h"
 
 /* Texture of splat `id` at id * values of an unlinked file; only those of splats with `has[id]` are there. */
 struct spl_textures {
@@ -54,9 +54,9 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
                    struct spl_error *err);
 void spl_coded_finish(struct spl_coded *coded);
 
-/* Writes the listed textures to `path`, for measuring coders; `photographs` and their `pixels` are told with them. */
-int spl_textures_keep(const struct spl_textures *textures, const char *path, uint64_t splats, uint32_t photographs,
-                      uint64_t pixels, struct spl_error *err);
+/* Writes the listed textures to `path`, for measuring coders, and where they come from. */
+int spl_textures_keep(const struct spl_textures *textures, const char *path, const struct spl_texture_origin *origin,
+                      struct spl_error *err);
 
 /* For spl_dataset_retexture(); the context is a struct spl_coded_chunks. */
 struct spl_coded_chunks {

@@ -69,46 +69,96 @@ static void expect_refused(const void *bytes, size_t length, const char *said)
         fail_msg("%s does not say %s", err.message, said);
 }
 
+static void expect_header_refused(uint8_t *bytes, size_t length, const struct spl_texture_file_header *good, size_t at,
+                                  uint64_t value, const char *said)
+{
+    memcpy(bytes, good, sizeof *good);
+    memcpy(bytes + at, &value, sizeof value);
+    expect_refused(bytes, length, said);
+    memcpy(bytes, good, sizeof *good);
+}
+
 static void test_file(void **state)
 {
     struct plant p = plant_make(8, 5, 3000, 2, 0.5f);
     struct spl_texture_file file;
     struct spl_error err = {0};
-    uint8_t bytes[40 + 2 * 192] = {0}, back[192];
+    uint8_t bytes[48 + 2 * 192 + 2 * 2 + 3] = {0}, back[192];
     (void)state;
     assert_int_equal(spl_texture_file_open(path, &file, &err), SPL_E_NOT_FOUND);
     expect_refused(bytes, sizeof bytes, "holds no textures");
-    expect_refused("SPLTEXT1", 8, "holds no textures");
-    struct spl_texture_file_header header = {.magic = "SPLTEXT", .size = 8, .count = 2, .splats = 2};
-    header.magic[7] = '1';
-    assert_int_equal(sizeof header, 40);
-    memcpy(bytes, &header, sizeof header);
+    expect_refused("SPLTEXT2", 8, "holds no textures");
+    struct spl_texture_file_header good = {
+        .magic = "SPLTEXT", .size = 8, .count = 2, .splats = 2, .photographs = 2, .names_bytes = 3};
+    good.magic[7] = '1'; /* no photographs in those */
+    assert_int_equal(sizeof good, 48);
+    memcpy(bytes, &good, sizeof good);
+    expect_refused(bytes, sizeof bytes, "holds no textures");
+    good.magic[7] = '2';
+    memcpy(bytes, &good, sizeof good);
+    memcpy(bytes + sizeof bytes - 7,
+           "\1\0\xff\xff"
+           "a",
+           6); /* photographs 1 and none; "a" and "" */
     expect_refused(bytes, sizeof bytes - 1, "says 2 textures");
-    header.count = UINT64_MAX / 192 + 1;
-    memcpy(bytes, &header, sizeof header);
-    expect_refused(bytes, sizeof bytes, "says ");
-    header.count = 2;
-    header.size = 33;
-    memcpy(bytes, &header, sizeof header);
+    expect_header_refused(bytes, sizeof bytes, &good, offsetof(struct spl_texture_file_header, count),
+                          UINT64_MAX / 192 + 1, "says ");
+    expect_header_refused(bytes, sizeof bytes, &good, offsetof(struct spl_texture_file_header, splats),
+                          UINT64_MAX / 2 + 2, "says ");
+    expect_header_refused(bytes, sizeof bytes, &good, offsetof(struct spl_texture_file_header, names_bytes), 2,
+                          "says ");
+    struct spl_texture_file_header bad = good;
+    bad.size = 33;
+    memcpy(bytes, &bad, sizeof bad);
     expect_refused(bytes, sizeof bytes, "not 1..32");
-    header.size = 8;
-    header.splats = 1;
-    memcpy(bytes, &header, sizeof header);
+    bad = good;
+    bad.splats = 1;
+    bad.names_bytes = 5;
+    memcpy(bytes, &bad, sizeof bad);
     expect_refused(bytes, sizeof bytes, "on 1 splats");
-
+    bad = good;
+    bad.photographs = 1; /* the first splat's is the second */
+    memcpy(bytes, &bad, sizeof bad);
+    expect_refused(bytes, sizeof bytes, "splat 0 has photograph 1 of 1");
+    bad.photographs = 4;
+    memcpy(bytes, &bad, sizeof bad);
+    expect_refused(bytes, sizeof bytes, "says 4 photographs");
+    bad.photographs = 3;
+    memcpy(bytes, &bad, sizeof bad);
+    bytes[sizeof bytes - 2] = 'b';
+    expect_refused(bytes, sizeof bytes, "photograph 1 has no name");
+    bytes[sizeof bytes - 2] = 0;
+    memcpy(bytes, &good, sizeof good);
+    write_bytes(bytes, sizeof bytes);
     err = (struct spl_error){0};
-    assert_int_equal(spl_texture_file_write(path, plant_source(&p), 5000, 3, 777, &err), 0);
+    assert_int_equal(spl_texture_file_open(path, &file, &err), 0);
+    assert_string_equal(file.origin.names[0], "a");
+    assert_string_equal(file.origin.names[1], "");
+    spl_texture_file_close(&file);
+
+    static uint16_t photo[5000];
+    photo[4999] = SPL_TEXTURE_NO_PHOTO;
+    photo[7] = 2;
+    const struct spl_texture_origin origin = {.splats = 5000,
+                                              .pixels = 777,
+                                              .photographs = 3,
+                                              .photo = photo,
+                                              .names = (const char *const[]){"north", "", "a b"}};
+    assert_int_equal(spl_texture_file_write(path, plant_source(&p), &origin, &err), 0);
     assert_int_equal(spl_texture_file_open(path, &file, &err), 0);
     assert_int_equal(file.source.count, 3000);
-    assert_int_equal(file.header.splats, 5000);
-    assert_int_equal(file.header.pixels, 777);
+    assert_int_equal(file.origin.splats, 5000);
+    assert_int_equal(file.origin.pixels, 777);
+    assert_int_equal(file.origin.photographs, 3);
+    assert_string_equal(file.origin.names[2], "a b");
+    assert_memory_equal(file.origin.photo, photo, sizeof photo);
     assert_int_equal(file.source.read(file.source.context, 2999, 1, back, &err), 0);
     assert_memory_equal(back, p.textures + 2999 * 192, 192);
     assert_int_equal(truncate(path, 1000), 0);
     assert_int_equal(file.source.read(file.source.context, 2999, 1, back, &err), SPL_E_INPUT);
     spl_texture_file_close(&file);
     err = (struct spl_error){0};
-    assert_int_equal(spl_texture_file_write("/nowhere/at/all", plant_source(&p), 5000, 3, 777, &err), SPL_E_IO);
+    assert_int_equal(spl_texture_file_write("/nowhere/at/all", plant_source(&p), &origin, &err), SPL_E_IO);
     plant_finish(&p);
 }
 
