@@ -70,16 +70,24 @@ static void help(void)
         "  --restart                 forget what OUT/state.jsonl holds\n"
         "\n"
         "Textures, with --textures first: how dictionaries are learned, and their bytes against quality, beside the\n"
-        "sparse-coding paper's settings and block-compressed photographs. FILE is what 'splatd pack --keep-textures'\n"
-        "wrote. OUT gets textures.csv, training.csv, rate.svg and training.svg; half an hour for 500,000 textures.\n"
-        "  --textures FILE -o OUT [--epochs N] [--threads N] [--memory MB]      (12; all cores; 2048)\n"
+        "sparse-coding paper's settings (D8W4, D12W4, D16W8). FILE is what 'splatd pack --keep-textures' wrote, NAME.spld\n"
+        "what it packed: its geometry is counted, its frames are timed by pass. With --cameras, photographs put straight\n"
+        "onto the splats are measured too: whole, at half size, in BC7 and BC1; against the views that were packed, and\n"
+        "against those of MODEL that were left out. OUT gets textures.csv, training.csv, rate.svg and training.svg; half\n"
+        "an hour for 500,000 textures.\n"
+        "  --textures FILE [NAME.spld [--cameras MODEL [--images DIR]]] -o OUT\n"
+        "  --epochs N                rounds of each training (12); 0: no coding but that of NAME.spld\n"
+        "  --views N                 compared at most, of either kind (8)\n"
+        "  --repeats N --size WxH    times each pass is timed, and the size of its frames (9; 1280x720)\n"
+        "  --threads N --memory MB --device NAME      (all cores; 2048; auto)\n"
         "\n"
         "  splatd bench hall.spld\n"
         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
         "  splatd bench hall.spld -o hall-bench\n"
         "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
-        "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench");
+        "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench\n"
+        "  splatd bench --textures hall.textures hall.spld --cameras colmap/sparse -o hall-textures");
 }
 
 /* Splits `text` at commas, in place, and hands each piece to `take`. */

@@ -1,18 +1,15 @@
-/* splatd bench --textures: options in, the table to stdout, charts and figures into a folder. */
+/* splatd bench --textures: options in, one run of each measurement, tables to stdout, charts and figures into a folder.
+ * Everything that can be refused without a device is refused before one is opened. */
 #include <errno.h>
 #include <getopt.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 
 #include "cmd/bench.h"
-#include "cmd/cmd.h"
+#include "cmd/bench_textures.h"
 #include "cmd/options.h"
-#include "cmd/output.h"
-#include "measure/textures.h"
-#include "sparse/texture_file.h"
+#include "image/load.h"
 
 static void show_epoch(void *context, const char *what, const struct spl_train_progress *epoch)
 {
@@ -21,148 +18,168 @@ static void show_epoch(void *context, const char *what, const struct spl_train_p
             epoch->seconds, epoch->psnr, epoch->atoms_per_splat, epoch->dictionary);
 }
 
-static int write_file(const char *folder, const char *name, const char *text, size_t length, struct spl_error *err)
+static void show_photograph(void *context, const char *photograph)
 {
-    char path[4096];
-    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path)
-        return spl_fail(err, SPL_E_USAGE, "%s: the path is too long", folder);
-    return spl_cmd_write_output(path, text, length, err);
+    (void)context;
+    fprintf(stderr, "photograph %s onto the splats\n", photograph);
 }
 
-/* One row a coding, as a spreadsheet reads it; inf and nan are words that it knows. */
-static int write_rows(const struct spl_textures_report *report, const char *folder, struct spl_error *err)
+static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
 {
-    char *text = NULL;
-    size_t length = 0;
-    FILE *out = open_memstream(&text, &length);
-    if (!out)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory: the table");
-    fputs("name,codes_bytes,dictionary_bytes,psnr_db,atoms,dictionary,seconds\n", out);
-    for (uint32_t i = 0; i < report->rows; i++) {
-        const struct spl_textures_row *r = &report->row[i];
-        fprintf(out, "\"%s\",%.4f,%.4f,%.3f,%.3f,%u,%.1f\n", r->name, r->codes, r->dictionary, r->psnr, r->atoms,
-                r->count, r->seconds);
-    }
-    int rc = fclose(out) ? spl_fail(err, SPL_E_NOMEM, "out of memory: the table") : 0;
-    if (!rc)
-        rc = write_file(folder, "textures.csv", text, length, err);
-    free(text);
+    struct spl_image_info info;
+    int rc = spl_image_get_info(path, &info, err);
+    *width = info.width;
+    *height = info.height;
     return rc;
 }
 
-static int write_epochs(const struct spl_textures_report *report, const char *folder, struct spl_error *err)
-{
-    char *text = NULL;
-    size_t length = 0;
-    FILE *out = open_memstream(&text, &length);
-    if (!out)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory: the table");
-    fputs("method,epoch,seconds,psnr_db,atoms\n", out);
-    for (uint32_t i = 0; i < report->batches_epochs; i++)
-        fprintf(out, "mini-batches,%u,%.2f,%.3f,%.3f\n", report->batches[i].epoch, report->batches[i].seconds,
-                report->batches[i].psnr, report->batches[i].atoms_per_splat);
-    for (uint32_t i = 0; i < report->ksvd_epochs; i++)
-        fprintf(out, "k-SVD,%u,%.2f,%.3f,%.3f\n", report->ksvd[i].epoch, report->ksvd[i].seconds, report->ksvd[i].psnr,
-                report->ksvd[i].atoms_per_splat);
-    int rc = fclose(out) ? spl_fail(err, SPL_E_NOMEM, "out of memory: the table") : 0;
-    if (!rc)
-        rc = write_file(folder, "training.csv", text, length, err);
-    free(text);
-    return rc;
-}
+struct arguments {
+    const char *textures, *dataset, *folder, *cameras, *images, *device;
+    uint64_t epochs, threads, memory_mb, views, rounds;
+    uint32_t width, height;
+};
 
-static int write_charts(const struct spl_textures_report *report, const char *folder, struct spl_error *err)
+static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    char *svg = NULL;
-    size_t length = 0;
-    int rc = spl_textures_chart_training(report, &svg, &length, err);
-    if (!rc)
-        rc = write_file(folder, "training.svg", svg, length, err);
-    free(svg);
+    static const struct option options[] = {
+        {"output", required_argument, NULL, 'o'},  {"epochs", required_argument, NULL, 'e'},
+        {"threads", required_argument, NULL, 't'}, {"memory", required_argument, NULL, 'm'},
+        {"cameras", required_argument, NULL, 'c'}, {"images", required_argument, NULL, 'i'},
+        {"views", required_argument, NULL, 'v'},   {"repeats", required_argument, NULL, 'r'},
+        {"size", required_argument, NULL, 's'},
+        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
+    int option, rc = 0;
+    *a = (struct arguments){.epochs = 12, .memory_mb = 2048, .views = 8, .rounds = 9, .width = 1280, .height = 720};
+    while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
+        switch (option) {
+        case 'o':
+            a->folder = optarg;
+            break;
+        case 'e':
+            rc = spl_cmd_parse_count("--epochs", optarg, 0, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
+            break;
+        case 't':
+            rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a->threads, err);
+            break;
+        case 'm':
+            rc = spl_cmd_parse_count("--memory", optarg, 1, 1u << 24, &a->memory_mb, err);
+            break;
+        case 'c':
+            a->cameras = optarg;
+            break;
+        case 'i':
+            a->images = optarg;
+            break;
+        case 'v':
+            rc = spl_cmd_parse_count("--views", optarg, 1, SPL_VIEW_LIST_MAX, &a->views, err);
+            break;
+        case 'r':
+            rc = spl_cmd_parse_count("--repeats", optarg, 1, SPL_PASSES_ROUNDS_MAX, &a->rounds, err);
+            break;
+        case 's':
+            rc = spl_cmd_parse_size("--size", optarg, &a->width, &a->height, err);
+            break;
+        case 'd':
+            a->device = optarg;
+            break;
+        default:
+            rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
+        }
+    int files = argc - optind;
+    if (!rc && (files < 1 || files > 2 || !a->folder))
+        rc = spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures, its NAME.spld, and -o OUT");
+    if (!rc && files == 1 && (a->cameras || a->device))
+        rc = spl_fail(err, SPL_E_USAGE, "--cameras and --device are about NAME.spld, which is missing");
+    if (!rc && a->images && !a->cameras)
+        rc = spl_fail(err, SPL_E_USAGE, "--images DIR goes with --cameras MODEL");
     if (!rc) {
-        rc = spl_textures_chart_rate(report, &svg, &length, err);
-        if (!rc)
-            rc = write_file(folder, "rate.svg", svg, length, err);
-        free(svg);
+        a->textures = argv[optind];
+        a->dataset = files == 2 ? argv[optind + 1] : NULL;
     }
     return rc;
 }
 
-static void print_table(const struct spl_textures_report *report)
+struct bench {
+    struct arguments a;
+    struct spl_texture_file file;
+    struct spl_dataset *dataset;
+    struct spl_view_list cameras;
+    struct spl_projected_report projected;
+    struct spl_passes_view passes[SPL_PASSES_VIEWS];
+    struct spl_device_info device;
+    struct spl_textures_report report;
+};
+
+/* What is measured of frames: the times of passes, and photographs where there are cameras. */
+static int render(struct bench *b, struct spl_error *err)
 {
-    printf("%-24s %8s %10s %8s %9s %7s %10s %8s\n", "", "codes", "dictionary", "in all", "PSNR, dB", "atoms",
-           "dictionary", "seconds");
-    printf("%-24s %29s %17s %10s\n", "", "bytes a splat", "a splat", "of atoms");
-    for (uint32_t i = 0; i < report->rows; i++) {
-        const struct spl_textures_row *r = &report->row[i];
-        printf("%-24s %8.3f %10.3f %8.3f %9.2f", r->name, r->codes, r->dictionary, r->codes + r->dictionary, r->psnr);
-        if (isnan(r->atoms))
-            puts("");
-        else
-            printf(" %7.2f %10u %8.1f\n", r->atoms, r->count, r->seconds);
+    const struct spl_renderer_options how = {.device = b->a.device};
+    struct spl_renderer *renderer = NULL;
+    int rc = spl_renderer_create(&how, &renderer, err);
+    if (!rc)
+        rc = spl_renderer_add(renderer, b->dataset, err);
+    if (!rc) {
+        b->device = *spl_renderer_get_device(renderer);
+        rc = spl_passes_measure(renderer, b->dataset, b->a.width, b->a.height, (uint32_t)b->a.rounds, b->passes, err);
     }
-    for (uint32_t i = 0; i < report->rows; i++) {
-        const struct spl_textures_row *r = &report->row[i];
-        double ours = spl_textures_bytes_at(report, r->psnr), theirs = r->codes + r->dictionary;
-        if (i < report->first_adaptive && theirs > 0 && !isnan(ours))
-            printf("at the quality of %s, %.2f dB: adaptive %.3f bytes a splat, %.0f %% of its %.3f\n", r->name,
-                   r->psnr, ours, 100 * ours / theirs, theirs);
+    if (!rc && b->a.cameras) {
+        const struct spl_projected_options projected = {.renderer = renderer,
+                                                        .dataset = b->dataset,
+                                                        .origin = &b->file.origin,
+                                                        .photographs = &b->cameras,
+                                                        .texture_size = b->file.header.size,
+                                                        .views = (uint32_t)b->a.views,
+                                                        .memory_bytes = b->a.memory_mb << 20,
+                                                        .threads = (unsigned)b->a.threads,
+                                                        .progress = show_photograph};
+        rc = spl_projected_measure(&projected, &b->projected, err);
     }
+    spl_renderer_destroy(renderer);
+    return rc;
+}
+
+static int open_inputs(struct bench *b, struct spl_error *err)
+{
+    const struct spl_photograph_options photographs = {.images = b->a.images, .get_size = get_size};
+    int rc = spl_texture_file_open(b->a.textures, &b->file, err);
+    if (!rc && b->a.dataset)
+        rc = spl_dataset_open(b->a.dataset, true, &b->dataset, err);
+    if (!rc && b->a.cameras)
+        rc = spl_view_list_load_photographs(&b->cameras, b->a.cameras, &photographs, err);
+    if (!rc && mkdir(b->a.folder, 0777) && errno != EEXIST)
+        rc = spl_fail_errno(err, errno, "%s", b->a.folder);
+    return rc;
 }
 
 int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                            {"epochs", required_argument, NULL, 'e'},
-                                            {"threads", required_argument, NULL, 't'},
-                                            {"memory", required_argument, NULL, 'm'},
-                                            {NULL, 0, NULL, 0}};
-    const char *folder = NULL;
-    uint64_t epochs = 12, threads = 0, memory_mb = 2048;
-    struct spl_texture_file file = {.fd = -1};
-    struct spl_textures_report *report = NULL;
-    int option, rc = 0;
-    while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
-        if (option == 'o')
-            folder = optarg;
-        else if (option == 'e')
-            rc = spl_cmd_parse_count("--epochs", optarg, 1, SPL_TEXTURES_EPOCHS_MAX, &epochs, err);
-        else if (option == 't')
-            rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &threads, err);
-        else if (option == 'm')
-            rc = spl_cmd_parse_count("--memory", optarg, 1, 1u << 24, &memory_mb, err);
-        else
-            rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
-    if (!rc && (argc - optind != 1 || !folder))
-        rc = spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures and -o OUT");
-    if (!rc && mkdir(folder, 0777) && errno != EEXIST)
-        rc = spl_fail_errno(err, errno, "%s", folder);
-    if (!rc)
-        rc = spl_texture_file_open(argv[optind], &file, err);
-    report = rc ? NULL : calloc(1, sizeof *report);
-    if (!rc && !report)
-        rc = spl_fail(err, SPL_E_NOMEM, "out of memory: the report");
-    if (rc)
+    struct bench *b = calloc(1, sizeof *b);
+    if (!b)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory: the report");
+    b->file.fd = -1;
+    int rc = parse(&b->a, argc, argv, err);
+    if (rc || (rc = open_inputs(b, err)) || (b->dataset && (rc = render(b, err))))
         goto done;
-    const struct spl_textures_options how = {.source = &file.source,
-                                             .splats = file.header.splats,
-                                             .pixels = file.header.pixels,
-                                             .epochs = (uint32_t)epochs,
-                                             .memory_bytes = memory_mb << 20,
+    const struct spl_textures_options how = {.source = &b->file.source,
+                                             .origin = &b->file.origin,
+                                             .dataset = b->dataset,
+                                             .projected = b->a.cameras ? &b->projected : NULL,
+                                             .epochs = (uint32_t)b->a.epochs,
+                                             .memory_bytes = b->a.memory_mb << 20,
                                              .seed = 1,
-                                             .threads = (unsigned)threads,
+                                             .threads = (unsigned)b->a.threads,
                                              .progress = show_epoch};
-    rc = spl_textures_measure(&how, report, err);
+    rc = spl_textures_measure(&how, &b->report, err);
     if (rc)
         goto done;
-    print_table(report);
-    rc = write_rows(report, folder, err);
-    if (!rc)
-        rc = write_epochs(report, folder, err);
-    if (!rc)
-        rc = write_charts(report, folder, err);
+    spl_cmd_print_textures(&b->report, how.projected);
+    if (b->dataset)
+        spl_cmd_print_passes(&b->device, b->passes);
+    rc = spl_cmd_write_textures(&b->report, b->a.folder, err);
 done:
-    spl_texture_file_close(&file);
-    free(report);
+    spl_view_list_finish(&b->cameras);
+    spl_dataset_close(b->dataset);
+    spl_texture_file_close(&b->file);
+    free(b);
     return rc;
 }

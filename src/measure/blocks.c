@@ -9,6 +9,9 @@
 #define STB_DXT_IMPLEMENTATION
 #include <stb/stb_dxt.h>
 
+#include "base/memory.h"
+#include "base/parallel.h"
+
 static void expand_565(uint32_t packed, int out[3])
 {
     uint32_t r = packed >> 11, g = packed >> 5 & 63, b = packed & 31;
@@ -154,4 +157,49 @@ void spl_block_bc7(const uint8_t in[16][3], uint8_t out[16][3])
         }
         refine_ends(in, best_step, a, b);
     }
+}
+
+struct coding {
+    const uint8_t *from;
+    uint8_t *to;
+    uint32_t width, height;
+    void (*code)(const uint8_t[16][3], uint8_t[16][3]);
+};
+
+static void code_rows(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct coding *c = context;
+    (void)worker;
+    for (size_t row = begin; row < end; row++)
+        for (uint32_t left = 0; left < c->width; left += 4) {
+            uint8_t in[16][3], out[16][3];
+            size_t at[16];
+            for (uint32_t i = 0; i < 16; i++) {
+                size_t x = left + i % 4, y = row * 4 + i / 4;
+                at[i] = 4 * ((y < c->height ? y : c->height - 1) * c->width + (x < c->width ? x : c->width - 1));
+                memcpy(in[i], c->from + at[i], 3);
+            }
+            c->code((const uint8_t(*)[3])in, out);
+            for (uint32_t i = 16; i-- > 0;) /* of texels that repeat another, the one that is there comes last */
+                memcpy(c->to + at[i], out[i], 3);
+        }
+}
+
+int spl_blocks_code(const struct spl_pyramid *from, void (*code)(const uint8_t in[16][3], uint8_t out[16][3]),
+                    unsigned threads, struct spl_pyramid *out, struct spl_error *err)
+{
+    *out = *from;
+    memset(out->texels, 0, sizeof out->texels);
+    for (uint32_t l = 0; l < from->levels; l++) {
+        size_t bytes = (size_t)from->width[l] * from->height[l] * 4;
+        out->texels[l] = spl_alloc_raw(bytes, 1, err);
+        if (!out->texels[l]) {
+            spl_pyramid_finish(out);
+            return SPL_E_NOMEM;
+        }
+        memcpy(out->texels[l], from->texels[l], bytes);
+        struct coding coding = {from->texels[l], out->texels[l], from->width[l], from->height[l], code};
+        spl_parallel_for(threads, (from->height[l] + 3) / 4, 4, code_rows, &coding);
+    }
+    return 0;
 }

@@ -1,7 +1,8 @@
 /* The runs behind `splatd bench --textures`. Trainings are timed one after the other on all threads; a row's PSNR is
  * over all values of all textures, weights and atoms rounded as they are stored. The paper's coding is charged what the
  * paper charges: an index and a weight an atom, counts being implied by its batches, and a byte a texel of the
- * dictionary; ours what the container stores. Photographs are charged all their pixels and mips. */
+ * dictionary; ours what the container stores. Photographs are charged all their pixels and mips, and two bytes a splat
+ * that say which is its own. */
 #include "measure/textures.h"
 
 #include <math.h>
@@ -12,10 +13,18 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "measure/blocks.h"
 #include "sparse/code.h"
 
-enum { coded_chunks = 64, compared_atoms = 1024, adaptive_atoms = 2048, compared_textures = 50000 };
+enum {
+    coded_chunks = 64,
+    compared_atoms = 1024,
+    adaptive_atoms = 2048,
+    compared_textures = 50000,
+    large_atoms = 16384,    /* above, training takes no more than */
+    large_trained = 196608, /* textures and */
+    large_epochs = 2,       /* rounds over them, and codes */
+    large_coded = 65536,    /* others */
+};
 static const double mips = 4.0 / 3, cut_off = 40;
 
 struct watch {
@@ -35,19 +44,21 @@ static bool watch_epoch(void *context, const struct spl_train_progress *epoch)
     return true;
 }
 
-static int train(const struct spl_textures_options *o, struct watch *watch, enum spl_train_method method,
-                 uint32_t atoms, float lambda, struct spl_dictionary *out, struct spl_error *err)
+static int train(const struct spl_textures_options *o, const struct spl_texture_source *source, struct watch *watch,
+                 enum spl_train_method method, uint32_t atoms, float lambda, struct spl_dictionary *out,
+                 struct spl_error *err)
 {
     const struct spl_train_settings settings = {.method = method,
                                                 .dictionary = atoms,
                                                 .atoms = SPL_ATOMS_MAX,
                                                 .psnr = lambda > 0 ? 0 : (float)cut_off,
                                                 .lambda = lambda,
-                                                .epochs = o->epochs,
+                                                .epochs = atoms > large_atoms && o->epochs > large_epochs ? large_epochs
+                                                                                                          : o->epochs,
                                                 .seed = o->seed,
                                                 .memory_bytes = o->memory_bytes,
                                                 .threads = o->threads};
-    return spl_dictionary_train(o->source, &settings, watch_epoch, watch, out, err);
+    return spl_dictionary_train(source, &settings, watch_epoch, watch, out, err);
 }
 
 struct coding {
@@ -76,10 +87,9 @@ static void code_piece(void *context, size_t begin, size_t end, unsigned worker)
 }
 
 /* Codes all textures, in chunks as they come. */
-static int code_all(const struct spl_textures_options *o, const struct spl_coder *coder, struct spl_code_sums *sums,
-                    struct spl_error *err)
+static int code_all(const struct spl_textures_options *o, const struct spl_texture_source *source,
+                    const struct spl_coder *coder, struct spl_code_sums *sums, struct spl_error *err)
 {
-    const struct spl_texture_source *source = o->source;
     struct coding *c = spl_alloc(1, sizeof *c, err);
     uint32_t n = spl_texture_values(source->size);
     uint8_t *textures = spl_alloc_raw((size_t)coded_chunks * SPL_CHUNK_SPLATS, n, err);
@@ -113,16 +123,49 @@ static double to_psnr(double squared_error, double values)
     return squared_error > 0 ? -10 * log10(squared_error / values) : INFINITY;
 }
 
-static struct spl_textures_row *add_row(struct spl_textures_report *report, const char *name)
+static struct spl_textures_row *add_row(struct spl_textures_report *report, const char *name,
+                                        enum spl_textures_kind kind)
 {
     spl_assert(report->rows < SPL_TEXTURES_ROWS_MAX);
     struct spl_textures_row *row = &report->row[report->rows++];
-    *row = (struct spl_textures_row){.atoms = NAN};
+    *row = (struct spl_textures_row){.atoms = NAN, .packed = NAN, .left_out = NAN, .kind = kind};
     snprintf(row->name, sizeof row->name, "%s", name);
     return row;
 }
 
-/* One row: a dictionary of at most `atoms`, and what coding with it gives. */
+/* Of a mean colour: the dataset's, else 24 bits. */
+static double find_color_bytes(const struct spl_textures_options *o)
+{
+    const struct spl_dataset_info *info = o->dataset ? spl_dataset_get_info(o->dataset) : NULL;
+    return info ? (double)info->attribute_bits[SPL_ATTRIBUTE_COLOR] / 8 / (double)info->splats : 3;
+}
+
+/* Every `stride`-th texture of a source, from `offset` on. */
+struct thinned {
+    const struct spl_texture_source *from;
+    uint64_t stride, offset;
+};
+
+static int read_thinned(void *context, uint64_t first, uint32_t count, uint8_t *out, struct spl_error *err)
+{
+    const struct thinned *t = context;
+    size_t n = spl_texture_values(t->from->size);
+    int rc = 0;
+    for (uint32_t i = 0; !rc && i < count; i++)
+        rc = t->from->read(t->from->context, t->offset + (first + i) * t->stride, 1, out + i * n, err);
+    return rc;
+}
+
+static struct spl_texture_source thin(struct thinned *t)
+{
+    return (struct spl_texture_source){.count = (t->from->count - t->offset + t->stride - 1) / t->stride,
+                                       .size = t->from->size,
+                                       .read = read_thinned,
+                                       .context = t};
+}
+
+/* One row: a dictionary of at most `atoms`, and what coding with it gives. Large dictionaries are trained on some of
+ * the textures and measured on some of the others: without a Gram matrix each step multiplies with all atoms. */
 static int measure_coding(const struct spl_textures_options *o, struct spl_textures_report *report, const char *name,
                           uint32_t atoms, uint32_t weight_bits, float lambda, struct spl_error *err)
 {
@@ -130,27 +173,34 @@ static int measure_coding(const struct spl_textures_options *o, struct spl_textu
     struct spl_dictionary dictionary = {0};
     struct spl_coder *coder = NULL;
     struct spl_code_sums sums = {0};
-    uint64_t begin_ns = spl_now_ns(), used = 0;
+    uint64_t begin_ns = spl_now_ns(), used = 0, every = o->source->count / large_trained + 1;
+    uint64_t coded_every = (o->source->count / every / large_coded + 1) * every;
+    bool some = atoms > large_atoms && every > 1;
+    struct thinned train_on = {o->source, some ? every : 1, 0}, measure_on = {o->source, some ? coded_every : 1, some};
+    struct spl_texture_source trained = thin(&train_on), coded = thin(&measure_on);
     const struct spl_code_settings settings = {
         .atoms = SPL_ATOMS_MAX, .psnr = lambda > 0 ? 0 : (float)cut_off, .lambda = lambda, .weight_bits = weight_bits};
-    int rc = train(o, &watch, SPL_TRAIN_BATCHES, atoms, lambda, &dictionary, err);
+    int rc = train(o, some ? &trained : o->source, &watch, SPL_TRAIN_BATCHES, atoms, lambda, &dictionary, err);
     if (rc)
         goto done;
     struct spl_error why = {0};
     coder = spl_coder_create(&dictionary, &settings, o->memory_bytes, o->threads, &why);
-    rc = coder ? code_all(o, coder, &sums, err) : spl_fail_field(err, why.code, why.field, "%s", why.message);
+    rc = coder ? code_all(o, some ? &coded : o->source, coder, &sums, err)
+               : spl_fail_field(err, why.code, why.field, "%s", why.message);
     if (rc)
         goto done;
-    struct spl_textures_row *row = add_row(report, name);
+    struct spl_textures_row *row = add_row(report, name, lambda > 0 ? SPL_TEXTURES_OURS : SPL_TEXTURES_PAPER);
     for (int k = 1; k <= SPL_ATOMS_MAX; k++)
         used += (uint64_t)k * sums.histogram[k];
-    double splats = (double)o->splats, texels = (double)dictionary.count * spl_texture_values(dictionary.size);
-    row->paper = !(lambda > 0);
-    row->codes = row->paper ? (double)used * (log2(atoms) + weight_bits) / 8 / splats : (double)sums.bits / 8 / splats;
-    row->dictionary = (texels + (row->paper ? 0 : 4.0 * dictionary.count)) / splats;
+    double splats = (double)o->origin->splats, texels = (double)dictionary.count * spl_texture_values(dictionary.size);
+    double bits = lambda > 0 ? (double)sums.bits : (double)used * (log2(atoms) + weight_bits);
+    row->color = lambda > 0 ? find_color_bytes(o) : 3;
+    row->codes = bits / 8 / (double)sums.splats * (double)o->source->count / splats;
+    row->shared = (texels + (lambda > 0 ? 4.0 * dictionary.count : 0)) / splats;
     row->psnr = to_psnr(sums.squared_error, (double)sums.values);
     row->atoms = (double)used / (double)sums.splats;
     row->count = dictionary.count;
+    row->sample = some ? trained.count : 0;
     row->seconds = (double)(spl_now_ns() - begin_ns) / SPL_NS_PER_S;
 done:
     spl_coder_destroy(coder);
@@ -158,215 +208,181 @@ done:
     return rc;
 }
 
-enum { plain, bc7, bc1, half, half_bc7, half_bc1, baselines };
-
-static void code_blocks(uint8_t *pixels, uint32_t size, void (*code)(const uint8_t[16][3], uint8_t[16][3]))
+/* How far textures are from their mean colours. */
+static int measure_colors(const struct spl_textures_options *o, struct spl_textures_report *report,
+                          struct spl_error *err)
 {
-    for (uint32_t y = 0; y < size; y += 4)
-        for (uint32_t x = 0; x < size; x += 4) {
-            uint8_t in[16][3], out[16][3];
-            for (uint32_t i = 0; i < 16; i++)
-                memcpy(in[i], pixels + 3 * ((y + i / 4) * size + x + i % 4), 3);
-            code((const uint8_t(*)[3])in, out);
-            for (uint32_t i = 0; i < 16; i++)
-                memcpy(pixels + 3 * ((y + i / 4) * size + x + i % 4), out[i], 3);
-        }
-}
-
-/* Half the size by boxes of 2 × 2. */
-static void halve(const uint8_t *in, uint32_t size, uint8_t *out)
-{
-    for (uint32_t i = 0; i < 3 * size * size / 4; i++) {
-        uint32_t c = i % 3, x = i / 3 % (size / 2) * 2, y = i / 3 / (size / 2) * 2;
-        const uint8_t *at = in + 3 * (y * size + x) + c;
-        out[i] = (uint8_t)((at[0] + at[3] + at[3 * size] + at[3 * size + 3] + 2) / 4);
-    }
-}
-
-/* Twice the size, bilinear, the edge repeated. */
-static float enlarged(const uint8_t *half_pixels, uint32_t half_size, uint32_t x, uint32_t y, uint32_t c)
-{
-    uint32_t last = half_size - 1, x0 = x / 2, y0 = y / 2;
-    uint32_t x1 = x & 1 ? (x0 < last ? x0 + 1 : last)
-                  : x0  ? x0 - 1
-                        : 0,
-             y1 = y & 1 ? (y0 < last ? y0 + 1 : last)
-                  : y0  ? y0 - 1
-                        : 0;
-    float near =
-        0.75f * half_pixels[3 * (y0 * half_size + x0) + c] + 0.25f * half_pixels[3 * (y0 * half_size + x1) + c];
-    float far = 0.75f * half_pixels[3 * (y1 * half_size + x0) + c] + 0.25f * half_pixels[3 * (y1 * half_size + x1) + c];
-    return 0.75f * near + 0.25f * far;
-}
-
-/* Adds the squared errors, of 255, of what one texture is in each baseline. */
-static void compare_texture(const uint8_t *texture, uint32_t size, double error[baselines])
-{
-    uint8_t pixels[SPL_TEXTURE_VALUES_MAX], coded[SPL_TEXTURE_VALUES_MAX];
-    uint32_t texels = size * size;
-    float mean[3] = {0};
-    for (uint32_t i = 0; i < texels; i++)
-        for (uint32_t c = 0; c < 3; c++) {
-            pixels[3 * i + c] = texture[c * texels + i];
-            mean[c] += (float)texture[c * texels + i] / (float)texels;
-        }
-    for (int kind = plain; kind < baselines; kind++) {
-        bool small = kind >= half;
-        if (small)
-            halve(pixels, size, coded);
-        else
-            memcpy(coded, pixels, 3 * (size_t)texels);
-        if (kind == bc7 || kind == half_bc7)
-            code_blocks(coded, small ? size / 2 : size, spl_block_bc7);
-        if (kind == bc1 || kind == half_bc1)
-            code_blocks(coded, small ? size / 2 : size, spl_block_bc1);
-        for (uint32_t i = 0; i < 3 * texels; i++) {
-            uint32_t c = i % 3, x = i / 3 % size, y = i / 3 / size;
-            float value = kind == plain ? roundf(mean[c])
-                          : small       ? enlarged(coded, size / 2, x, y, c)
-                                        : (float)coded[i];
-            error[kind] += (double)((value - pixels[i]) * (value - pixels[i]));
-        }
-    }
-}
-
-/* Colours alone, and the photographs as they are, at half the size, and in blocks. */
-static int measure_baselines(const struct spl_textures_options *o, struct spl_textures_report *report,
-                             struct spl_error *err)
-{
-    static const struct {
-        const char *name;
-        int kind; /* -1: the textures themselves */
-        double bytes;
-    } photographs[] = {{"LOD 0", -1, 3},         {"LOD 0 BC7", bc7, 1},           {"LOD 0 BC1", bc1, 0.5},
-                       {"LOD 1", half, 3.0 / 4}, {"LOD 1 BC7", half_bc7, 1. / 4}, {"LOD 1 BC1", half_bc1, 0.5 / 4}};
     const struct spl_texture_source *source = o->source;
     uint64_t stride = source->count / compared_textures + 1, compared = 0;
-    uint8_t texture[SPL_TEXTURE_VALUES_MAX];
-    double error[baselines] = {0};
+    uint32_t texels = source->size * source->size;
+    double error = 0;
     for (uint64_t i = 0; i < source->count; i += stride, compared++) {
+        uint8_t texture[SPL_TEXTURE_VALUES_MAX];
         int rc = source->read(source->context, i, 1, texture, err);
         if (rc)
             return rc;
-        compare_texture(texture, source->size, error);
+        for (uint32_t c = 0; c < 3; c++) {
+            const uint8_t *plane = texture + c * texels;
+            double sum = 0;
+            for (uint32_t t = 0; t < texels; t++)
+                sum += plane[t];
+            double mean = round(sum / texels);
+            for (uint32_t t = 0; t < texels; t++)
+                error += (plane[t] - mean) * (plane[t] - mean);
+        }
     }
-    double values = (double)compared * spl_texture_values(source->size) * 255 * 255;
-    add_row(report, "colours only")->psnr = to_psnr(error[plain], values);
-    for (size_t i = 0; o->pixels && i < sizeof photographs / sizeof *photographs; i++) {
-        struct spl_textures_row *row = add_row(report, photographs[i].name);
-        row->codes = mips * photographs[i].bytes * (double)o->pixels / (double)o->splats;
-        row->psnr = photographs[i].kind < 0 ? INFINITY : to_psnr(error[photographs[i].kind], values);
-    }
+    struct spl_textures_row *row = add_row(report, "colours only", SPL_TEXTURES_OTHER);
+    row->color = find_color_bytes(o);
+    row->psnr = to_psnr(error, (double)compared * 3 * texels * 255 * 255);
+    if (o->projected && o->projected->packed.views)
+        row->packed = o->projected->packed.colored;
+    if (o->projected && o->projected->left_out.views)
+        row->left_out = o->projected->left_out.colored;
     return 0;
+}
+
+/* Photographs put onto splats, and, as a reference, each splat's own texture. */
+static void add_photographs(const struct spl_textures_options *o, struct spl_textures_report *report)
+{
+    static const struct {
+        const char *name;
+        double bytes; /* a pixel */
+    } forms[SPL_PROJECTED_COUNT] = {{"LOD 0", 3},       {"LOD 0 BC7", 1},      {"LOD 0 BC1", 0.5},
+                                    {"LOD 1", 3.0 / 4}, {"LOD 1 BC7", 1. / 4}, {"LOD 1 BC1", 0.5 / 4}};
+    const struct spl_projected_report *p = o->projected;
+    for (int k = 0; p && k < SPL_PROJECTED_COUNT; k++) {
+        struct spl_textures_row *row = add_row(report, forms[k].name, SPL_TEXTURES_PHOTOGRAPHS);
+        row->color = sizeof *o->origin->photo;
+        row->shared = mips * forms[k].bytes * (double)o->origin->pixels / (double)o->origin->splats;
+        row->psnr = p->texture[k];
+        row->packed = p->packed.views ? p->packed.projected[k] : NAN;
+        row->left_out = p->left_out.views ? p->left_out.projected[k] : NAN;
+    }
+    struct spl_textures_row *row = add_row(report, "a texture for each splat", SPL_TEXTURES_OTHER);
+    row->codes = mips * spl_texture_values(o->source->size) * (double)o->source->count / (double)o->origin->splats;
+    row->psnr = INFINITY;
+}
+
+/* The dataset as it was packed. */
+static void add_packed(const struct spl_textures_options *o, struct spl_textures_report *report)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(o->dataset);
+    const json_t *textures = json_object_get(spl_dataset_get_meta(o->dataset), "textures");
+    uint64_t histogram[SPL_ATOMS_MAX + 1] = {0}, used = 0;
+    double splats = (double)info->splats * 8, textured = json_number_value(json_object_get(textures, "splats"));
+    if (!info->atoms || spl_dataset_count_atoms(o->dataset, histogram, NULL))
+        return;
+    for (int k = 1; k <= SPL_ATOMS_MAX; k++)
+        used += (uint64_t)k * histogram[k];
+    struct spl_textures_row *row = add_row(report, "as packed", SPL_TEXTURES_PACKED);
+    row->color = (double)info->attribute_bits[SPL_ATTRIBUTE_COLOR] / splats;
+    row->codes = (double)info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] / splats;
+    row->shared = (double)info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY] / splats;
+    row->psnr =
+        json_is_number(json_object_get(textures, "psnr")) ? json_number_value(json_object_get(textures, "psnr")) : NAN;
+    row->atoms = textured > 0 ? (double)used / textured : NAN;
+    row->count = info->atoms;
+    if (o->projected && o->projected->packed.views)
+        row->packed = o->projected->packed.textured;
+    if (o->projected && o->projected->left_out.views)
+        row->left_out = o->projected->left_out.textured;
+}
+
+static double find_geometry_bytes(const struct spl_dataset *dataset)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    uint64_t bits = 0;
+    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
+        if (a != SPL_ATTRIBUTE_COLOR && a != SPL_ATTRIBUTE_TEXTURE && a != SPL_ATTRIBUTE_DICTIONARY)
+            bits += info->attribute_bits[a];
+    return (double)bits / 8 / (double)info->splats;
+}
+
+/* The paper's codings. One that is too large for the memory is left away by name. */
+static int measure_paper(const struct spl_textures_options *o, struct spl_textures_report *report,
+                         struct spl_error *err)
+{
+    static const struct {
+        const char *name;
+        uint32_t atoms, weight_bits;
+    } codings[] = {{"paper D8W4", 256, 4}, {"paper D12W4", 4096, 4}, {"paper D16W8", 65536, 8}};
+    int rc = 0;
+    for (size_t i = 0; !rc && i < sizeof codings / sizeof *codings; i++) {
+        struct spl_error why = {0};
+        rc = measure_coding(o, report, codings[i].name, codings[i].atoms, codings[i].weight_bits, 0, &why);
+        if (rc == SPL_E_LIMIT) {
+            snprintf(report->left_away, sizeof report->left_away, "%s: %.400s", codings[i].name, why.message);
+            rc = 0;
+        } else if (rc)
+            spl_fail_field(err, rc, why.field, "%s", why.message);
+    }
+    return rc;
+}
+
+/* k-SVD and mini-batches on the same textures. */
+static int measure_trainings(const struct spl_textures_options *o, struct spl_textures_report *report,
+                             struct spl_error *err)
+{
+    struct watch ksvd = {o, "k-SVD", report->ksvd, &report->ksvd_epochs};
+    struct watch batches = {o, "mini-batches", report->batches, &report->batches_epochs};
+    struct spl_dictionary dictionary = {0};
+    report->dictionary = compared_atoms;
+    int rc = train(o, o->source, &batches, SPL_TRAIN_BATCHES, compared_atoms, 0, &dictionary, err);
+    spl_dictionary_finish(&dictionary);
+    if (!rc)
+        rc = train(o, o->source, &ksvd, SPL_TRAIN_KSVD, compared_atoms, 0, &dictionary, err);
+    spl_dictionary_finish(&dictionary);
+    return rc;
 }
 
 int spl_textures_measure(const struct spl_textures_options *o, struct spl_textures_report *report,
                          struct spl_error *err)
 {
     static const double shares[] = {0.06, 0.03, 0.015, 0.0075}; /* lambda, of the error at the cut-off */
-    struct watch ksvd = {o, "k-SVD", report->ksvd, &report->ksvd_epochs};
-    struct watch batches = {o, "mini-batches", report->batches, &report->batches_epochs};
-    struct spl_dictionary dictionary = {0};
-    *report = (struct spl_textures_report){.dictionary = compared_atoms};
+    *report = (struct spl_textures_report){.splats = o->origin->splats};
     if (!o->source->count || o->source->size < 8 || o->source->size % 8)
         return spl_fail(err, SPL_E_INPUT,
                         "%llu textures of %u texels a side: nothing to compare; there must be some, of 8, 16 "
                         "or 32",
                         (unsigned long long)o->source->count, o->source->size);
-    int rc = measure_baselines(o, report, err);
+    if (o->dataset && spl_dataset_get_info(o->dataset)->splats != o->origin->splats)
+        return spl_fail_field(err, SPL_E_INPUT, "splats", "%s has %llu splats, the textures are of %llu: pack again",
+                              spl_dataset_get_info(o->dataset)->id,
+                              (unsigned long long)spl_dataset_get_info(o->dataset)->splats,
+                              (unsigned long long)o->origin->splats);
+    report->geometry = o->dataset ? find_geometry_bytes(o->dataset) : 0;
+    int rc = measure_colors(o, report, err);
     if (!rc)
-        rc = train(o, &batches, SPL_TRAIN_BATCHES, compared_atoms, 0, &dictionary, err);
-    spl_dictionary_finish(&dictionary);
+        add_photographs(o, report);
+    if (!rc && o->dataset)
+        add_packed(o, report);
+    if (rc || !o->epochs)
+        return rc;
+    rc = measure_trainings(o, report, err);
     if (!rc)
-        rc = train(o, &ksvd, SPL_TRAIN_KSVD, compared_atoms, 0, &dictionary, err);
-    spl_dictionary_finish(&dictionary);
-    if (!rc)
-        rc = measure_coding(o, report, "paper D8W4", 256, 4, 0, err);
-    if (!rc)
-        rc = measure_coding(o, report, "paper D12W4", 4096, 4, 0, err);
-    report->first_adaptive = report->rows;
+        rc = measure_paper(o, report, err);
     for (size_t i = 0; !rc && i < sizeof shares / sizeof *shares; i++) {
         char name[40];
         double lambda = shares[i] * spl_texture_values(o->source->size) * pow(10, -cut_off / 10);
         snprintf(name, sizeof name, "adaptive, lambda %.2g", lambda);
         rc = measure_coding(o, report, name, adaptive_atoms, 6, (float)lambda, err);
-        report->adaptives += !rc;
     }
     return rc;
 }
 
 double spl_textures_bytes_at(const struct spl_textures_report *report, double psnr)
 {
-    for (uint32_t i = report->first_adaptive; i + 1 < report->first_adaptive + report->adaptives; i++) {
-        const struct spl_textures_row *a = &report->row[i], *b = a + 1;
-        if (a->psnr <= psnr && psnr <= b->psnr && a->psnr < b->psnr) {
+    const struct spl_textures_row *a = NULL;
+    for (uint32_t i = 0; i < report->rows; i++) {
+        const struct spl_textures_row *b = &report->row[i];
+        if (b->kind != SPL_TEXTURES_OURS)
+            continue;
+        if (a && a->psnr <= psnr && psnr <= b->psnr && a->psnr < b->psnr) {
             double share = (psnr - a->psnr) / (b->psnr - a->psnr);
-            double low = log(a->codes + a->dictionary), high = log(b->codes + b->dictionary);
+            double low = log(spl_textures_row_bytes(a)), high = log(spl_textures_row_bytes(b));
             return exp(low + share * (high - low));
         }
+        a = b;
     }
     return NAN;
-}
-
-static uint32_t place_epochs(const struct spl_train_progress *epochs, uint32_t count, struct spl_chart_point *points)
-{
-    for (uint32_t i = 0; i < count; i++) {
-        points[i] = (struct spl_chart_point){
-            .ms = epochs[i].seconds, .psnr = epochs[i].psnr, .index = -1, .front = i + 1 == count};
-        snprintf(points[i].detail, sizeof points[i].detail, "epoch %u, %.2f atoms a splat", epochs[i].epoch,
-                 epochs[i].atoms_per_splat);
-    }
-    return count;
-}
-
-int spl_textures_chart_training(const struct spl_textures_report *report, char **svg, size_t *length,
-                                struct spl_error *err)
-{
-    struct spl_chart_point points[2][SPL_TEXTURES_EPOCHS_MAX];
-    struct spl_chart_curve curves[2] = {{.name = "mini-batches", .points = points[0]},
-                                        {.name = "k-SVD", .color = 1, .points = points[1]}};
-    curves[0].count = place_epochs(report->batches, report->batches_epochs, points[0]);
-    curves[1].count = place_epochs(report->ksvd, report->ksvd_epochs, points[1]);
-    char subtitle[160];
-    snprintf(subtitle, sizeof subtitle,
-             "%u atoms, up to %d a splat until %g dB, %llu textures; weights not yet quantised", report->dictionary,
-             SPL_ATOMS_MAX, cut_off, (unsigned long long)(report->batches_epochs ? report->batches[0].sample : 0));
-    return spl_chart_write(&(struct spl_chart){.title = "Training: quality against time",
-                                               .subtitle = subtitle,
-                                               .axis = "seconds",
-                                               .unit = "s",
-                                               .note = "a point is an epoch",
-                                               .curves = curves,
-                                               .curve_count = 2},
-                           svg, length, err);
-}
-
-int spl_textures_chart_rate(const struct spl_textures_report *report, char **svg, size_t *length, struct spl_error *err)
-{
-    struct spl_chart_point points[3][SPL_TEXTURES_ROWS_MAX];
-    struct spl_chart_curve curves[3] = {{.name = "adaptive", .points = points[0]},
-                                        {.name = "the paper's coding", .color = 1, .points = points[1]},
-                                        {.name = "photographs", .color = 2, .dash = 2, .points = points[2]}};
-    for (uint32_t i = 0; i < report->rows; i++) {
-        const struct spl_textures_row *row = &report->row[i];
-        bool adaptive = i >= report->first_adaptive && i < report->first_adaptive + report->adaptives;
-        if (!isfinite(row->psnr) || !(row->codes > 0))
-            continue;
-        struct spl_chart_curve *curve = &curves[adaptive ? 0 : row->paper ? 1 : 2];
-        struct spl_chart_point *point = &points[curve - curves][curve->count++];
-        *point = (struct spl_chart_point){
-            .ms = row->codes + row->dictionary, .psnr = row->psnr, .index = -1, .front = adaptive};
-        snprintf(point->label, sizeof point->label, "%s", adaptive ? "" : row->name);
-        snprintf(point->detail, sizeof point->detail, "%s: codes %.2f, dictionary %.2f", row->name, row->codes,
-                 row->dictionary);
-    }
-    return spl_chart_write(&(struct spl_chart){.title = "Textures: quality against bytes a splat",
-                                               .subtitle = "codes and dictionary, or photographs with mips; without "
-                                                           "geometry and mean colours",
-                                               .axis = "bytes a splat",
-                                               .unit = "bytes",
-                                               .note = "PSNR against the splats' textures",
-                                               .curves = curves,
-                                               .curve_count = 3},
-                           svg, length, err);
 }

@@ -1,47 +1,70 @@
 /* Coders of splat textures beside each other, on the same textures: how training converges, and bytes against quality,
- * with the paper's own settings and block-compressed photographs (table 1 and figure 7 of the sparse-coding paper). */
+ * with the paper's own settings and photographs put onto the splats (table 1 and figure 7 of the sparse-coding paper).
+ */
 #ifndef SPL_MEASURE_TEXTURES_H
 #define SPL_MEASURE_TEXTURES_H
 
+#include "dataset/dataset.h"
 #include "measure/chart.h"
+#include "measure/projected.h"
 #include "sparse/train.h"
 
 enum { SPL_TEXTURES_EPOCHS_MAX = 64, SPL_TEXTURES_ROWS_MAX = 24 };
 
 struct spl_textures_options {
     const struct spl_texture_source *source;
-    uint64_t splats; /* of the dataset: bytes are told of each */
-    uint64_t pixels; /* of its photographs; 0 = unknown: no rows of photographs */
-    uint32_t epochs; /* of each training, 1..SPL_TEXTURES_EPOCHS_MAX */
+    const struct spl_texture_origin *origin;
+    const struct spl_dataset *dataset; /* what was packed: its geometry is charged to every row; may be NULL */
+    const struct spl_projected_report *projected; /* rows of photographs; may be NULL */
+    uint32_t epochs; /* of each training, 0..SPL_TEXTURES_EPOCHS_MAX; 0: no coding but the dataset's own is measured */
     uint64_t memory_bytes, seed;
     unsigned threads;
     void (*progress)(void *context, const char *what, const struct spl_train_progress *epoch); /* may be NULL */
     void *context;
 };
 
+/* Bytes of a splat: its mean colour, or the index of its photograph; its codes; and its share of what all splats look
+ * up, which is the dictionary as it is stored, photographs with their mips, or textures with theirs. */
 struct spl_textures_row {
     char name[40];
-    double codes, dictionary; /* bytes a splat; codes: of photographs, the pixels with their mips */
-    double psnr;              /* against the textures, dB; infinite where they are the textures */
-    double atoms;             /* a splat with a texture, mean; NaN for what has none */
-    uint32_t count;           /* atoms of the dictionary */
-    double seconds;           /* training and coding */
-    bool paper;               /* the paper's coding: index and weight of fixed width */
+    double color, codes, shared;
+    double psnr;             /* against the textures, dB; infinite where they are the textures */
+    double packed, left_out; /* of frames against photographs, dB; NaN = not measured */
+    double atoms;            /* a splat with a texture, mean; NaN for what has none */
+    uint32_t count;          /* atoms of the dictionary */
+    uint64_t sample;         /* textures that were trained on, others measured; 0 = all, both */
+    double seconds;          /* training and coding */
+    enum spl_textures_kind {
+        SPL_TEXTURES_OTHER,
+        SPL_TEXTURES_PHOTOGRAPHS,
+        SPL_TEXTURES_PAPER, /* index and weight of fixed width */
+        SPL_TEXTURES_OURS,  /* least error + lambda bits */
+        SPL_TEXTURES_PACKED /* the dataset itself */
+    } kind;
 };
 
 struct spl_textures_report {
     struct spl_train_progress ksvd[SPL_TEXTURES_EPOCHS_MAX], batches[SPL_TEXTURES_EPOCHS_MAX];
     uint32_t ksvd_epochs, batches_epochs, dictionary; /* atoms both were trained to */
+    double geometry; /* bytes a splat without colour: positions, normals, radii, headers; 0 without a dataset */
+    uint64_t splats;
+    char left_away[512]; /* the coding that did not fit, and why; "" */
     struct spl_textures_row row[SPL_TEXTURES_ROWS_MAX];
-    uint32_t rows, first_adaptive, adaptives; /* row[first_adaptive ..]: least error + lambda · bits, rising quality */
+    uint32_t rows;
 };
+
+static inline double spl_textures_row_bytes(const struct spl_textures_row *row)
+{
+    return row->color + row->codes + row->shared;
+}
 
 /* Trains and codes all of it; minutes to half an hour. SPL_E_INPUT where the source is empty or its textures are
  * smaller than a block, and what training and coding fail with. Blocks. */
 int spl_textures_measure(const struct spl_textures_options *options, struct spl_textures_report *report,
                          struct spl_error *err);
 
-/* Bytes a splat that the adaptive coding needs for `psnr`, between its rows; NaN beyond them. */
+/* Bytes a splat that the adaptive coding needs for `psnr`, mean colour and dictionary with it, between its rows; NaN
+ * beyond them. */
 double spl_textures_bytes_at(const struct spl_textures_report *report, double psnr);
 
 /* Quality against seconds of training, and against bytes a splat. As spl_chart_write(). */

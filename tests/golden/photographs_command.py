@@ -1,5 +1,6 @@
 """'splatd pack --cameras' as a user runs it: splats take the photographs' colours and textures, what is wrong with a
 photograph is said by name, and the rest is packed when --keep-going says so."""
+import json
 import math
 import os
 import pathlib
@@ -156,13 +157,50 @@ with tempfile.TemporaryDirectory() as folder:
         assert spread(8) > 1.3 * spread(0), (coding, spread(8), spread(0))
         assert run("info", "wall.spld", "--json").count("resampling_psnr") <= 1
 
-    # the textures as they were before: coders beside each other
-    table = run("bench", "--textures", "images/kept", "-o", "coders", "--epochs", "2")
-    rows = {line[:24].strip(): line.split() for line in table.splitlines()}
-    assert "colours only" in rows and "LOD 0 BC1" in rows and "paper D12W4" in rows, table
+    # the textures as they were before: coders beside each other, the photograph itself on the splats, a view that was
+    # left out and whose photograph is the same plane seen from nearer
+    cameras = {"rings": camera((0, -1.5, 0), (0, 0, 0), (128, 96)), "nearer": camera((0, -1, 0), (0, 0, 0), (128, 96))}
+    write_png("images/nearer.png", 128, 96, lambda x, y: int(128 + 90 * math.sin(0.8 / 1.5 * math.hypot(x - 64, y - 48))))
+    put_views(cameras)
+    arguments = ("--textures", "images/kept", "wall.spld", "--cameras", "views.json", "-o", "coders", "--repeats", "1", "--size", "160x90")
+    table = run("bench", *arguments, "--epochs", "2")
+    rows = {line[:24].strip(): line[24:].split() for line in table.splitlines()}
+    assert "paper D12W4" in rows and "paper D16W8" in rows and "adaptive, lambda 0.00029" in rows, table
+    columns = dict(geometry=0, all=4, megabytes=5, psnr=8, packed=9, left_out=10)
+
+    def figure(row, column):
+        return float(rows[row][columns[column]].replace("-", "nan"))
+    # the photograph itself, but at the frame's edge, where splats reach in whose centres it does not show
+    assert figure("LOD 0", "psnr") == math.inf
+    assert figure("LOD 0", "packed") > figure("colours only", "packed") + 10, table
+    assert figure("LOD 0", "left_out") > figure("colours only", "left_out") + 6, table
+    assert figure("LOD 0 BC7", "psnr") > figure("LOD 0 BC1", "psnr") > 25, table
+    assert figure("LOD 0", "psnr") > figure("LOD 1", "psnr") > figure("LOD 1 BC1", "psnr"), table
+    assert figure("as packed", "packed") > figure("colours only", "packed") + 3, table
+    info = json.loads(run("info", "wall.spld", "--json"))
+    assert abs(figure("as packed", "all") - info["bytes_per_splat"]["total"]) < 0.02, (table, info)
+    assert table.count("visibility") == 3 and re.search(r"\n  8 +\d", table), table
+    assert "1 that were packed" in table and "; 1 left out" in table, table
     assert sorted(os.listdir("coders")) == ["rate.svg", "textures.csv", "training.csv", "training.svg"]
-    done = subprocess.run([SPLATD, "bench", "--textures", "wall.spld", "-o", "coders"], stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 2 and "no textures" in done.stderr, done.stderr
+
+    def not_measured(words, *arguments):
+        done = subprocess.run([SPLATD, "bench", "--textures", *arguments, "-o", "coders", "--epochs", "0", "--repeats",
+                               "1", "--size", "16x9"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
+    not_measured("no textures", "wall.spld")
+    not_measured("NAME.spld, which is missing", "images/kept", "--cameras", "views.json")
+    not_measured("--cameras MODEL", "images/kept", "wall.spld", "--images", "images")
+    put_views({"nearer": cameras["nearer"]})
+    not_measured("'rings' was packed", "images/kept", "wall.spld", "--cameras", "views.json")
+    put_views({**cameras, "large": camera((0, -1, 0), (0, 0, 0), (640, 480))})
+    not_measured("the limit is 1", "images/kept", "wall.spld", "--cameras", "views.json", "--memory", "1")
+    put_views(good)
+    write_png("images/left.png", 64, 48, bytes((200, 100, 50)))
+    write_png("images/right.png", 64, 48, bytes((200, 100, 50)))
+    points.append("3 0 3")
+    pathlib.Path("wall.xyz").write_text("\n".join(points) + "\n")
+    pack()
+    not_measured("pack again", "images/kept", "wall.spld")
     shutil.rmtree("coders")
     os.unlink("images/kept")
 

@@ -1,12 +1,14 @@
-/* The baselines' blocks, files of textures and what is refused of them, and the comparison of coders on few textures.
- */
+/* The baselines' blocks and where photographs are looked up, files of textures and what is refused of them, and the
+ * comparison of coders on few textures. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <cmocka.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <unistd.h>
 
+#include "base/memory.h"
 #include "measure/blocks.h"
 #include "measure/textures.h"
 #include "sparse/texture_file.h"
@@ -162,11 +164,27 @@ static void test_file(void **state)
     plant_finish(&p);
 }
 
+static const struct spl_textures_row *find_row(const struct spl_textures_report *report, const char *name)
+{
+    for (uint32_t i = 0; i < report->rows; i++)
+        if (!strcmp(report->row[i].name, name))
+            return &report->row[i];
+    fail_msg("no row %s", name);
+    return NULL;
+}
+
 static void test_measure(void **state)
 {
     struct plant p = plant_make(8, 40, 1200, 2, 1), few = plant_make(4, 1, 2, 1, 1);
-    struct spl_textures_options o = {
-        .source = plant_source(&p), .splats = 2400, .pixels = 100000, .epochs = 3, .memory_bytes = 1 << 28, .seed = 1};
+    const struct spl_texture_origin origin = {.splats = 2400, .pixels = 100000};
+    struct spl_projected_report projected = {.texture = {INFINITY, 45, 40, 37, 36, 35},
+                                             .packed = {.views = 2, .colored = 20, .projected = {99, 40}}};
+    struct spl_textures_options o = {.source = plant_source(&p),
+                                     .origin = &origin,
+                                     .projected = &projected,
+                                     .epochs = 3,
+                                     .memory_bytes = 1 << 28,
+                                     .seed = 1};
     static struct spl_textures_report report;
     struct spl_error err = {0};
     char *svg;
@@ -175,37 +193,131 @@ static void test_measure(void **state)
     if (spl_textures_measure(&o, &report, &err))
         fail_msg("%s", err.message);
     assert_true(report.batches_epochs >= 1 && report.ksvd_epochs >= 1);
-    assert_int_equal(report.adaptives, 4);
-    assert_string_equal(report.row[0].name, "colours only");
-    assert_true(report.row[0].codes == 0 && report.row[0].psnr < 30);
-    assert_true(isinf(report.row[1].psnr)); /* LOD 0 */
-    assert_true(fabs(report.row[1].codes - 4 * 100000 / 2400.0) < 1e-6);
-    assert_true(report.row[2].psnr > report.row[3].psnr && report.row[3].psnr > report.row[4].psnr);
-    const struct spl_textures_row *first = &report.row[report.first_adaptive], *last = first + 3;
-    assert_true(last->psnr > first->psnr && last->codes > first->codes);
+    assert_true(report.geometry == 0 && !*report.left_away);
+    const struct spl_textures_row *colors = find_row(&report, "colours only");
+    assert_true(colors->color == 3 && colors->codes == 0 && colors->psnr < 30 && colors->packed == 20);
+    assert_true(isnan(colors->left_out));
+    const struct spl_textures_row *whole = find_row(&report, "LOD 0"), *half = find_row(&report, "LOD 1 BC1");
+    assert_true(isinf(whole->psnr) && whole->packed == 99 && whole->color == 2);
+    assert_true(fabs(whole->shared - 4 * 100000 / 2400.0) < 1e-6);
+    assert_true(fabs(half->shared - whole->shared / 24) < 1e-6 && half->psnr == 35);
+    /* half of the splats have a texture: 192 bytes and their mips */
+    assert_true(fabs(find_row(&report, "a texture for each splat")->codes - 128) < 1e-9);
+    const struct spl_textures_row *small = find_row(&report, "paper D8W4"), *large = find_row(&report, "paper D16W8");
+    assert_true(small->sample == 0 && large->sample == 0 && large->count > small->count);
+    assert_true(fabs(small->codes - small->atoms * 1.5 / 2) < 1e-9 && fabs(large->codes - large->atoms * 3 / 2) < 1e-9);
+    const struct spl_textures_row *last = &report.row[report.rows - 1], *first = last - 3;
+    assert_true(first->kind == SPL_TEXTURES_OURS && last->psnr > first->psnr && last->codes > first->codes);
     double between = spl_textures_bytes_at(&report, (first[2].psnr + last->psnr) / 2);
-    assert_true(between > first->codes && between <= last->codes + last->dictionary);
+    assert_true(between > first->codes && between <= spl_textures_row_bytes(last));
     assert_true(isnan(spl_textures_bytes_at(&report, 99)));
     assert_int_equal(spl_textures_chart_rate(&report, &svg, &length, &err), 0);
     assert_non_null(strstr(svg, "bytes a splat"));
     assert_non_null(strstr(svg, "paper D12W4"));
+    assert_non_null(strstr(svg, "LOD 1 BC7"));
     assert_null(strstr(svg, "milliseconds"));
     free(svg);
     assert_int_equal(spl_textures_chart_training(&report, &svg, &length, &err), 0);
     assert_non_null(strstr(svg, "k-SVD"));
     free(svg);
+    o.epochs = 0; /* no codings, and none of photographs */
+    o.projected = NULL;
+    assert_int_equal(spl_textures_measure(&o, &report, &err), 0);
+    assert_int_equal(report.rows, 2);
+    assert_int_equal(report.batches_epochs, 0);
     o.source = plant_source(&few); /* smaller than two blocks */
     assert_int_equal(spl_textures_measure(&o, &report, &err), SPL_E_INPUT);
     plant_finish(&p);
     plant_finish(&few);
 }
 
+/* A pyramid whose texel (x, y) is grey 10 x + y, alpha as given. */
+static struct spl_pyramid ramp(uint32_t width, uint32_t height, uint8_t alpha)
+{
+    struct spl_image image = {.type = SPL_PIXEL_RGBA8, .width = width, .height = height};
+    struct spl_pyramid pyramid;
+    uint8_t(*to)[4] = image.pixels = malloc((size_t)width * height * 4);
+    assert_non_null(to);
+    for (uint32_t i = 0; i < width * height; i++) {
+        uint8_t grey = (uint8_t)(10 * (i % width) + i / width);
+        memcpy(to[i], (uint8_t[]){grey, grey, grey, alpha}, 4);
+    }
+    assert_int_equal(spl_pyramid_init(&pyramid, &image, NULL), 0);
+    return pyramid;
+}
+
+static void invert(const uint8_t in[16][3], uint8_t out[16][3])
+{
+    for (int i = 0; i < 48; i++)
+        out[i / 3][i % 3] = (uint8_t)(255 - in[i / 3][i % 3]);
+}
+
+/* Every texel of every level is its own block's, whatever the sides; alpha stays. */
+static void test_blocks_of_pyramids(void **state)
+{
+    struct spl_pyramid from = ramp(9, 6, 77), out;
+    (void)state;
+    assert_int_equal(spl_blocks_code(&from, invert, 2, &out, NULL), 0);
+    assert_int_equal(out.levels, from.levels);
+    for (uint32_t l = 0; l < from.levels; l++)
+        for (uint32_t i = 0; i < 4 * from.width[l] * from.height[l]; i++)
+            assert_int_equal(out.texels[l][i], i % 4 < 3 ? 255 - from.texels[l][i] : 77);
+    spl_pyramid_finish(&out);
+    for (int n = 1;; n++) {
+        spl_memory_fail_after(n);
+        int rc = spl_blocks_code(&from, invert, 1, &out, NULL);
+        spl_memory_fail_after(0);
+        assert_true(rc == 0 || (rc == SPL_E_NOMEM && !out.texels[0]));
+        if (!rc)
+            break;
+    }
+    spl_pyramid_finish(&out);
+    spl_pyramid_finish(&from);
+}
+
+static void test_look(void **state)
+{
+    struct spl_camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                .fx = 10,
+                                .fy = 10,
+                                .cx = 4,
+                                .cy = 4,
+                                .width = 8,
+                                .height = 8,
+                                .near = 0.1};
+    struct spl_named_view photograph = {.camera = camera};
+    struct spl_pyramid pyramid = ramp(8, 8, 255);
+    float rgb[3];
+    (void)state;
+    /* through its own eye a photograph shows itself, at any depth */
+    assert_true(spl_projected_look(&camera, (double[]){2.5, 5.5}, 3, &photograph, &pyramid, 1, rgb));
+    assert_true(fabsf(rgb[0] - 25) < 1e-3f);
+    assert_true(spl_projected_look(&camera, (double[]){2.5, 5.5}, 300, &photograph, &pyramid, 1, rgb));
+    assert_true(fabsf(rgb[2] - 25) < 1e-3f);
+    /* level 1 has the means of 2 x 2: 10 * 2.5 + 4.5 there, and bilinear a quarter of the way to its neighbour */
+    assert_true(spl_projected_look(&camera, (double[]){3, 5}, 3, &photograph, &pyramid, 2, rgb));
+    assert_true(fabsf(rgb[0] - 29.5f) < 0.6f);
+    /* an eye one unit to the right sees what lies 5 deep two pixels further left */
+    photograph.camera.eye[0] = 1;
+    assert_true(spl_projected_look(&camera, (double[]){6.5, 1.5}, 5, &photograph, &pyramid, 1, rgb));
+    assert_true(fabsf(rgb[0] - 41) < 1e-3f);
+    assert_false(spl_projected_look(&camera, (double[]){1.5, 1.5}, 5, &photograph, &pyramid, 1, rgb)); /* outside */
+    photograph.camera.eye[0] = 0;
+    photograph.camera.eye[2] = 4; /* what lies 3 deep is behind it */
+    assert_false(spl_projected_look(&camera, (double[]){4, 4}, 3, &photograph, &pyramid, 1, rgb));
+    /* from three times the distance a pixel spans three of the photograph's */
+    photograph.camera.eye[2] = 6;
+    assert_true(spl_projected_look(&camera, (double[]){4, 4}, 9, &photograph, &pyramid, 1, rgb));
+    assert_true(fabsf(rgb[0] - 38.5f) < 1);
+    spl_pyramid_finish(&pyramid);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blocks),
-        cmocka_unit_test(test_file),
-        cmocka_unit_test(test_measure),
+        cmocka_unit_test(test_blocks),  cmocka_unit_test(test_file),
+        cmocka_unit_test(test_measure), cmocka_unit_test(test_blocks_of_pyramids),
+        cmocka_unit_test(test_look),
     };
     snprintf(path, sizeof path, "/tmp/spl-textures-%ld", (long)getpid());
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
