@@ -41,13 +41,17 @@ struct arguments {
 
 static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {
-        {"output", required_argument, NULL, 'o'},  {"epochs", required_argument, NULL, 'e'},
-        {"threads", required_argument, NULL, 't'}, {"memory", required_argument, NULL, 'm'},
-        {"cameras", required_argument, NULL, 'c'}, {"images", required_argument, NULL, 'i'},
-        {"views", required_argument, NULL, 'v'},   {"repeats", required_argument, NULL, 'r'},
-        {"size", required_argument, NULL, 's'},
-        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
+    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                            {"epochs", required_argument, NULL, 'e'},
+                                            {"threads", required_argument, NULL, 't'},
+                                            {"memory", required_argument, NULL, 'm'},
+                                            {"cameras", required_argument, NULL, 'c'},
+                                            {"images", required_argument, NULL, 'i'},
+                                            {"views", required_argument, NULL, 'v'},
+                                            {"repeats", required_argument, NULL, 'r'},
+                                            {"size", required_argument, NULL, 's'},
+                                            {"device", required_argument, NULL, 'd'},
+                                            {NULL, 0, NULL, 0}};
     int option, rc = 0;
     *a = (struct arguments){.epochs = 12, .memory_mb = 2048, .views = 8, .rounds = 9, .width = 1280, .height = 720};
     while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
