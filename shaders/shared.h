@@ -152,6 +152,17 @@ struct spl_draw_chunk {
 #define SPL_COLOR_U 4
 #define SPL_COLOR_V 8
 #define SPL_COLOR_BASE_Y 16
+/* A drawn chunk has in the upper 8 bits how many words after the first of its colours its clip lines start, plus 1; 0 = it has
+ * none. */
+#define SPL_COLOR_CLIP 24
+
+/* Clip lines: a mask of SPL_LINEAR_WORDS words that says which splats have one, then the codes of these in their order, word by
+ * word from the low bits up: direction in the low bits, offset above. The splat ends at offset / 2^SPL_CLIP_OFFSET_BITS of its
+ * radius from its centre along that direction of its tangent frame. Directions start at the frame's u, turn to v, and divide
+ * the square |u| + |v| = 1 evenly. */
+#define SPL_CLIP_DIRECTION_BITS 6
+#define SPL_CLIP_OFFSET_BITS 4
+#define SPL_CLIP_BITS 10
 
 #define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
 
@@ -194,6 +205,7 @@ struct spl_frame_params {
 
 #ifndef SPL_GLSL
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
+_Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
 _Static_assert(sizeof(struct spl_frame_params) == 128, "spl_frame_params is 128 bytes on both sides");

@@ -1,7 +1,7 @@
 /* Depth pass of method splat: the least view depth of every sample, each disc pushed back by its blend margin. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
-#include "common/disc.glsl"
+#include "common/clip.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
@@ -13,12 +13,15 @@ void draw(splat_run run, splat s)
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
     disc d = make_disc(s, run.low, run.high);
+    clip_line line = load_clip(run.chunk, s);
     ivec2 at = d.first;
     /* The end is asked for at the end, here and in main(): software drivers leave a loop only there, so that a question at its
      * start costs every group of lanes another round, with all of them off. */
     for (;;) {
         float z;
-        if (disc_sample(d, at, z) < 1.0 && at.y <= d.last.y) {
+        vec3 offset;
+        float distance = disc_sample(d, at, z, offset);
+        if (clip(line, offset, distance) < 1.0 && at.y <= d.last.y) {
             precise float pushed = z + d.margin;
             uint index = sample_index(at), bits = floatBitsToUint(pushed);
             if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */

@@ -14,7 +14,7 @@
 #ifdef SPL_TEXTURED
 #include "common/texture.glsl"
 #else
-#include "common/disc.glsl"
+#include "common/clip.glsl"
 #endif
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -78,6 +78,7 @@ void draw(splat_run run, splat s)
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s, run.low, run.high);
+    clip_line line = load_clip(run.chunk, s);
 #ifdef SPL_TEXTURED
     splat_texture t = load_texture(run.chunk, s, value);
 #endif
@@ -85,7 +86,7 @@ void draw(splat_run run, splat s)
     for (;;) {
         float z;
         vec3 offset;
-        float distance = disc_sample(d, sample_at, z, offset);
+        float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
         uint at = sample_index(sample_at);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);

@@ -22,6 +22,7 @@ enum spl_attribute {
     SPL_ATTRIBUTE_CLASS,
     SPL_ATTRIBUTE_UNCERTAINTY,
     SPL_ATTRIBUTE_LINEAR,
+    SPL_ATTRIBUTE_CLIP,    /* clip lines and the mask that says which splats have one */
     SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,

@@ -100,10 +100,4 @@ float disc_sample(disc d, ivec2 at, out float z, out vec3 offset)
     return min(distance, near_center);
 }
 
-float disc_sample(disc d, ivec2 at, out float z)
-{
-    vec3 offset;
-    return disc_sample(d, at, z, offset);
-}
-
 #endif

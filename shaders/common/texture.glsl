@@ -5,8 +5,7 @@
 #ifndef SPL_TEXTURE_GLSL
 #define SPL_TEXTURE_GLSL
 
-#include "common/disc.glsl"
-#include "common/tangent.glsl"
+#include "common/clip.glsl"
 
 layout(constant_id = 0) const uint PLANES = 1;
 layout(constant_id = 1) const uint SMOOTH = 0; /* texels are interpolated */

@@ -11,7 +11,7 @@
 #include <jansson.h>
 
 #include "cmd/dictionary.h"
-#include "dataset/chunk.h"
+#include "dataset/chunk_clip.h"
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
 
@@ -24,8 +24,12 @@ static const struct {
     enum spl_attribute attribute;
     unsigned shifts[3], shift_count, bits;
 } codes[] = {
-    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION,
-     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
+    {"position_axis",
+     "position, an axis",
+     SPL_ATTRIBUTE_POSITION,
+     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z},
+     3,
+     5},
     {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
     {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
     {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
@@ -45,6 +49,7 @@ struct report {
     double widths[code_count][width_max + 1]; /* shares of the codes */
     uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
     uint64_t linear;                          /* points on wires, poles and cables */
+    uint64_t clips;                           /* splats that end at a clip line */
 };
 
 static void usage(FILE *out)
@@ -101,6 +106,8 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
     for (uint32_t i = 0; i < report->level_count; i++)
         report->levels[i].spacing /= (double)report->levels[i].splats;
     for (uint32_t c = 0; c < chunk_count; c++)
+        report->clips += spl_clip_count(&chunks[c]);
+    for (uint32_t c = 0; c < chunk_count; c++)
         for (int k = 0; k < code_count; k++)
             for (unsigned s = 0; s < codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
@@ -146,8 +153,7 @@ static void print_table(const struct report *report)
     char a[32], b[32], c[32], d[32];
     size_t i;
     printf("%s  version %016" PRIx64 ", %.1f MB\n", info->id, info->version, (double)info->file_bytes / 1e6);
-    json_array_foreach(sources, i, source)
-        printf("%-16s%s\n", i ? "" : "  source", json_string_value(source));
+    json_array_foreach(sources, i, source) printf("%-16s%s\n", i ? "" : "  source", json_string_value(source));
     printf("  points        %s read, %s kept\n", grouped(info->points, a), grouped(info->leaf_splats, b));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
@@ -157,6 +163,8 @@ static void print_table(const struct report *report)
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
+    printf("  clip lines    %s splats (%.2f %%)\n", grouped(report->clips, a),
+           100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
@@ -239,7 +247,7 @@ static json_t *to_json(const struct report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:o, s:o, s:o, s:o, s:O}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -248,8 +256,8 @@ static json_t *to_json(const struct report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes, "by_level", levels, "widths", widths,
-        "textures", textures_to_json(report), "sources",
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
+        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
 }
 

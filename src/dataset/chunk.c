@@ -4,7 +4,7 @@
  * A range of extent E gets b bits so that 2^b cells of the wanted step cover it, centred: every value then lies within
  * half a step of its code. The step common to several axes is shrunk afterwards as far as the chosen bits allow, which
  * is accuracy at no cost. Pure functions; any thread. */
-#include "dataset/chunk.h"
+#include "dataset/chunk_clip.h"
 
 #include <float.h>
 #include <math.h>
@@ -358,6 +358,21 @@ static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes
     return writer.used;
 }
 
+/* Appends the clip lines to the `used` words of the other streams. */
+static uint32_t write_clips(const struct spl_splat *splats, struct spl_chunk *chunk, uint32_t *words, uint32_t used)
+{
+    struct spl_clip clips[SPL_CHUNK_SPLATS];
+    float normals[SPL_CHUNK_SPLATS][3];
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        struct spl_splat decoded = {0};
+        clips[i] = splats[i].clip;
+        if (clips[i].direction[0] != 0 || clips[i].direction[1] != 0 || clips[i].direction[2] != 0)
+            spl_chunk_decode(chunk, words, i, &decoded);
+        memcpy(normals[i], decoded.normal, sizeof normals[i]);
+    }
+    return spl_clip_encode(clips, (const float(*)[3])normals, chunk, words + used);
+}
+
 uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error)
@@ -389,7 +404,8 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
         encode_uncertainties(splats, count, chunk, &codes);
     if (error)
         *error = (struct spl_chunk_error){.position_over_radius = position_sum, .normal_radians = normal_sum};
-    return write_streams(chunk, &codes, mask, words);
+    uint32_t used = write_streams(chunk, &codes, mask, words);
+    return used + write_clips(splats, chunk, words, used);
 }
 
 uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, const uint8_t (*color)[3],

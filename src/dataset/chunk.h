@@ -11,6 +11,12 @@
 
 #include "dataset/format.h"
 
+/* A line that a disc ends at, in its plane. */
+struct spl_clip {
+    float direction[3];   /* world, across the line and away from the centre, unit; all 0 = no line */
+    float offset;         /* of the line from the centre, radii, 0..1 */
+};
+
 /* A splat relative to its node's origin. */
 struct spl_splat {
     float position[3];    /* metres from the node's origin; the encoder takes them as doubles, see below */
@@ -20,6 +26,7 @@ struct spl_splat {
     uint8_t color[3];     /* sRGB */
     uint8_t classification;
     bool linear; /* lies on a wire, a pole or a cable */
+    struct spl_clip clip;
 };
 
 struct spl_chunk_options {
@@ -40,6 +47,7 @@ uint32_t spl_chunk_color_width(const struct spl_chunk *chunk);
 uint32_t spl_chunk_color_word(const struct spl_chunk *chunk);     /* offset in the page */
 uint32_t spl_chunk_class_word(const struct spl_chunk *chunk);
 uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk);
+uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk);
 
 /* Adds the chunk's bits to each attribute's; header and padding go to SPL_ATTRIBUTE_CHUNK (a dataset adds nodes). */
 void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
@@ -48,7 +56,10 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
 uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *mask);
 
 /* Largest number of words a chunk can need. */
-enum { SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + SPL_LINEAR_WORDS + 4 };
+enum {
+    SPL_CLIP_WORDS_MAX = SPL_LINEAR_WORDS + SPL_CHUNK_SPLATS * SPL_CLIP_BITS / 32,
+    SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + SPL_LINEAR_WORDS + 4 + SPL_CLIP_WORDS_MAX
+};
 
 /* Chooses widths and codes for `count` splats (1..128) whose order is kept, writes `words` (room for
  * SPL_CHUNK_WORDS_MAX) and everything in *chunk but geometry_word and first_id, which it zeroes. Positions are doubles

@@ -6,6 +6,7 @@
 
 #include <math.h>
 
+#include "dataset/chunk_clip.h"
 #include "geom/octahedral.h"
 
 static uint32_t part(uint32_t word, unsigned shift, unsigned bits)
@@ -76,9 +77,14 @@ uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk)
     return spl_chunk_class_word(chunk) + stream_words(chunk, class_width(chunk));
 }
 
+uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk)
+{
+    return spl_chunk_uncertainty_word(chunk) + stream_words(chunk, uncertainty_width(chunk));
+}
+
 uint32_t spl_chunk_words(const struct spl_chunk *chunk)
 {
-    return spl_chunk_uncertainty_word(chunk) + stream_words(chunk, uncertainty_width(chunk)) - chunk->geometry_word;
+    return spl_chunk_clip_word(chunk) + spl_clip_words(chunk) - chunk->geometry_word;
 }
 
 void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
@@ -92,6 +98,7 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     uint64_t classification = count * class_width(chunk);
     uint64_t uncertainty = count * uncertainty_width(chunk);
     uint64_t linear = linear_words(chunk) ? count : 0;
+    uint64_t clip = spl_clip_count(chunk) ? count + spl_clip_count(chunk) * SPL_CLIP_BITS : 0;
     bits[SPL_ATTRIBUTE_POSITION] += position;
     bits[SPL_ATTRIBUTE_NORMAL] += normal;
     bits[SPL_ATTRIBUTE_RADIUS] += radius;
@@ -99,8 +106,9 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     bits[SPL_ATTRIBUTE_CLASS] += classification;
     bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
     bits[SPL_ATTRIBUTE_LINEAR] += linear;
+    bits[SPL_ATTRIBUTE_CLIP] += clip;
     bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_chunk_words(chunk) + 8 * sizeof *chunk - position - normal - radius -
-                                 color - classification - uncertainty - linear;
+                                 color - classification - uncertainty - linear - clip;
 }
 
 /* The next `width` bits (0..24) at *bit of the stream at `words`. */
@@ -139,6 +147,7 @@ void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
                              splat->normal);
 
     splat->linear = is_linear(chunk, page, i);
+    spl_clip_decode(chunk, page + spl_chunk_clip_word(chunk), i, splat->normal, &splat->clip);
 
     bits = chunk->color_bits;
     words = page + spl_chunk_color_word(chunk);

@@ -57,10 +57,12 @@ struct spl_node {
     uint32_t depth;               /* root = 0 */
 };
 
-/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15. */
+/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number of
+ * splats with a clip line 16..23. */
 #define SPL_EXTRA_CLASS 0
 #define SPL_EXTRA_UNCERTAINTY 4
 #define SPL_EXTRA_CLASS_BASE 8
+#define SPL_EXTRA_CLIP 16
 #define SPL_UNCERTAINTY_BITS_MAX 5
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */

@@ -96,8 +96,10 @@ static const char *judge_chunk(const struct spl_chunk *c)
         color & 0xff00f000u || abs(base_u) > 255 || abs(base_v) > 255)
         return "has colours wider than 8 bits";
     if ((extra >> SPL_EXTRA_CLASS & 15) > 8 || (extra >> SPL_EXTRA_UNCERTAINTY & 15) > SPL_UNCERTAINTY_BITS_MAX ||
-        extra >> 16 || !(c->uncertainty_max >= 0 && isfinite(c->uncertainty_max)))
+        extra >> (SPL_EXTRA_CLIP + 8) || !(c->uncertainty_max >= 0 && isfinite(c->uncertainty_max)))
         return "has classes or uncertainties that no file of version 1 has";
+    if (extra >> SPL_EXTRA_CLIP > c->count)
+        return "has more clip lines than splats";
     return NULL;
 }
 

@@ -32,10 +32,12 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
     return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
-/* Which row of the table of batches: one for each number of planes, interpolation, and phase. */
+/* Which row of the table of batches: one for each number of planes, interpolation, clip lines or none, and phase. */
 static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
 {
-    return 2 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + (chunk >= list->first_back_chunk);
+    bool clipped = list->chunks[chunk].color_bits >> SPL_COLOR_CLIP;
+    return 4 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + 2 * clipped +
+           (chunk >= list->first_back_chunk);
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
@@ -82,8 +84,11 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
             if (grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err))
                 return SPL_E_NOMEM;
             *batch = (uint32_t)list->batch_count;
-            list->batches[list->batch_count++] = (struct spl_draw_batch){
-                .page = list->page_of_chunk[i], .planes = (uint8_t)(row / 4), .smooth = row / 2 % 2, .back = row % 2};
+            list->batches[list->batch_count++] = (struct spl_draw_batch){.page = list->page_of_chunk[i],
+                                                                         .planes = (uint8_t)(row / 8),
+                                                                         .smooth = row / 4 % 2,
+                                                                         .clipped = row / 2 % 2,
+                                                                         .back = row % 2};
         }
         list->batches[*batch].entries += runs(&list->chunks[i]);
     }
@@ -92,7 +97,7 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
 
 int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err)
 {
-    enum { rows = 4 * (SPL_TEXTURE_ATOMS + 1) };
+    enum { rows = 8 * (SPL_TEXTURE_ATOMS + 1) };
     uint32_t *batch_of_page = spl_alloc_raw((size_t)pages * rows, sizeof *batch_of_page, err);
     int rc = batch_of_page
                  ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)

@@ -10,12 +10,13 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page, phase and number of planes of atoms: what one dispatch works off. The front phase
+/* The draw-list entries of one page, phase, number of planes of atoms, with or without clip lines: what one dispatch works off. The front phase
  * is the nearer half of the splats, whose depth occludes chunks of the back phase. */
 struct spl_draw_batch {
     uint32_t page;
     uint8_t planes; /* 0 = no textures */
     bool smooth;    /* texels are interpolated */
+    bool clipped;   /* chunks with clip lines */
     bool back;
     uint32_t first_entry, entries;
 };

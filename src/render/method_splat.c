@@ -3,27 +3,46 @@
  * both hide from the shade pass, which runs once a group of layers. */
 #include "render/renderer.h"
 
-static int record_depth(struct spl_tile *tile, struct spl_gpu_kernel *depth, struct spl_error *err)
+/* The kernel of `slot`, and where chunks are drawn that have clip lines the one of theirs. */
+static int get_kernels(struct spl_renderer *r, uint32_t slot, struct spl_gpu_kernel **plain,
+                       struct spl_gpu_kernel **clipped, struct spl_error *err)
+{
+    bool any = false;
+    for (size_t i = 0; i < r->list.batch_count; i++)
+        any |= r->list.batches[i].clipped;
+    *clipped = NULL;
+    int rc = spl_renderer_get_kernel(r, slot, plain, err);
+    return rc || !any ? rc : spl_renderer_get_kernel(r, slot + 1, clipped, err);
+}
+
+static int record_depth(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    int rc = spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = SPL_PHASE_FRONT}, err);
+    struct spl_gpu_kernel *depth;
+    struct spl_dispatch what = {.phases = SPL_PHASE_FRONT};
+    int rc = get_kernels(r, SPL_KERNEL_SPLAT_DEPTH, &depth, &what.clipped, err);
+    if (rc)
+        return rc;
+    rc = spl_tile_dispatch_splats(tile, depth, &what, err);
     spl_gpu_barrier(r->gpu);
     if (!rc)
         rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, err);
+    what.phases = SPL_PHASE_BACK;
     if (!rc)
-        rc = spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = SPL_PHASE_BACK}, err);
+        rc = spl_tile_dispatch_splats(tile, depth, &what, err);
     spl_gpu_barrier(r->gpu);
     return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, err);
 }
 
 /* Colours: chunks with atoms by the kernel of their number of planes, the others by the one that knows none. */
-static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, struct spl_error *err)
+static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, struct spl_gpu_kernel *clipped,
+                        struct spl_error *err)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     uint64_t seen = 0;
     for (size_t i = 0; i < list->batch_count; i++)
         seen |= 1ull << (2 * list->batches[i].planes + list->batches[i].smooth);
-    struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true};
+    struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true, .clipped = clipped};
     int rc = spl_tile_dispatch_splats(tile, plain, &what, err);
     for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1) && !rc; kind++) {
         struct spl_gpu_kernel *kernel;
@@ -31,7 +50,7 @@ static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, str
             continue;
         what.planes = kind / 2;
         what.smooth = kind % 2;
-        rc = spl_renderer_get_kernel(tile->renderer, SPL_KERNEL_SPLAT_TEXTURE + kind - 2, &kernel, err);
+        rc = get_kernels(tile->renderer, SPL_KERNEL_SPLAT_TEXTURE + 2 * (kind - 2), &kernel, &what.clipped, err);
         if (!rc)
             rc = spl_tile_dispatch_splats(tile, kernel, &what, err);
     }
@@ -41,10 +60,8 @@ static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, str
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    struct spl_gpu_kernel *depth, *shade;
-    int rc = spl_renderer_get_kernel(r, SPL_KERNEL_SPLAT_DEPTH, &depth, err);
-    if (!rc)
-        rc = spl_renderer_get_kernel(r, SPL_KERNEL_SPLAT_SHADE + group, &shade, err);
+    struct spl_gpu_kernel *shade, *clipped;
+    int rc = get_kernels(r, SPL_KERNEL_SPLAT_SHADE + 2 * group, &shade, &clipped, err);
     if (rc)
         return rc;
     if (first)
@@ -54,7 +71,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     if (first) {
-        rc = record_depth(tile, depth, err);
+        rc = record_depth(tile, err);
         spl_tile_stamp(tile, SPL_STAGE_DEPTH);
     }
     if (group == SPL_SUMS_ID) { /* only now: occlusion used the buffer */
@@ -62,8 +79,10 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         spl_gpu_barrier(r->gpu);
     }
     if (!rc)
-        rc = group == SPL_SUMS_COLOR ? shade_colors(tile, shade, err)
-                                     : spl_tile_dispatch_splats(tile, shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
+        rc = group == SPL_SUMS_COLOR
+                 ? shade_colors(tile, shade, clipped, err)
+                 : spl_tile_dispatch_splats(
+                       tile, shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .clipped = clipped}, err);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;

@@ -11,12 +11,13 @@
 
 /* Kernels are made when first used and kept: one slot per kernel and set of constants. */
 enum spl_kernel_slot {
-    SPL_KERNEL_SPLAT_DEPTH,
+    SPL_KERNEL_SPLAT_DEPTH, /* + 1 for chunks with clip lines, as of the shade pass */
+    SPL_KERNEL_SPLAT_DEPTH_CLIPPED,
     SPL_KERNEL_OCCLUSION_TILES,
     SPL_KERNEL_OCCLUSION_CHUNKS,
-    SPL_KERNEL_SPLAT_SHADE,                                          /* + SPL_SUMS_* */
-    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + SPL_SUMS_COUNT, /* + 2 (planes - 1) + smooth */
-    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + 2 * SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
+    SPL_KERNEL_SPLAT_SHADE,                                          /* + 2 SPL_SUMS_* */
+    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + 2 * SPL_SUMS_COUNT, /* + 4 (planes - 1) + 2 smooth */
+    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + 4 * SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
     SPL_KERNEL_RESOLVE = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT,     /* + 2 layer + method */
     SPL_KERNEL_COUNT = SPL_KERNEL_RESOLVE + 2 * SPL_LAYER_COUNT
 };
@@ -80,6 +81,7 @@ struct spl_dispatch {
     bool by_texture;   /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
+    struct spl_gpu_kernel *clipped; /* for chunks with clip lines; NULL = as the others */
 };
 int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, const struct spl_dispatch *what,
                              struct spl_error *err);

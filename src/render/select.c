@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "dataset/chunk.h"
+#include "dataset/chunk_clip.h"
 #include "render/frustum.h"
 #include "render/occupancy.h"
 
@@ -137,6 +137,9 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     } else {
         spl_occupancy_add_everywhere(&w->occupancy, count);
     }
+    uint32_t clip = spl_clip_count(chunk) && !w->params->points
+                        ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
+                        : 0; // at most 157
     struct spl_draw_chunk out = {
         .step = chunk->step,
         .radius_min = (float)(chunk->radius_min * scale),
@@ -144,7 +147,7 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
         .geometry_word = chunk->geometry_word,
         .color_word = spl_chunk_color_word(chunk),
         .geometry_bits = chunk->geometry_bits,
-        .color_bits = chunk->color_bits,
+        .color_bits = chunk->color_bits | clip << SPL_COLOR_CLIP,
         .color_base = chunk->color_base,
         .normal_u = chunk->normal_u,
         .normal_v = chunk->normal_v,

@@ -4,22 +4,29 @@
 #include "render/renderer.h"
 
 /* Every kernel's name and constants. */
-static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t constants[2], size_t *count)
+static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t constants[3], size_t *count)
 {
     *count = 0;
-    if (slot == SPL_KERNEL_SPLAT_DEPTH)
+    memset(constants, 0, 3 * sizeof *constants);
+    if (slot <= SPL_KERNEL_SPLAT_DEPTH_CLIPPED) {
+        constants[2] = slot - SPL_KERNEL_SPLAT_DEPTH;
+        *count = 3;
         return "splat_depth";
+    }
     if (slot == SPL_KERNEL_OCCLUSION_TILES)
         return "occlusion_tiles";
     if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
         return "occlusion_chunks";
     if (slot >= SPL_KERNEL_SPLAT_TEXTURE && slot < SPL_KERNEL_POINTS) {
-        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2 + 1;
+        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 4 + 1;
+        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2 % 2;
         constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) % 2;
         return wide ? "splat_texture64" : "splat_texture";
     }
     if (slot < SPL_KERNEL_POINTS) {
-        constants[(*count)++] = slot - SPL_KERNEL_SPLAT_SHADE;
+        constants[0] = (slot - SPL_KERNEL_SPLAT_SHADE) / 2;
+        constants[2] = (slot - SPL_KERNEL_SPLAT_SHADE) % 2;
+        *count = 3;
         return wide ? "splat_shade64" : "splat_shade";
     }
     *count = 2;
@@ -37,7 +44,7 @@ int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot 
                             struct spl_error *err)
 {
     if (!renderer->kernels[slot]) {
-        uint32_t constants[2];
+        uint32_t constants[3];
         size_t count;
         const char *name = describe(slot, spl_gpu_get_limits(renderer->gpu)->atomics_64, constants, &count);
         int rc = spl_gpu_kernel_create(renderer->gpu, name, constants, count, &renderer->kernels[slot], err);
@@ -99,7 +106,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
             int rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
             if (rc)
                 return rc;
-            spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
+            spl_gpu_dispatch(tile->renderer->gpu, batch->clipped && what->clipped ? what->clipped : kernel, bindings,
                              (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
             done += params.entries;
         }

@@ -141,6 +141,8 @@ static void decode_all(const struct spl_dataset *dataset)
                 spl_assert(s.radius > 0 && isfinite(s.radius) && s.uncertainty >= 0 && isfinite(s.uncertainty));
                 float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];
                 spl_assert(fabsf(length - 1) < 1e-5f);
+                spl_assert(isfinite(s.clip.direction[0] + s.clip.direction[1] + s.clip.direction[2]));
+                spl_assert(s.clip.offset >= 0 && s.clip.offset <= 1);
             }
         free(page);
     }

@@ -1,5 +1,5 @@
-/* The kernels against the plain C reference, on random scenes and real cameras: depth within 1e-6 relative, colour within
- * one level, the same nearest splat but at ties, coverage equal. One body for every backend. */
+/* The kernels against the plain C reference, on random scenes and real cameras: depth within 1e-6 relative, colour
+ * within one level, the same nearest splat but at ties, coverage equal. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -83,9 +83,10 @@ static void same_images(const struct spl_dataset *dataset, const struct spl_view
     size_t few = t.pixels / 10000 + 1;
     if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > few ||
         t.normal_differs > few)
-        fail_msg("%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu",
-                 what, t.pixels, t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst,
-                 t.id_differs, t.normal_differs);
+        fail_msg(
+            "%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu",
+            what, t.pixels, t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst,
+            t.id_differs, t.normal_differs);
     spl_frame_finish(&gpu);
     spl_frame_finish(&cpu);
 }
@@ -158,7 +159,8 @@ static void random_splats_match(void **state)
     done(dataset);
 }
 
-/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most of what follows. */
+/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most of what follows.
+ */
 static void a_wall_that_hides_the_rest_changes_nothing(void **state)
 {
     (void)state;
@@ -197,7 +199,8 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     done(dataset);
 }
 
-/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more. */
+/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more.
+ */
 static void the_widest_codes_match(void **state)
 {
     (void)state;
@@ -229,6 +232,85 @@ static void the_widest_codes_match(void **state)
     struct spl_view view = looking(origin, 3, 160, 120);
     same_images(dataset, &view, "widest codes");
     done(dataset);
+}
+
+/* A direction across `normal`, and how far along it the disc reaches. */
+static void random_line(struct make_splat *splat)
+{
+    const float *n = splat->normal;
+    double length = 0, along = 0, d[3];
+    for (int c = 0; c < 3; c++) {
+        d[c] = uniform() - 0.5;
+        along += d[c] * n[c];
+    }
+    for (int c = 0; c < 3; c++) {
+        d[c] -= along * n[c];
+        length += d[c] * d[c];
+    }
+    for (int c = 0; c < 3; c++)
+        splat->clip[c] = (float)(d[c] / sqrt(length));
+    splat->clip_offset = (float)uniform();
+}
+
+/* Chunks with lines among chunks without, whole, pruned, inside a level that was made coarser, and in windows. */
+static void clip_lines_match(void **state)
+{
+    (void)state;
+    random_state = 5;
+    struct make_splat *splats = random_splats(6000, origin, 0.05);
+    for (size_t i = 0; i < 6000; i++)
+        if (i / 128 % 3 && (i % 3 || i / 128 % 2))
+            random_line(&splats[i]);
+    static const struct {
+        const char *what;
+        int levels;
+        double distance, lod;
+    } rows[] = {
+        {"lines", 1, 3, 0}, {"lines, pruned", 1, 3, 12}, {"lines, coarse", 2, 3, 9}, {"among lines", 1, 0.4, 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_dataset *dataset = make_dataset_levels(splats, 6000, rows[i].levels);
+        assert_true(spl_dataset_get_info(dataset)->attribute_bits[SPL_ATTRIBUTE_CLIP] > 0);
+        assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+        struct spl_view view = looking(origin, rows[i].distance, 160, 120);
+        view.lod = rows[i].lod;
+        same_images(dataset, &view, rows[i].what);
+        done(dataset);
+    }
+    free(splats);
+}
+
+/* Discs of 40 pixels that face the eye end where their line says, wherever it lies and points, and nowhere else. */
+static void discs_end_at_their_lines(void **state)
+{
+    (void)state;
+    static const double eye[3] = {0, 0, 4}, up[3] = {0, 1, 0};
+    for (int turn = 0; turn < 12; turn++) {
+        for (int end = 0; end < 4; end++) {
+            double angle = turn * M_PI / 6 + 0.1, x = cos(angle), y = sin(angle), offset = 0.25 * end;
+            struct make_splat splat = {
+                .normal = {0, 0, 1}, .radius = 1, .clip = {(float)x, (float)y, 0}, .clip_offset = (float)offset};
+            struct spl_dataset *dataset = make_dataset(&splat, 1);
+            assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+            struct spl_view view = looking(origin, 4, 160, 120);
+            assert_int_equal(spl_camera_look_at(&view.camera, eye, origin, up, NULL), SPL_OK);
+            view.camera.fx = view.camera.fy = 160; /* 40 pixels a metre */
+            struct spl_frame frame;
+            assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+            const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
+            for (int row = 0; row < 120; row++)
+                for (int column = 0; column < 160; column++) {
+                    double px = (column + 0.5 - 80) / 40, py = (60 - row - 0.5) / 40, far = px * x + py * y;
+                    double from_line = far - offset, from_rim = sqrt(px * px + py * py) - 1, off = 0.13;
+                    bool covered = coverage[160 * row + column] > 0;
+                    if (from_rim > 0.03 || from_line > off)
+                        assert_false(covered);
+                    else if (from_rim < -0.03 && from_line < -off)
+                        assert_true(covered);
+                }
+            spl_frame_finish(&frame);
+            done(dataset);
+        }
+    }
 }
 
 /* The eye among discs that span the image; a software driver's loop ends after 65535 rounds, done or not. */
@@ -301,8 +383,10 @@ static void a_million_splats_on_one_pixel_do_not_wrap(void **state)
     size_t count = 1 << 20;
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (size_t i = 0; i < count; i++)
-        splats[i] = (struct make_splat){.position = {uniform() * 1e-3, uniform() * 1e-3, 0}, .normal = {0, 0, 1},
-                                        .radius = 1e-3f, .color = {255, 128, 7}};
+        splats[i] = (struct make_splat){.position = {uniform() * 1e-3, uniform() * 1e-3, 0},
+                                        .normal = {0, 0, 1},
+                                        .radius = 1e-3f,
+                                        .color = {255, 128, 7}};
     struct spl_dataset *dataset = make_dataset(splats, count);
     free(splats);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
@@ -342,7 +426,8 @@ static void small_tiles_give_the_same_image(void **state)
     struct tally t = compare(&frames[0], &frames[1]);
     /* Each tile has its own largest weight, whose rounding moves the mean depth where steep discs cross. */
     size_t few = t.pixels / 10000 + 1;
-    if (t.color_differs > few || t.depth_differs > t.pixels / 500 || t.depth_worst > 1e-3 || t.id_differs > few || t.covered_differs > few)
+    if (t.color_differs > few || t.depth_differs > t.pixels / 500 || t.depth_worst > 1e-3 || t.id_differs > few ||
+        t.covered_differs > few)
         fail_msg("of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu", t.pixels,
                  t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst, t.id_differs);
     spl_frame_finish(&frames[0]);
@@ -359,7 +444,9 @@ static void coarse_frames_show_the_same_place(void **state)
     struct make_splat *splats = calloc(side * side, sizeof *splats);
     for (size_t i = 0; i < side * side; i++)
         splats[i] = (struct make_splat){.position = {(double)(i % side) * 0.02 - 2, 0, (double)(i / side) * 0.02 - 2},
-                                        .normal = {0, -1, 0}, .radius = 0.02f, .color = {90, 160, 30}};
+                                        .normal = {0, -1, 0},
+                                        .radius = 0.02f,
+                                        .color = {90, 160, 30}};
     struct spl_dataset *dataset = make_dataset(splats, side * side);
     free(splats);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
@@ -525,6 +612,8 @@ int main(int argc, char **argv)
         cmocka_unit_test_prestate(a_lost_device_is_reported_and_replaced, device),
         cmocka_unit_test(views_out_of_range_name_their_field),
         cmocka_unit_test(the_widest_codes_match),
+        cmocka_unit_test(clip_lines_match),
+        cmocka_unit_test(discs_end_at_their_lines),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     spl_renderer_destroy(renderer);

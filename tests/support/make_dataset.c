@@ -68,7 +68,9 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
             part[i] = (struct spl_splat){.radius = from[i].radius,
                                          .uncertainty = from[i].uncertainty,
                                          .classification = from[i].classification,
-                                         .linear = from[i].linear};
+                                         .linear = from[i].linear,
+                                         .clip.offset = from[i].clip_offset};
+            memcpy(part[i].clip.direction, from[i].clip, sizeof part[i].clip.direction);
             memcpy(part[i].normal, from[i].normal, sizeof part[i].normal);
             memcpy(part[i].color, from[i].color, sizeof part[i].color);
             for (int a = 0; a < 3; a++)

@@ -16,6 +16,7 @@ struct make_splat {
     uint8_t classification;
     float uncertainty;
     bool linear;
+    float clip[3], clip_offset; /* struct spl_clip: all 0 = no line */
 };
 
 /* Writes `count` (> 0) splats to `path` at default errors, with classes and uncertainties.

@@ -47,6 +47,7 @@ struct disc {
     uint32_t window;               /* of the tile that it is drawn to; 0 = all of it */
     float world[3], texture_scale; /* with atoms: its normal, and its radius over that of its texture */
     bool smooth;                   /* texels are interpolated */
+    float line[3], end;            /* of its clip line: across it, view space, and where it lies, radii */
     uint32_t planes;               /* atoms that are drawn at most; 0 = plain */
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
@@ -126,6 +127,8 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float distance = qx * qx + qy * qy + fall * fall;
     memcpy(offset, (float[]){qx, qy, fall}, 3 * sizeof *offset);
     *z = p[2] * (1 + (w < -reach ? -reach : w > reach ? reach : w));
+    if (qx * d->line[0] + qy * d->line[1] + fall * d->line[2] >= d->end)
+        return 1;
     return distance < near_center ? distance : near_center;
 }
 
@@ -288,6 +291,8 @@ static void for_each_disc(struct scene *s, bool shade)
             memcpy(d.color, splat.color, sizeof d.color);
             memcpy(d.world, splat.normal, sizeof d.world);
             d.texture_scale = draw->texture_scale;
+            d.end = splat.clip.offset / draw->texture_scale;
+            to_view(&s->camera, splat.clip.direction, d.line);
             d.planes = spl_texture_planes(draw->texture);
             d.smooth = draw->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1;
             if (d.planes) {

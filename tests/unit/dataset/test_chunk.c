@@ -8,8 +8,9 @@
 
 #include <cmocka.h>
 
-#include "dataset/chunk.h"
+#include "dataset/chunk_clip.h"
 #include "geom/octahedral.h"
+#include "geom/tangent.h"
 
 static const struct spl_chunk_options defaults = {.position_error = 0.016,
                                                   .normal_error = M_PI / 180,
@@ -72,6 +73,22 @@ static double angle_between(const float a[3], const float b[3])
     return 2 * asin(fmin(1, 0.5 * sqrt(chord)));
 }
 
+/* Lies in the disc's plane, a few degrees off at most, never more than a step inside. True where there is a line. */
+static bool check_clip(const struct spl_clip *in, const struct spl_splat *out)
+{
+    const float *a = in->direction, *b = out->clip.direction, *n = out->normal;
+    bool wanted = (a[0] != 0 || a[1] != 0 || a[2] != 0) && in->offset < 0.95f;
+    if (b[0] == 0 && b[1] == 0 && b[2] == 0) {
+        assert_true(!wanted && out->clip.offset == 1);
+        return false;
+    }
+    assert_true(a[0] != 0 || a[1] != 0 || a[2] != 0);
+    assert_true(fabsf(b[0] * n[0] + b[1] * n[1] + b[2] * n[2]) < 1e-5f);
+    assert_true(angle_between(a, b) < 0.07 + 0.06); // a code's half step, and the normal's own error
+    assert_true(out->clip.offset >= in->offset - 0.02f && out->clip.offset < in->offset + 0.06f);
+    return true;
+}
+
 /* Encodes, decodes each splat from a larger page, and checks every promise of the contract. Returns bits a splat. */
 static double check_sample(const struct sample *s, const struct spl_chunk_options *options)
 {
@@ -89,7 +106,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     assert_true(chunk.step > 0 && chunk.radius_step > 0 && chunk.normal_step > 0);
 
     double position_sum = 0, normal_sum = 0, radius_sum = 0;
-    uint32_t linear = 0;
+    uint32_t linear = 0, clips = 0;
     for (uint32_t i = 0; i < s->count; i++) {
         const struct spl_splat *in = &s->splats[i];
         struct spl_splat out;
@@ -106,6 +123,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
         assert_memory_equal(out.color, in->color, 3);
         assert_int_equal(out.linear, in->linear);
         linear += in->linear;
+        clips += check_clip(&in->clip, &out);
         assert_int_equal(out.classification, options->has_class ? in->classification : 0);
         if (!options->has_uncertainty || in->uncertainty == 0)
             assert_true(out.uncertainty == 0);
@@ -119,6 +137,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     assert_true(fabs(chunk.radius_mean - radius_sum / s->count) <= 1e-6 * chunk.radius_mean);
 
     assert_int_equal(spl_chunk_count_linear(&chunk, page + spl_chunk_color_word(&chunk) - SPL_LINEAR_WORDS), linear);
+    assert_int_equal(spl_clip_count(&chunk), clips);
 
     uint64_t bits[SPL_ATTRIBUTE_COUNT] = {0}, all = 0;
     spl_chunk_add_bits(&chunk, bits);
@@ -285,6 +304,43 @@ static void test_linear(void **state)
     }
 }
 
+/* Directions all around normals all around, every offset; and what a forged mask names has no line. */
+static void test_clip_lines(void **state)
+{
+    (void)state;
+    static const uint32_t counts[] = {1, 33, SPL_CHUNK_SPLATS};
+    struct sample s;
+    for (int row = 0; row < 60; row++) {
+        double up[3] = {uniform() - 0.5, uniform() - 0.5, row % 3 ? uniform() - 0.5 : 4};
+        double length = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);
+        for (int c = 0; c < 3; c++)
+            up[c] /= length;
+        make_sheet(&s, counts[row % 3], 1, 0.1, 0.01, 0.5, up);
+        for (uint32_t i = 0; i < s.count; i++) {
+            struct spl_splat *splat = &s.splats[i];
+            float u[3], v[3];
+            double angle = 2 * M_PI * uniform();
+            spl_tangent_frame(splat->normal, u, v);
+            for (int c = 0; c < 3 && (row < 3 || i % 3 == 0); c++)
+                splat->clip.direction[c] = (float)(cos(angle) * u[c] + sin(angle) * v[c]);
+            splat->clip.offset = (float)(1.2 * uniform() - 0.01);
+        }
+        check_sample(&s, &defaults);
+    }
+    uint32_t words[SPL_CHUNK_WORDS_MAX];
+    struct spl_chunk chunk;
+    struct spl_splat out;
+    spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
+    uint32_t count = spl_clip_count(&chunk), with = 0;
+    assert_true(count > 0 && count < s.count);
+    memset(words + spl_chunk_clip_word(&chunk), 0xff, SPL_LINEAR_WORDS * sizeof *words);
+    for (uint32_t i = 0; i < s.count; i++) {
+        spl_chunk_decode(&chunk, words, i, &out);
+        with += out.clip.offset < 1;
+    }
+    assert_int_equal(with, count);
+}
+
 static void test_zero_normal(void **state)
 {
     (void)state;
@@ -385,6 +441,7 @@ int main(void)
         cmocka_unit_test(test_radius_spread),
         cmocka_unit_test(test_normal_directions),
         cmocka_unit_test(test_linear),
+        cmocka_unit_test(test_clip_lines),
         cmocka_unit_test(test_zero_normal),
         cmocka_unit_test(test_octahedral),
         cmocka_unit_test(test_color_is_lossless),

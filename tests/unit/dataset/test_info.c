@@ -50,7 +50,9 @@ static void make(const char *name, size_t count, int levels)
                                         .normal = {0, 0, 1},
                                         .radius = 0.5f,
                                         .color = {(uint8_t)i, 10, 10},
-                                        .linear = i % 10 == 3};
+                                        .linear = i % 10 == 3,
+                                        .clip = {i % 8 == 1, 0, 0},
+                                        .clip_offset = 0.4f};
     snprintf(path, sizeof path, "%s/%s", folder, name);
     make_dataset_file(path, splats, count, levels);
     free(splats);
@@ -66,12 +68,14 @@ static void test_json(void **state)
 {
     (void)state;
     static const char *const attributes[] = {"position", "radius",      "normal", "color",
-                                             "class",    "uncertainty", "linear", "chunk"};
+                                             "class",    "uncertainty", "linear", "clip",
+                                             "chunk"};
     char output[8192];
     assert_int_equal(run("--json two.spld", output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL);
     assert_string_equal(json_string_value(json_object_get(json, "id")), "two");
     assert_true(number(json, "linear") == 400);
+    assert_true(number(json, "clip_lines") == 500);
     assert_true(json_is_true(json_object_get(json_object_get(json, "attributes"), "surface")));
     assert_true(number(json, "points") == 4000 && number(json, "splats") == 4500 && number(json, "levels") == 2);
     const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");
@@ -109,6 +113,7 @@ static void test_table(void **state)
     assert_non_null(strstr(output, "splats        4,500: 4,000 points and 500 for coarser levels (12.5 %)"));
     assert_non_null(strstr(output, "one  version "));
     assert_non_null(strstr(output, "linear        400 points on wires, poles and cables (10.00 %)"));
+    assert_non_null(strstr(output, "clip lines    500 splats (11.11 %)"));
     assert_non_null(strstr(output, "surface       normals and radii"));
 }
 

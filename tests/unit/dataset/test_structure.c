@@ -135,6 +135,9 @@ FORGE(unknown_bit, p->chunks[0].geometry_bits |= 3u << SPL_GEOMETRY_LINEAR)
 FORGE(wide_color, p->chunks[0].color_bits |= 15)
 FORGE(color_base, p->chunks[0].color_base = 0x7fff)
 FORGE(wide_class, p->chunks[0].extra_bits |= 15)
+FORGE(many_lines, p->chunks[0].extra_bits |= 255u << SPL_EXTRA_CLIP)
+FORGE(lines_past_page, p->chunks[p->chunk_count - 1].extra_bits |= p->chunks[p->chunk_count - 1].count << SPL_EXTRA_CLIP)
+FORGE(unknown_extra, p->chunks[0].extra_bits |= 1u << 24)
 FORGE(uncertainty_nan, p->chunks[0].uncertainty_max = NAN)
 FORGE(past_page, p->chunks[p->chunk_count - 1].geometry_word += 1 + 16)
 FORGE(word_wraps, p->chunks[0].geometry_word = UINT32_MAX)
@@ -199,6 +202,9 @@ static const struct {
     {wide_color, "section CHNK: chunk 0 has colours"},
     {color_base, "section CHNK: chunk 0 has colours"},
     {wide_class, "section CHNK: chunk 0 has classes"},
+    {many_lines, "section CHNK: chunk 0 has more clip lines than splats"},
+    {lines_past_page, "reaches beyond the end of its page"},
+    {unknown_extra, "section CHNK: chunk 0 has classes or uncertainties"},
     {uncertainty_nan, "section CHNK: chunk 0 has classes or uncertainties"},
     {past_page, "reaches beyond the end of its page"},
     {word_wraps, "section CHNK: chunk 0 reaches beyond"},
