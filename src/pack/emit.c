@@ -49,6 +49,7 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
                       double position[3])
 {
     size_t i = node->begin + at;
+    *s = (struct spl_splat){0};
     for (int c = 0; c < 3; c++) {
         position[c] = p->axis[c][i] - node->origin[c];
         s->normal[c] = p->normal[i][c];
@@ -61,6 +62,7 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
 static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl_splat *s, double position[3])
 {
     const struct spl_inner_splat *from = &node->splats[at];
+    *s = (struct spl_splat){0};
     for (int c = 0; c < 3; c++) {
         position[c] = from->position[c];
         s->normal[c] = from->normal[c];
