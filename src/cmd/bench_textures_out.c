@@ -118,6 +118,25 @@ static void print_row(const struct spl_textures_report *report, const struct spl
     puts("");
 }
 
+/* Figure 9 of the paper, a line a coding. */
+static void print_atoms(const struct spl_textures_report *report)
+{
+    bool any = false;
+    for (uint32_t i = 0; i < report->rows; i++) {
+        const struct spl_textures_row *r = &report->row[i];
+        if (!r->count || r->kind == SPL_TEXTURES_PACKED)
+            continue;
+        if (!any)
+            printf("\n%-24s %6d %6d %6d %6d %6d %6d %6d %6d %6d\n", "% of textures by atoms", 0, 1, 2, 3, 4, 5, 6, 7,
+                   8);
+        any = true;
+        printf("%-24s", r->name);
+        for (int k = 0; k <= SPL_ATOMS_MAX; k++)
+            printf(" %6.1f", 100 * r->shares[k]);
+        puts("");
+    }
+}
+
 /* What the adaptive coding needs at the quality of each other row. */
 static void print_rates(const struct spl_textures_report *report)
 {
@@ -159,6 +178,7 @@ void spl_cmd_print_textures(const struct spl_textures_report *report, const stru
             projected->packed.views, (unsigned long long)projected->packed.pixels, projected->left_out.views,
             (unsigned long long)projected->left_out.pixels);
     print_rates(report);
+    print_atoms(report);
 }
 
 void spl_cmd_print_passes(const struct spl_device_info *device, const struct spl_passes_view *views)

@@ -38,6 +38,9 @@ static const struct {
 };
 enum { code_count = sizeof codes / sizeof *codes };
 
+static const char bar[] = "########################################";
+enum { bar_max = sizeof bar - 1 };
+
 struct report {
     const struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
@@ -146,6 +149,23 @@ static const char *grouped(uint64_t value, char text[32])
     return text;
 }
 
+/* As figure 9 of the sparse-coding paper. A bar's full length is the largest share. */
+static void print_atoms(const struct report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    char text[32];
+    uint64_t most = 1;
+    printf("\n  textures of %u x %u from %s atoms, %.1f MB resident; splats by number of atoms\n", info->texture_size,
+           info->texture_size, grouped(info->atoms, text), (double)info->dictionary_bytes / 1e6);
+    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
+        most = report->atoms[count] > most ? report->atoms[count] : most;
+    for (int count = 0; count <= SPL_ATOMS_MAX; count++) {
+        int length = (int)((double)bar_max * (double)report->atoms[count] / (double)most + 0.5);
+        printf("  %-6d%12s%8.1f %%%s%.*s\n", count, grouped(report->atoms[count], text),
+               100.0 * (double)report->atoms[count] / (double)info->splats, length ? "  " : "", length, bar);
+    }
+}
+
 static void print_table(const struct report *report)
 {
     const struct spl_dataset_info *info = report->info;
@@ -195,11 +215,7 @@ static void print_table(const struct report *report)
     }
     if (!info->atoms)
         return;
-    printf("\n  textures of %u x %u from %s atoms, %.1f MB resident; splats by number of atoms\n ", info->texture_size,
-           info->texture_size, grouped(info->atoms, a), (double)info->dictionary_bytes / 1e6);
-    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
-        printf("  %d: %.1f %%", count, 100.0 * (double)report->atoms[count] / (double)info->splats);
-    printf("\n");
+    print_atoms(report);
 }
 
 static json_t *vector(const double v[3])

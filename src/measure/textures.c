@@ -190,8 +190,10 @@ static int measure_coding(const struct spl_textures_options *o, struct spl_textu
     if (rc)
         goto done;
     struct spl_textures_row *row = add_row(report, name, lambda > 0 ? SPL_TEXTURES_OURS : SPL_TEXTURES_PAPER);
-    for (int k = 1; k <= SPL_ATOMS_MAX; k++)
+    for (int k = 0; k <= SPL_ATOMS_MAX; k++) {
         used += (uint64_t)k * sums.histogram[k];
+        row->shares[k] = (double)sums.histogram[k] / (double)sums.splats;
+    }
     double splats = (double)o->origin->splats, texels = (double)dictionary.count * spl_texture_values(dictionary.size);
     double bits = lambda > 0 ? (double)sums.bits : (double)used * (log2(atoms) + weight_bits);
     row->color = lambda > 0 ? find_color_bytes(o) : 3;

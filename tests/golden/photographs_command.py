@@ -156,6 +156,12 @@ with tempfile.TemporaryDirectory() as folder:
         assert "epoch 1" in said and "atoms a splat: 0:" in said, said
         assert spread(8) > 1.3 * spread(0), (coding, spread(8), spread(0))
         assert run("info", "wall.spld", "--json").count("resampling_psnr") <= 1
+        atoms = re.findall(r"\n  ([0-8]) +([\d,]+) +[\d.]+ %(?:  (#+))?", run("info", "wall.spld").split("by number of")[1])
+        counts = [int(count.replace(",", "")) for _, count, _ in atoms]
+        assert [int(n) for n, _, _ in atoms] == list(range(9)), atoms
+        levels = json.loads(run("info", "wall.spld", "--json"))["by_level"]
+        assert sum(counts) == sum(level["splats"] for level in levels), (counts, levels)
+        assert len(atoms[counts.index(max(counts))][2]) == 40, atoms
 
     # the textures as they were before: coders beside each other, the photograph itself on the splats, a view that was
     # left out and whose photograph is the same plane seen from nearer

@@ -206,6 +206,12 @@ static void test_measure(void **state)
     const struct spl_textures_row *small = find_row(&report, "paper D8W4"), *large = find_row(&report, "paper D16W8");
     assert_true(small->sample == 0 && large->sample == 0 && large->count > small->count);
     assert_true(fabs(small->codes - small->atoms * 1.5 / 2) < 1e-9 && fabs(large->codes - large->atoms * 3 / 2) < 1e-9);
+    double mean = 0, all = 0;
+    for (int k = 0; k <= SPL_ATOMS_MAX; k++) {
+        all += small->shares[k];
+        mean += k * small->shares[k];
+    }
+    assert_true(fabs(all - 1) < 1e-9 && fabs(mean - small->atoms) < 1e-9);
     const struct spl_textures_row *last = &report.row[report.rows - 1], *first = last - 3;
     assert_true(first->kind == SPL_TEXTURES_OURS && last->psnr > first->psnr && last->codes > first->codes);
     double between = spl_textures_bytes_at(&report, (first[2].psnr + last->psnr) / 2);
