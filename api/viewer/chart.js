@@ -57,7 +57,11 @@ export class Chart {
     if (!this.axes || frame.stages.frame === undefined) return;
     const used = frame.chosen ?? {method: "splat", lod: 1, supersample: 1, ...setting};
     const known = this.profile.points.find(
-      (p) => p.method === used.method && p.lod === Number(used.lod) && p.supersample === Number(used.supersample),
+      (p) =>
+        p.method === used.method &&
+        p.lod === Number(used.lod) &&
+        p.supersample === Number(used.supersample) &&
+        p.atoms === Number(used.atoms ?? 8),
     );
     const psnr = known?.psnr ?? null,
       ms = frame.stages.frame;

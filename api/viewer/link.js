@@ -1,7 +1,7 @@
 // What is on screen as text: the URL's fragment, and a command that fetches the same picture.
 
 const VECTORS = ["eye", "target", "up"],
-  NUMBERS = ["fov", "lod", "supersample"],
+  NUMBERS = ["fov", "lod", "supersample", "atoms"],
   TEXTS = ["dataset", "layer", "method", "budget"];
 
 /** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. */

@@ -12,7 +12,7 @@ import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
 
 const $ = (id) => document.getElementById(id);
-const SETTINGS = ["layer", "method", "lod", "supersample", "budget"];
+const SETTINGS = ["layer", "method", "lod", "supersample", "atoms", "budget"];
 
 const stage = new Stage($("stage"));
 const points = new Points(stage, document.querySelector(".marks"));
@@ -38,10 +38,15 @@ function choose(select, value) {
   select.value = value;
 }
 
+let textures = null; // of the dataset
+
 /** What the controls say, as parameters of a view; a budget chooses the others. */
 function readSettings() {
   const settings = Object.fromEntries(SETTINGS.map((name) => [name, $(name).value]));
-  for (const name of ["method", "lod", "supersample"]) $(name).disabled = settings.budget !== "";
+  for (const name of ["method", "lod", "supersample", "atoms"]) $(name).disabled = settings.budget !== "";
+  const textured = Boolean(textures?.methods.includes(settings.method));
+  $("atoms").hidden = $("atoms").labels[0].hidden = !textured;
+  if (!textured || settings.atoms === "") delete settings.atoms; // all of them
   stage.coarse = $("moving").value;
   return settings;
 }
@@ -85,7 +90,9 @@ async function open() {
     choices($("method"), dataset.methods, wanted.method ?? "splat");
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
+    choose($("atoms"), wanted.atoms ?? "");
     choose($("budget"), wanted.budget ?? "");
+    textures = dataset.textures;
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
@@ -121,6 +128,7 @@ function showFrame({detail: frame}) {
   const {chosen, promised, demand} = frame;
   $("chosen").textContent = chosen
     ? `Chosen: ${chosen.method}, level ${chosen.lod}, samples a side ${chosen.supersample}` +
+      (textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
       `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
     : "";
   writeLink();

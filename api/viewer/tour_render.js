@@ -48,7 +48,7 @@ export function renderTours(tour, say) {
   };
 
   $("render").addEventListener("click", async () => {
-    const {layer, method, lod, supersample} = tour.stage.settings; // one setting for all frames: no budget
+    const {layer, method, lod, supersample, atoms} = tour.stage.settings; // one setting for all frames: no budget
     const [width, height] = [$("tour-width"), $("tour-height")];
     if (![width, height].every((input) => input.reportValidity())) return;
     const settings = {
@@ -56,6 +56,7 @@ export function renderTours(tour, say) {
       method,
       lod: Number(lod),
       supersample: Number(supersample),
+      ...(atoms === undefined ? {} : {atoms: Number(atoms)}),
       format: "jpeg",
       width: Number(width.value),
       height: Number(height.value),

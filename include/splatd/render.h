@@ -20,6 +20,7 @@ enum spl_method {
 };
 const char *spl_method_name(enum spl_method method);
 int spl_method_from_name(const char *name);  /* -1 for an unknown name */
+bool spl_method_has_textures(enum spl_method method); /* draws them where there are any; else their mean colours */
 
 struct spl_view {
     struct spl_camera camera;

@@ -10,6 +10,7 @@
 
 #include "cmd/cmd.h"
 #include "cmd/options.h"
+#include "shared.h"
 
 enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
 
@@ -18,10 +19,11 @@ struct arguments {
     const char *devices[LIST_MAX];
     enum spl_method methods[LIST_MAX];
     double lods[LIST_MAX], supersamples[LIST_MAX];
-    size_t supersample_count;
+    uint32_t atoms[LIST_MAX];
+    size_t supersample_count, atom_count;
     struct spl_path path;
     const char *views, *set, *output;
-    bool json, sized, listed[3]; /* listed: --method, --lod, --supersample were given */
+    bool json, sized, listed[4]; /* listed: --method, --lod, --supersample, --atoms were given */
     uint32_t repeats;
     struct spl_bench_options bench;
     struct spl_cmd_bench_sweep sweep;
@@ -64,6 +66,7 @@ static void help(void)
         "                            and 4x4 samples a pixel\n"
         "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3)\n"
         "  --supersample LIST        samples a pixel side, of 0.25,0.5,1,2,4 (0.25,0.5,1,2)\n"
+        "  --atoms LIST              of a splat's texture at most, where the dataset has textures (0,2,8)\n"
         "  --repeats N               times each view and setting is timed (5)\n"
         "  --peers FILE.csv          rows name,ms,psnr of other programs, for the same chart\n"
         "  --profile FILE, --no-profile\n"
@@ -136,6 +139,14 @@ static int take_supersample(struct arguments *a, const char *text, struct spl_er
     return status;
 }
 
+static int take_atoms(struct arguments *a, const char *text, struct spl_error *err)
+{
+    uint64_t count = 0;
+    int status = spl_cmd_parse_count("--atoms", text, 0, SPL_TEXTURE_ATOMS, &count, err);
+    a->atoms[a->atom_count++] = (uint32_t)count;
+    return status;
+}
+
 /* Options that only mean something with -o. */
 static int take_sweep_option(struct arguments *a, int option, struct spl_error *err)
 {
@@ -155,6 +166,11 @@ static int take_sweep_option(struct arguments *a, int option, struct spl_error *
         a->supersample_count = 0;
         a->listed[2] = true;
         status = each("--supersample", optarg, take_supersample, a, err);
+        break;
+    case 'a':
+        a->atom_count = 0;
+        a->listed[3] = true;
+        status = each("--atoms", optarg, take_atoms, a, err);
         break;
     case 'e':
         status = spl_cmd_parse_count("--repeats", optarg, 1, SPL_SWEEP_REPEATS_MAX, &count, err);
@@ -250,6 +266,12 @@ static int finish_sweep(struct arguments *a, struct spl_error *err)
         a->supersamples[3] = 2;
         a->supersample_count = 4;
     }
+    if (!a->listed[3]) {
+        a->atoms[0] = 0;
+        a->atoms[1] = 2;
+        a->atoms[2] = SPL_TEXTURE_ATOMS;
+        a->atom_count = 3;
+    }
     s->views = a->set ? NULL : a->views;
     s->path = a->bench.path;
     s->places = a->bench.frames ? a->bench.frames : 8;
@@ -261,6 +283,9 @@ static int finish_sweep(struct arguments *a, struct spl_error *err)
     s->lod_count = a->bench.lod_count;
     s->supersamples = a->supersamples;
     s->supersample_count = a->supersample_count;
+    s->atoms = a->atoms;
+    s->atom_count = a->atom_count;
+    s->atoms_listed = a->listed[3];
     s->sweep.renderer = (struct spl_renderer_options){.device = a->devices[0], .memory_limit = a->bench.memory_limit};
     return 0;
 }
@@ -281,6 +306,7 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
         {"reference", required_argument, NULL, 'r'},
         {"photographs", no_argument, NULL, 'p'},
         {"supersample", required_argument, NULL, 'x'},
+        {"atoms", required_argument, NULL, 'a'},
         {"repeats", required_argument, NULL, 'e'},
         {"peers", required_argument, NULL, 'P'},
         {"profile", required_argument, NULL, 'f'},
@@ -321,9 +347,10 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
     if (!status && a->sweep.output)
         status = finish_sweep(a, err);
     if (!status && !a->sweep.output &&
-        (a->listed[2] || a->sweep.peers || a->sweep.profile || a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
+        (a->listed[2] || a->listed[3] || a->sweep.peers || a->sweep.profile ||
+         a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
         status = spl_fail(err, SPL_E_USAGE,
-                          "--supersample, --reference, --photographs, --peers and --profile go with -o OUT");
+                          "--supersample, --atoms, --reference, --photographs, --peers and --profile go with -o OUT");
     a->sweep.dataset_path = argv[optind];
     a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {

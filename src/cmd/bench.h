@@ -23,7 +23,9 @@ struct spl_cmd_bench_sweep {
     struct spl_sweep_options sweep; /* all but dataset, views, settings, folder, progress */
     const enum spl_method *methods;
     const double *lods, *supersamples;
-    size_t method_count, lod_count, supersample_count;
+    const uint32_t *atoms; /* only for datasets with textures and methods that draw them */
+    size_t method_count, lod_count, supersample_count, atom_count;
+    bool atoms_listed; /* asked for, not the default */
 };
 
 /* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */

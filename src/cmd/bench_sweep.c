@@ -14,6 +14,7 @@
 #include "measure/page.h"
 #include "measure/peers.h"
 #include "measure/report.h"
+#include "shared.h"
 
 enum { default_width = 1280, default_height = 720 };
 
@@ -99,24 +100,40 @@ static int make_views(const struct spl_cmd_bench_sweep *o, const struct spl_data
     return rc;
 }
 
-static int make_settings(const struct spl_cmd_bench_sweep *o, struct spl_setting **out, size_t *count,
-                         struct spl_error *err)
+static int add_setting(struct spl_setting *settings, size_t *count, const struct spl_setting *s, struct spl_error *err)
 {
+    char name[64];
+    spl_report_setting_name(s, name);
+    for (size_t i = 0; i < *count; i++)
+        if (spl_setting_equal(&settings[i], s))
+            return spl_fail(err, SPL_E_USAGE, "the setting %s is asked for twice", name);
+    settings[(*count)++] = *s;
+    return SPL_OK;
+}
+
+/* Every combination; where textures make no difference there is one without a cap of atoms. */
+static int make_settings(const struct spl_cmd_bench_sweep *o, const struct spl_dataset_info *info,
+                         struct spl_setting **out, size_t *count, struct spl_error *err)
+{
+    static const uint32_t all = SPL_TEXTURE_ATOMS;
     *count = 0;
-    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count, sizeof **out, err);
+    if (o->atoms_listed && !info->atoms)
+        return spl_fail(err, SPL_E_USAGE, "--atoms is about textures, and dataset '%s' has none", info->id);
+    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count * o->atom_count, sizeof **out, err);
     if (!*out)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < o->method_count * o->lod_count * o->supersample_count; i++) {
+    int rc = SPL_OK;
+    for (size_t i = 0; !rc && i < o->method_count * o->lod_count * o->supersample_count; i++) {
         struct spl_setting s = {.method = o->methods[i / o->supersample_count / o->lod_count],
                                 .lod = o->lods[i / o->supersample_count % o->lod_count],
                                 .supersample = o->supersamples[i % o->supersample_count]};
-        for (size_t j = 0; j < *count; j++)
-            if ((*out)[j].method == s.method && (*out)[j].lod == s.lod && (*out)[j].supersample == s.supersample)
-                return spl_fail(err, SPL_E_USAGE, "%s at lod %g and supersample %g is asked for twice",
-                                spl_method_name(s.method), s.lod, s.supersample);
-        (*out)[(*count)++] = s;
+        bool textured = info->atoms && spl_method_has_textures(s.method);
+        for (size_t j = 0; !rc && j < (textured ? o->atom_count : 1); j++) {
+            s.atoms = textured ? o->atoms[j] : all;
+            rc = add_setting(*out, count, &s, err);
+        }
     }
-    return SPL_OK;
+    return rc;
 }
 
 /* ------------------------------------------------------------------------------------------------------------- output
@@ -211,7 +228,7 @@ int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *o, const struct spl_dataset 
     struct progress progress = {0};
     int rc = make_views(o, dataset, &views, err);
     if (!rc)
-        rc = make_settings(o, &settings, &o->sweep.setting_count, err);
+        rc = make_settings(o, spl_dataset_get_info(dataset), &settings, &o->sweep.setting_count, err);
     if (!rc && o->peers)
         rc = spl_peers_load(&peers, o->peers, err);
     if (rc)

@@ -139,12 +139,23 @@ static void write_axes(const struct layout *l, const struct spl_chart *chart)
             TOP);
 }
 
+/* The attribute that makes a curve's lines paler; a style would break pages that allow none. */
+static struct fading {
+    char text[40];
+} fading(const struct spl_chart_curve *curve)
+{
+    struct fading out = {""};
+    if (curve->fade > 0)
+        snprintf(out.text, sizeof out.text, " stroke-opacity=\"%.2f\"", 1 - curve->fade);
+    return out;
+}
+
 static void write_curves(const struct layout *l)
 {
     for (size_t i = 0; i < l->place_count;) {
         const struct spl_chart_curve *curve = l->places[i].curve;
-        fprintf(l->out, "<polyline class=\"curve s%u\" stroke-dasharray=\"%s\" points=\"", curve->color % COLORS,
-                dashes[curve->dash % DASHES]);
+        fprintf(l->out, "<polyline class=\"curve s%u\" stroke-dasharray=\"%s\"%s points=\"", curve->color % COLORS,
+                dashes[curve->dash % DASHES], fading(curve).text);
         for (; i < l->place_count && l->places[i].curve == curve; i++)
             fprintf(l->out, "%.1f,%.1f ", l->places[i].x, l->places[i].y);
         fputs("\"/>\n", l->out);
@@ -176,7 +187,8 @@ static void write_points(const struct layout *l, const struct spl_chart *chart)
             fprintf(l->out, "f%u", color);
         else
             fputs("open", l->out);
-        fprintf(l->out, "\" cx=\"%.1f\" cy=\"%.1f\" r=\"%s\"/></g>\n", at->x, at->y, p->front ? "5" : "3.6");
+        fprintf(l->out, "\"%s cx=\"%.1f\" cy=\"%.1f\" r=\"%s\"/></g>\n", fading(at->curve).text, at->x, at->y,
+                p->front ? "5" : "3.6");
     }
 }
 
@@ -235,8 +247,8 @@ static void write_legend(const struct layout *l, const struct spl_chart *chart)
             y = 71;
         }
         fprintf(l->out,
-                "<path class=\"curve s%u\" stroke-dasharray=\"%s\" d=\"M%.1f %.0fh26\"/><text x=\"%.1f\" y=\"%.0f\">",
-                curve->color % COLORS, dashes[curve->dash % DASHES], x, y - 4, x + 32, y);
+                "<path class=\"curve s%u\" stroke-dasharray=\"%s\"%s d=\"M%.1f %.0fh26\"/><text x=\"%.1f\" y=\"%.0f\">",
+                curve->color % COLORS, dashes[curve->dash % DASHES], fading(curve).text, x, y - 4, x + 32, y);
         spl_markup_text(l->out, curve->name);
         fputs("</text>\n", l->out);
         x += w;

@@ -21,6 +21,7 @@ struct spl_chart_curve {
     char name[64];                        /* in the legend */
     unsigned color;                       /* curves of the same colour belong together */
     unsigned dash;                        /* 0 = a full line */
+    double fade;                          /* 0 = in its full colour, towards 1 = paler */
     const struct spl_chart_point *points; /* borrowed; any order, drawn by ms */
     size_t count;
 };

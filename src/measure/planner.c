@@ -12,6 +12,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "shared.h"
 
 static const double spread_quantile = 0.97, spread_step = 0.08;
 static const double spread_least = 0.02, spread_most = 1.5;
@@ -21,12 +22,13 @@ enum { first_frames = 6 };
 static const double first_gain = 0.5;
 
 /* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order. */
+enum { all = SPL_TEXTURE_ATOMS };
 static const struct spl_candidate common[] = {
-    {{SPL_METHOD_POINTS, 4, 1}, 4, 10, 15, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25}, 4, 15, 17, NAN, 0},
-    {{SPL_METHOD_POINTS, 1, 0.25}, 4, 20, 20, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25}, 5, 30, 21, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 0.25}, 5, 42, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5}, 6, 72, 23, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 0.5}, 8, 90, 24, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1}, 8, 180, 25, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 1}, 10, 250, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 2}, 20, 900, 27, NAN, 0},
+    {{SPL_METHOD_POINTS, 4, 1, all}, 4, 10, 15, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25, all}, 4, 15, 17, NAN, 0},
+    {{SPL_METHOD_POINTS, 1, 0.25, all}, 4, 20, 20, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25, all}, 5, 30, 21, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 0.25, all}, 5, 42, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5, all}, 6, 72, 23, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 0.5, all}, 8, 90, 24, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1, all}, 8, 180, 25, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 1, all}, 10, 250, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 2, all}, 20, 900, 27, NAN, 0},
 };
 enum { common_count = sizeof common / sizeof *common };
 
@@ -69,6 +71,8 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
         for (size_t i = 0; i < common_count; i++)
             if (!usable || usable(&common[i].setting))
                 planner->candidates[planner->count++] = common[i];
+    for (size_t i = 0; i < planner->count; i++)
+        planner->atoms |= planner->candidates[i].setting.atoms != SPL_TEXTURE_ATOMS;
     return 0;
 }
 
@@ -86,11 +90,32 @@ double spl_planner_estimate(const struct spl_planner *planner, size_t index, uin
     return (c->fixed_ms + c->ms_per_mpx * mpx) * exp(planner->shared + c->learned + planner->layer[layer]);
 }
 
-static bool matches(const struct spl_setting *setting, const struct spl_demand *demand)
+/* What is compared where candidates do not differ in atoms: any number is drawn in the candidate's time. */
+static struct spl_setting get_setting(const struct spl_planner *planner, const struct spl_setting *setting)
 {
-    return (!demand->keep_method || setting->method == demand->kept.method) &&
-           (!demand->keep_lod || setting->lod == demand->kept.lod) &&
-           (!demand->keep_supersample || setting->supersample == demand->kept.supersample);
+    struct spl_setting out = *setting;
+    if (!planner->atoms)
+        out.atoms = SPL_TEXTURE_ATOMS;
+    return out;
+}
+
+static bool matches(const struct spl_planner *planner, const struct spl_setting *setting,
+                    const struct spl_demand *demand)
+{
+    struct spl_setting kept = get_setting(planner, &demand->kept);
+    kept.method = demand->keep_method ? kept.method : setting->method;
+    kept.lod = demand->keep_lod ? kept.lod : setting->lod;
+    kept.supersample = demand->keep_supersample ? kept.supersample : setting->supersample;
+    kept.atoms = demand->keep_atoms ? kept.atoms : setting->atoms;
+    return spl_setting_equal(setting, &kept);
+}
+
+/* Is the accuracy that was measured another setting's, one of all atoms? */
+static bool is_unmeasured(const struct spl_planner *planner, const struct spl_setting *setting,
+                          const struct spl_demand *demand)
+{
+    return !planner->atoms && demand->keep_atoms && demand->kept.atoms < SPL_TEXTURE_ATOMS &&
+           spl_method_has_textures(setting->method);
 }
 
 static double rank(double psnr)
@@ -107,7 +132,8 @@ struct standing {
 static struct standing assess(const struct spl_planner *planner, size_t index, const struct spl_demand *demand)
 {
     const struct spl_candidate *c = &planner->candidates[index];
-    struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(c->bound) >= demand->psnr};
+    double bound = is_unmeasured(planner, &c->setting, demand) ? NAN : c->bound;
+    struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
     s.tail_ms = s.ms * exp(planner->spread);
     if (!isnan(demand->budget_ms))
@@ -137,7 +163,10 @@ static bool better(const struct spl_demand *demand, const struct spl_candidate *
 
 static int refuse(const struct spl_demand *demand, struct spl_error *err)
 {
-    const char *field = demand->keep_lod ? "lod" : demand->keep_supersample ? "supersample" : "method";
+    const char *field = demand->keep_lod           ? "lod"
+                        : demand->keep_supersample ? "supersample"
+                        : demand->keep_atoms       ? "atoms"
+                                                   : "method";
     return spl_fail_field(err, SPL_E_INPUT, field,
                           "no measured setting has the %s asked for; leave it out, or ask without budget and psnr",
                           field);
@@ -150,7 +179,7 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
     const struct spl_candidate *chosen = NULL;
     for (size_t i = 0; i < planner->count; i++) {
         const struct spl_candidate *c = &planner->candidates[i];
-        if (!matches(&c->setting, demand))
+        if (!matches(planner, &c->setting, demand))
             continue;
         struct standing s = assess(planner, i, demand);
         if (chosen && !better(demand, c, &s, chosen, &best))
@@ -163,18 +192,19 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
     *choice = (struct spl_choice){.setting = chosen->setting,
                                   .index = (size_t)(chosen - planner->candidates),
                                   .ms = best.ms,
-                                  .psnr = chosen->bound,
+                                  .psnr = is_unmeasured(planner, &chosen->setting, demand) ? NAN : chosen->bound,
                                   .meets = best.in_time && best.accurate};
+    if (demand->keep_atoms)
+        choice->setting.atoms = demand->kept.atoms;
     return 0;
 }
 
 ptrdiff_t spl_planner_find(const struct spl_planner *planner, const struct spl_setting *setting)
 {
-    for (size_t i = 0; i < planner->count; i++) {
-        const struct spl_setting *s = &planner->candidates[i].setting;
-        if (s->method == setting->method && s->lod == setting->lod && s->supersample == setting->supersample)
+    struct spl_setting wanted = get_setting(planner, setting);
+    for (size_t i = 0; i < planner->count; i++)
+        if (spl_setting_equal(&planner->candidates[i].setting, &wanted))
             return (ptrdiff_t)i;
-    }
     return -1;
 }
 

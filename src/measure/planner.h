@@ -19,7 +19,7 @@ struct spl_demand {
     double extra_ms;   /* >= 0: what the budget must hold beside the frame, the encoding */
     uint32_t width, height;
     enum spl_layer layer;
-    bool keep_method, keep_lod, keep_supersample; /* only settings that equal `kept` in these */
+    bool keep_method, keep_lod, keep_supersample, keep_atoms; /* only settings that equal `kept` in these */
     struct spl_setting kept;
 };
 
@@ -39,6 +39,7 @@ struct spl_planner {
         double learned;     /* ln of this setting's own factor */
     } *candidates;
     size_t count;
+    bool atoms; /* candidates differ in them; else every number of atoms is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
     uint64_t frames;    /* learned from */
 };
@@ -58,7 +59,8 @@ void spl_planner_finish(struct spl_planner *planner);
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
  * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
- * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has. */
+ * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has; atoms that
+ * nobody measured are kept instead, and nothing is promised of their accuracy. */
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
                        struct spl_error *err);
 

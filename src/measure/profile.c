@@ -14,6 +14,12 @@
 #include "base/memory.h"
 #include "measure/front.h"
 
+bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b)
+{
+    return a->method == b->method && a->lod == b->lod && a->supersample == b->supersample &&
+           (a->atoms == b->atoms || !spl_method_has_textures(a->method));
+}
+
 char *spl_profile_path(const char *dataset_path, struct spl_error *err)
 {
     static const char ending[] = ".spld";

@@ -21,7 +21,11 @@ struct spl_setting {
     enum spl_method method;
     double lod;         /* pixels, as spl_view.lod */
     double supersample; /* samples per pixel side; below 1: rendered at that share of the size and enlarged */
+    uint32_t atoms;     /* as spl_view.atoms; SPL_TEXTURE_ATOMS where the dataset or the method has no textures */
 };
+
+/* Do both draw the same? Atoms are not compared where the method draws no textures. */
+bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b);
 
 /* One measured setting. Times are those of spl_renderer_render on the host's clock, readback included, encoding not;
  * statistics are over all views and repeats at the profile's size. NAN: not measured (null in the file), allowed for

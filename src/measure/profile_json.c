@@ -18,6 +18,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "shared.h"
 
 #define FORMAT "splatd-profile"
 
@@ -61,6 +62,9 @@ static int check_point(struct spl_profile_point *point, const char *name, size_t
         return spl_fail_field(err, SPL_E_INPUT, "supersample",
                               "%s: point %zu: supersample %g is none of 0.25, 0.5, 1, 2, 4", name, index,
                               s->supersample);
+    if (s->atoms > SPL_TEXTURE_ATOMS)
+        return spl_fail_field(err, SPL_E_INPUT, "atoms", "%s: point %zu: atoms %u is above %d", name, index, s->atoms,
+                              SPL_TEXTURE_ATOMS);
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
         double value = *number_of(point, n);
         if (isnan(value) && n->optional)
@@ -83,13 +87,10 @@ static int check(struct spl_profile *profile, const char *name, struct spl_error
     int rc = 0;
     for (size_t i = 0; !rc && i < profile->count; i++) {
         rc = check_point(&profile->points[i], name, i, err);
-        const struct spl_setting *s = &profile->points[i].setting;
-        for (size_t j = 0; !rc && j < i; j++) {
-            const struct spl_setting *other = &profile->points[j].setting;
-            if (s->method == other->method && s->lod == other->lod && s->supersample == other->supersample)
+        for (size_t j = 0; !rc && j < i; j++)
+            if (spl_setting_equal(&profile->points[i].setting, &profile->points[j].setting))
                 rc = spl_fail_field(err, SPL_E_INPUT, "points", "%s: points %zu and %zu are the same setting", name, j,
                                     i);
-        }
     }
     return rc;
 }
@@ -132,6 +133,18 @@ static int read_number(const json_t *object, const char *key, bool optional, con
     return 0;
 }
 
+/* Profiles that were made before textures have none. */
+static int read_atoms(const json_t *object, const char *name, size_t index, uint32_t *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, "atoms");
+    json_int_t value = json ? json_integer_value(json) : SPL_TEXTURE_ATOMS;
+    if ((json && !json_is_integer(json)) || value < 0 || value > SPL_TEXTURE_ATOMS)
+        return spl_fail_field(err, SPL_E_INPUT, "atoms", "%s: point %zu: 'atoms' must be a whole number from 0 to %d",
+                              name, index, SPL_TEXTURE_ATOMS);
+    *out = (uint32_t)value;
+    return 0;
+}
+
 static int read_point(const json_t *object, const char *name, size_t index, struct spl_profile_point *point,
                       struct spl_error *err)
 {
@@ -141,7 +154,8 @@ static int read_point(const json_t *object, const char *name, size_t index, stru
         return spl_fail_field(err, SPL_E_INPUT, "points", "%s: point %zu is no object", name, index);
     if ((rc = read_text(object, "method", method, sizeof method, name, err)) ||
         (rc = read_number(object, "lod", false, name, index, &point->setting.lod, err)) ||
-        (rc = read_number(object, "supersample", false, name, index, &point->setting.supersample, err)))
+        (rc = read_number(object, "supersample", false, name, index, &point->setting.supersample, err)) ||
+        (rc = read_atoms(object, name, index, &point->setting.atoms, err)))
         return rc;
     int found = spl_method_from_name(method);
     if (found < 0)
@@ -294,8 +308,9 @@ int spl_profile_load(const char *path, const struct spl_dataset_info *dataset, c
 static json_t *point_to_json(const struct spl_profile_point *point)
 {
     struct spl_profile_point copy = *point;
-    json_t *json = json_pack("{s:s, s:f, s:f, s:b}", "method", spl_method_name(point->setting.method), "lod",
-                             point->setting.lod, "supersample", point->setting.supersample, "front", point->front);
+    json_t *json = json_pack("{s:s, s:f, s:f, s:i, s:b}", "method", spl_method_name(point->setting.method), "lod",
+                             point->setting.lod, "supersample", point->setting.supersample, "atoms",
+                             (int)point->setting.atoms, "front", point->front);
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
         double value = *number_of(&copy, n);
         json_object_set_new(json, n->name, isfinite(value) ? json_real(value) : json_null());

@@ -166,8 +166,9 @@ json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, 
         failed |= json_array_append_new(views, plan_view(&o->views->views[i])) != 0;
     for (size_t i = 0; i < o->setting_count; i++)
         failed |= json_array_append_new(
-                      settings, json_pack("{s:s, s:f, s:f}", "method", spl_method_name(o->settings[i].method), "lod",
-                                          o->settings[i].lod, "supersample", o->settings[i].supersample)) != 0;
+                      settings, json_pack("{s:s, s:f, s:f, s:i}", "method", spl_method_name(o->settings[i].method),
+                                          "lod", o->settings[i].lod, "supersample", o->settings[i].supersample, "atoms",
+                                          (int)o->settings[i].atoms)) != 0;
     json_t *plan = json_pack("{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:I}", "splatd-bench",
                              1, "program", SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device",
                              "backend", sweep->device.backend, "name", sweep->device.name, "driver",

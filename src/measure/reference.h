@@ -8,7 +8,7 @@
 #include "cloud/views.h"
 
 enum spl_reference_kind {
-    SPL_REFERENCE_SELF,  /* every leaf splat, 4×4 samples a pixel, method splat: what the dataset can give at best */
+    SPL_REFERENCE_SELF,  /* every leaf splat, all atoms, 4×4 samples a pixel, method splat: the dataset at its best */
     SPL_REFERENCE_EXACT, /* FOLDER/VIEW.color.png, and where they are there VIEW.{depth,normal,coverage}.npy, as
                             'splatd synth SCENE --views' writes them */
     SPL_REFERENCE_PHOTOGRAPHS, /* spl_named_view.photograph: colour only */

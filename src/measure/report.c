@@ -9,12 +9,15 @@
 
 #include "base/memory.h"
 #include "measure/record.h"
+#include "shared.h"
 
 void spl_report_setting_name(const struct spl_setting *s, char name[64])
 {
     int used = snprintf(name, 64, "%s lod=%g", spl_method_name(s->method), s->lod);
     if (s->supersample != 1)
-        snprintf(name + used, 64 - (size_t)used, " %g×%g", s->supersample, s->supersample);
+        used += snprintf(name + used, 64 - (size_t)used, " %g×%g", s->supersample, s->supersample);
+    if (s->atoms < SPL_TEXTURE_ATOMS)
+        snprintf(name + used, 64 - (size_t)used, " atoms=%u", s->atoms);
 }
 
 /* Times of one setting, view and size over the repeats, through `pick`. */
@@ -322,15 +325,15 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
         free(values);
         return spl_fail(err, SPL_E_NOMEM, "out of memory: the table could not be written");
     }
-    fputs("method,lod,supersample,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
+    fputs("method,lod,supersample,atoms,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
           "depth_rmse,depth_beyond,"
           "holes,see_through,halo,normal_mean,dense_share,dense_psnr,dense_depth_beyond,dense_holes,"
           "dense_see_through\n",
           out);
     for (size_t s = 0; s < report->profile.count; s++) {
         const struct spl_profile_point *p = &report->profile.points[s];
-        fprintf(out, "%s,%g,%g,%d", spl_method_name(p->setting.method), p->setting.lod, p->setting.supersample,
-                p->front);
+        fprintf(out, "%s,%g,%g,%u,%d", spl_method_name(p->setting.method), p->setting.lod, p->setting.supersample,
+                p->setting.atoms, p->front);
         struct spl_report_dense d = spl_report_get_dense(sweep, s);
         const double numbers[] = {
             p->ms,          p->ms_q90,       over_views(sweep, s, SPL_SWEEP_FULL, pick_device, values),

@@ -1,5 +1,5 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * supersampling is a dash pattern. Pure but for allocation; any thread. */
+ * supersampling is a dash pattern, fewer atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,9 +7,10 @@
 #include "base/memory.h"
 #include "measure/chart.h"
 #include "measure/report.h"
+#include "shared.h"
 
 static const double supersamples[] = {1, 2, 4, 0.5, 0.25};
-enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples };
+enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples, ALL = SPL_TEXTURE_ATOMS };
 
 struct build {
     struct spl_chart_point *points;
@@ -18,23 +19,26 @@ struct build {
     size_t curve_count;
 };
 
-static void add_curve(struct build *b, const char *name, unsigned color, unsigned dash, size_t first_point)
+static struct spl_chart_curve *add_curve(struct build *b, const char *name, unsigned color, unsigned dash,
+                                         size_t first_point)
 {
     if (b->point_count == first_point)
-        return;
+        return NULL;
     struct spl_chart_curve *curve = &b->curves[b->curve_count++];
     *curve = (struct spl_chart_curve){
         .color = color, .dash = dash, .points = b->points + first_point, .count = b->point_count - first_point};
     snprintf(curve->name, sizeof curve->name, "%s", name);
+    return curve;
 }
 
-static void add_settings(struct build *b, const struct spl_profile *profile, enum spl_method method, double supersample,
-                         unsigned dash)
+/* The settings that are `s` but for their level. */
+static void add_settings(struct build *b, const struct spl_profile *profile, struct spl_setting s, unsigned dash)
 {
     size_t first = b->point_count;
     for (size_t i = 0; i < profile->count; i++) {
         const struct spl_profile_point *p = &profile->points[i];
-        if (p->setting.method != method || p->setting.supersample != supersample)
+        s.lod = p->setting.lod;
+        if (!spl_setting_equal(&p->setting, &s) || p->setting.atoms != s.atoms)
             continue;
         struct spl_chart_point *out = &b->points[b->point_count++];
         *out = (struct spl_chart_point){.ms = p->ms, .psnr = p->psnr, .front = p->front, .index = (int32_t)i};
@@ -42,11 +46,29 @@ static void add_settings(struct build *b, const struct spl_profile *profile, enu
         snprintf(out->detail, sizeof out->detail, "90 %% of views within %.4g ms", p->ms_q90);
     }
     char name[64];
-    if (supersample == 1)
-        snprintf(name, sizeof name, "%s", spl_method_name(method));
-    else
-        snprintf(name, sizeof name, "%s %g×%g", spl_method_name(method), supersample, supersample);
-    add_curve(b, name, method, dash, first);
+    int used = snprintf(name, sizeof name, "%s", spl_method_name(s.method));
+    if (s.supersample != 1)
+        used += snprintf(name + used, sizeof name - (size_t)used, " %g×%g", s.supersample, s.supersample);
+    if (s.atoms < ALL)
+        snprintf(name + used, sizeof name - (size_t)used, " atoms=%u", s.atoms);
+    struct spl_chart_curve *curve = add_curve(b, name, s.method, dash, first);
+    if (curve)
+        curve->fade = 0.7 * (ALL - s.atoms) / ALL;
+}
+
+/* The legend has room for few: first each method with all atoms, then fewer atoms at one sample a pixel. */
+static void add_methods(struct build *b, const struct spl_profile *profile)
+{
+    for (int pass = 0; pass < 3; pass++)
+        for (int method = 0; method < SPL_METHOD_COUNT; method++)
+            for (unsigned i = 0; i < SUPERSAMPLES; i++)
+                for (unsigned atoms = ALL + 1; atoms-- > 0;)
+                    if ((atoms == ALL ? 0 : i == 0 ? 1 : 2) == pass)
+                        add_settings(b, profile,
+                                     (struct spl_setting){.method = (enum spl_method)method,
+                                                          .supersample = supersamples[i],
+                                                          .atoms = atoms},
+                                     i);
 }
 
 /* One curve for each name, in the order in which the names first appear. */
@@ -76,13 +98,11 @@ int spl_report_chart(const struct spl_profile *profile, uint64_t splats, double 
     *svg = NULL;
     size_t peer_count = peers ? peers->count : 0;
     struct build b = {.points = spl_alloc(profile->count + peer_count, sizeof *b.points, err)};
-    b.curves = spl_alloc((size_t)SPL_METHOD_COUNT * SUPERSAMPLES + peer_count, sizeof *b.curves, err);
+    b.curves = spl_alloc(profile->count + peer_count, sizeof *b.curves, err);
     int rc = SPL_E_NOMEM;
     if (!b.points || !b.curves)
         goto done;
-    for (int method = 0; method < SPL_METHOD_COUNT; method++)
-        for (unsigned i = 0; i < SUPERSAMPLES; i++)
-            add_settings(&b, profile, (enum spl_method)method, supersamples[i], i);
+    add_methods(&b, profile);
     add_peers(&b, peers);
     static const struct {
         const char *name, *text;

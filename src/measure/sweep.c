@@ -116,6 +116,7 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     out->method = o->settings[setting].method;
     out->lod = o->settings[setting].lod;
     out->supersample = o->settings[setting].supersample;
+    out->atoms = o->settings[setting].atoms;
     if (size == SPL_SWEEP_FULL)
         return;
     struct spl_camera *c = &out->camera;

@@ -21,7 +21,7 @@ struct spl_sweep_options {
     const struct spl_dataset *dataset;
     const struct spl_view_list *views; /* checked poses; see spl_reference_check_poses() */
     struct spl_reference reference;
-    const struct spl_setting *settings; /* 1 … SPL_PROFILE_POINTS_MAX; supersample as spl_view */
+    const struct spl_setting *settings; /* 1 … SPL_PROFILE_POINTS_MAX; members as spl_view */
     size_t setting_count;
     uint32_t repeats;
     struct spl_renderer_options renderer;

@@ -34,7 +34,7 @@ struct spl_select_params {
 /* Does the view draw textures where there are any: colours, by splats, with atoms? */
 static inline bool spl_view_is_textured(const struct spl_view *view)
 {
-    return view->method == SPL_METHOD_SPLAT && view->atoms && view->layers >> SPL_LAYER_COLOR & 1;
+    return spl_method_has_textures(view->method) && view->atoms && view->layers >> SPL_LAYER_COLOR & 1;
 }
 
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */

@@ -28,6 +28,11 @@ int spl_method_from_name(const char *name)
     return -1;
 }
 
+bool spl_method_has_textures(enum spl_method method)
+{
+    return method == SPL_METHOD_SPLAT;
+}
+
 void spl_view_init(struct spl_view *view)
 {
     *view = (struct spl_view){

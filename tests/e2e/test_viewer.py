@@ -18,7 +18,7 @@ import zipfile
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "http"))
 import browser
 from browser import Browser, Page
-from harness import FAKE, REAL, WALL, Daemon, run
+from harness import FAKE, REAL, TEXTURED, WALL, Daemon, run
 
 if not browser.BINARY:
     print("skipped: there is no chromium")
@@ -500,6 +500,36 @@ def test_the_chart_has_the_frame_on_it():
             assert float(tab.run("document.querySelector('.here').style.top")[:-1]) > float(
                 first[:-1]
             ), "less accurate is lower"
+
+
+def test_atoms_are_offered_where_there_are_textures():
+    hidden = "document.querySelector('#atoms').hidden"
+    with page() as tab:
+        assert tab.run(hidden) and "atoms" not in tab.run("location.hash")
+    close = FACING.replace("dataset=wall", "dataset=wall-textured").replace("eye=3", "eye=1")
+    with Daemon(REAL, datasets=[WALL, TEXTURED]) as other, page(f"http://127.0.0.1:{other.port}/{close}") as tab:
+        assert not tab.run(hidden) and tab.run("document.querySelector('[for=atoms]').offsetHeight > 0")
+        whole = tab.run(DIGEST)
+        tab.choose("#atoms", "0")
+        tab.until(f"location.hash.includes('atoms=0') && {REST}")
+        mean = tab.run(DIGEST)
+        assert mean[0] != whole[0], "the textures are on screen"
+        tab.choose("#method", "points")
+        tab.until(f"{hidden} && !location.hash.includes('atoms') && {REST}")
+        tab.choose("#method", "splat")
+        tab.until(f"!{hidden} && location.hash.includes('atoms=0') && {REST}")
+        tab.choose("#budget", "500ms")
+        tab.until(f"/^Chosen: splat.* \\d atoms/.test(document.querySelector('#chosen').textContent) && {REST}")
+        assert tab.run("document.querySelector('#atoms').disabled")
+        tab.choose("#budget", "")
+        tab.choose("#atoms", "")
+        tab.until(f"!location.hash.includes('atoms') && {REST}")
+        assert tab.run(DIGEST)[0] == whole[0]
+    with Daemon(REAL, datasets=[TEXTURED]) as other:
+        with page(f"http://127.0.0.1:{other.port}/{close}&atoms=0") as tab:
+            assert tab.run(DIGEST)[0] == mean[0], "the address has them"
+        with page(f"http://127.0.0.1:{other.port}/embed/wall-textured{close}&atoms=0") as tab:
+            assert any("atoms=0" in name for name, *_ in tab.run(VIEWS))
 
 
 def refuse(tab, status, problem, retry):

@@ -1,7 +1,7 @@
 """splatd bench -o on a small scene: what it writes, that a run ended with SIGKILL goes on to the same report, and what it
 refuses. Times differ from run to run and are taken out before reports are compared.
 
-environment: SPLATD_BINARY
+environment: SPLATD_BINARY, SPLATD_WALL_TEXTURED
 """
 import json
 import os
@@ -105,6 +105,33 @@ def test_profile(folder, dataset):
     assert (folder / "elsewhere.json").read_text() == (folder / "small.profile.json").read_text()
 
 
+def test_atoms(folder, dataset):
+    textured, cams, out = pathlib.Path(os.environ["SPLATD_WALL_TEXTURED"]), folder / "wall.json", folder / "t"
+    cams.write_text(json.dumps({"views": [{"name": "near", "width": 96, "height": 54, "camera": {
+        "eye": [1, 0, 1], "target": [0, 0, 1], "fov": 60}}]}))
+    command = ["bench", textured, "--views", cams, "--repeats", "1", "-o", out]
+    splatd(*command, "--lod", "0,2", "--supersample", "1,4", "--atoms", "0,2,8", "--profile", folder / "t.json")
+    points = json.loads((folder / "t.json").read_text())["points"]
+    assert len(points) == 4 * 3 + 4, "points draw no textures"
+    splats = {p["atoms"]: p for p in points if (p["method"], p["lod"], p["supersample"]) == ("splat", 0, 4)}
+    assert splats[8]["psnr"] == 100, "the reference draws all atoms"
+    assert splats[0]["psnr"] < splats[2]["psnr"] < 100, {a: p["psnr"] for a, p in splats.items()}
+    assert all(p["atoms"] == 8 for p in points if p["method"] == "points")
+    head, *rows = (out / "bench.csv").read_text().splitlines()
+    assert head.startswith("method,lod,supersample,atoms,front,") and any(r.startswith("splat,0,4,2,") for r in rows)
+    assert "stroke-opacity" in (out / "chart.svg").read_text()
+    said = splatd(*command, "--lod", "0,2", "--supersample", "1,4", "--atoms", "0,4,8", "--no-profile", code=2).stderr
+    assert "another 'settings'" in said, said
+    splatd(*command, "--lod", "1", "--supersample", "1", "--method", "splat", "--profile", folder / "t.json", "--restart")
+    assert [p["atoms"] for p in json.loads((folder / "t.json").read_text())["points"]] == [0, 2, 8], "the default"
+    for atoms, text in (("2,2", "splat lod=1 atoms=2 is asked for twice"), ("9", "--atoms"), ("all", "--atoms")):
+        said = splatd(*command, "--method", "splat", "--lod", "1", "--supersample", "1", "--atoms", atoms, code=2).stderr
+        assert text in said, said
+    said = splatd("bench", dataset, "--atoms", "2", "-o", folder / "n", code=2).stderr
+    assert "'small' has none" in said and not (folder / "n").exists(), said
+    assert "-o OUT" in splatd("bench", textured, "--atoms", "2", code=2).stderr
+
+
 def test_references(folder, dataset):
     """A render of the scene as its own 'exact' image: equal pixels, and what is refused."""
     cams, truth = views(folder / "v.json"), folder / "truth"
@@ -153,7 +180,7 @@ def main():
         folder = pathlib.Path(name)
         splatd("synth", "courtyard", "--points", "20000", "--format", "ply", "-o", folder / "scan")
         splatd("pack", folder / "scan" / "courtyard.ply", "-o", folder / "small.spld")
-        for test in (test_outputs_and_resume, test_profile, test_references, test_refusals):
+        for test in (test_outputs_and_resume, test_profile, test_atoms, test_references, test_refusals):
             try:
                 test(folder, folder / "small.spld")
                 print("ok   " + test.__name__, flush=True)

@@ -18,7 +18,8 @@ import urllib.parse
 
 import openapi
 
-REAL, FAKE, WALL = (os.environ[name] for name in ("SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL"))
+REAL, FAKE, WALL, TEXTURED = (
+    os.environ[name] for name in ("SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL", "SPLATD_WALL_TEXTURED"))
 VIEW = "/v1/datasets/wall/view"
 
 

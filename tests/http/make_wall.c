@@ -1,10 +1,11 @@
-/* make_wall [--small] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two levels, in the plane
- * x = 0. */
+/* make_wall [--small | --textured] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two levels,
+ * in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "support/make_dataset.h"
+#include "support/make_textures.h"
 
 enum { side = 40 };
 
@@ -20,7 +21,16 @@ int main(int argc, char **argv)
             .color = {(uint8_t)(i % side * 6), (uint8_t)(i / side * 6), 90},
         };
     }
-    int small = argc > 1 && !strcmp(argv[1], "--small");
+    int small = argc > 1 && !strcmp(argv[1], "--small"), textured = argc > 1 && !strcmp(argv[1], "--textured");
+    if (textured) {
+        struct spl_dataset *plain = make_dataset(splats, side * side);
+        struct spl_dictionary dictionary = make_dictionary(16, 8, 1);
+        for (int i = 2; i < argc; i++)
+            make_textured_file(plain, &dictionary, 8, 1, argv[i]);
+        spl_dictionary_finish(&dictionary);
+        spl_dataset_close(plain);
+        return 0;
+    }
     for (int i = 1 + small; i < argc; i++)
         make_dataset_file(argv[i], splats, side * side / (1 + small), 2);
     return 0;

@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import xml.etree.ElementTree
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run
+from harness import FAKE, REAL, TEXTURED, VIEW, WALL, Daemon, eventually, run
 
 PROFILE = "/v1/datasets/wall/profile"
 DEVICE = {"backend": "fake", "name": "flat colour", "driver": "tests", "software": True}
@@ -30,20 +30,20 @@ def profile(version, **more):
                        point("splat", 2, 1, 30), point("splat", 1, 1, 33), point("splat", 1, 2, 36)], **more}
 
 
-def version():
-    with Daemon(FAKE) as d:
-        return d.ask("/v1/datasets/wall").json()["version"]
+def version(path):
+    with Daemon(FAKE, datasets=[path]) as d:
+        return d.ask(f"/v1/datasets/{pathlib.Path(path).stem}").json()["version"]
 
 
-VERSION = version()
+VERSION = version(WALL)
 
 
 @contextlib.contextmanager
-def serving(document, binary=FAKE, **environment):
+def serving(document, binary=FAKE, source=WALL, **environment):
     """A daemon over a copy of the wall with `document` (text, JSON or None) beside it, and that file's path."""
     with tempfile.TemporaryDirectory() as folder:
         dataset = pathlib.Path(folder, "wall.spld")
-        shutil.copy(WALL, dataset)
+        shutil.copy(source, dataset)
         path = dataset.with_name("wall.profile.json")
         if document is not None:
             path.write_text(document if isinstance(document, str) else json.dumps(document))
@@ -125,6 +125,42 @@ def test_given_parameters_narrow_the_choice():
         assert ask(d, psnr=10, supersample=2)[0] == ("splat", 1, 2)
         reply = d.view(budget="1s", lod=1.25)
         assert reply.status == 400 and reply.json()["field"] == "lod", reply.body
+
+
+def test_atoms_are_chosen_where_there_are_textures():
+    points = [point("splat", lod, 1, psnr, atoms=atoms)
+              for lod, atoms, psnr in ((2, 0, 28), (2, 8, 31), (1, 0, 30), (1, 2, 33), (1, 8, 34))]
+    for p, share in zip(points, (1, 1.2, 1, 1.3, 2)):
+        p.update({k: share * p[k] for k in ("ms", "ms_q90", "ms_per_mpx")})
+    document = profile(version(TEXTURED), points=points + [point("points", 1, 1, 22, atoms=8)])
+    with serving(document, source=TEXTURED) as (d, _):
+        textures = d.ask("/v1/datasets/wall").json()["textures"]
+        assert textures == {"size": 8, "atoms": 16, "methods": ["splat"]}, textures
+        for params, wanted in [({"psnr": 31.5}, "2"), ({"psnr": 32.5}, "8"), ({"psnr": 28.5, "lod": 1}, "0"),
+                               ({"psnr": 20, "atoms": 2}, "8"), ({"psnr": 25, "atoms": 2}, "2"),
+                               ({"psnr": 29, "lod": 2}, "8")]:
+            _, reply = ask(d, **params)
+            chosen = fields(reply.headers["Splatd-Chosen"])
+            if chosen["method"] == "splat":
+                assert chosen["atoms"] == wanted, (params, chosen)
+            assert reply.headers["Splatd-Demand"] == "met", (params, chosen)
+        assert [p["atoms"] for p in d.ask(PROFILE).json()["points"]] == [0, 8, 0, 2, 8, 8]
+        chart = d.ask(PROFILE + "?format=svg").body.decode()
+        assert "splat atoms=2" in chart and chart.count("<polyline") == 4, chart
+        reply = d.view(budget="1s", atoms=3, method="splat")
+        assert reply.status == 400 and reply.json()["field"] == "atoms", reply.body
+    for p in document["points"]:
+        del p["atoms"]  # as they were before textures: all of them
+    document["points"] = [document["points"][i] for i in (1, 4, 5)]
+    with serving(document, source=TEXTURED) as (d, _):
+        assert fields(ask(d, psnr=31)[1].headers["Splatd-Chosen"])["atoms"] == "8"
+        reply = ask(d, budget="1s", atoms=3, method="splat")[1]
+        assert fields(reply.headers["Splatd-Chosen"])["atoms"] == "3"
+        assert "psnr" not in reply.headers["Splatd-Promised"], "nobody measured it"
+    with serving(profile(VERSION)) as (d, _):
+        assert d.ask("/v1/datasets/wall").json()["textures"] is None
+        reply = ask(d, psnr=20, atoms=3)[1]
+        assert "atoms" not in reply.headers["Splatd-Chosen"] and "psnr" in reply.headers["Splatd-Promised"]
 
 
 def test_profiles_that_cannot_be_trusted_are_ignored():

@@ -50,6 +50,15 @@ json_t *spl_describe_slot(const struct spl_catalog_slot *slot)
     return json;
 }
 
+static json_t *describe_textures(const struct spl_dataset_info *info)
+{
+    json_t *methods = json_array();
+    for (int i = 0; i < SPL_METHOD_COUNT; i++)
+        if (spl_method_has_textures((enum spl_method)i))
+            json_array_append_new(methods, json_string(spl_method_name((enum spl_method)i)));
+    return json_pack("{s:i, s:i, s:o}", "size", (int)info->texture_size, "atoms", (int)info->atoms, "methods", methods);
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
@@ -77,6 +86,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", names(layer_name, SPL_LAYER_COUNT));
     set(json, "methods", names(method_name, SPL_METHOD_COUNT));
+    set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)
         if (spl_format_is_built((enum spl_format)i))

@@ -119,9 +119,11 @@ static int resolve_demand(const struct values *values, struct spl_view_request *
     demand->keep_method = given(values, PARAM_method);
     demand->keep_lod = given(values, PARAM_lod);
     demand->keep_supersample = given(values, PARAM_supersample);
+    demand->keep_atoms = given(values, PARAM_atoms);
     demand->kept.method = out->view.method;
     demand->kept.lod = out->view.lod;
     demand->kept.supersample = out->view.supersample;
+    demand->kept.atoms = out->view.atoms;
     return 0;
 }
 

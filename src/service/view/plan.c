@@ -15,6 +15,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "shared.h"
 
 static const double encoding_margin = 1.25, encoding_gain = 0.2, encoding_step = 1; /* ln */
 static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
@@ -136,6 +137,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     if (has_changed(plan))
         read_profile(plan);
     struct spl_demand demand = request->demand;
+    demand.keep_atoms &= plan->info->atoms > 0;
     pthread_mutex_lock(&plan->mutex);
     demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
     pthread_mutex_unlock(&plan->mutex);
@@ -146,6 +148,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         return rc;
     request->view.method = choice->setting.method;
     request->view.lod = choice->setting.lod;
+    request->view.atoms = choice->setting.atoms;
     set_supersample(&request->view, &choice->setting);
     *promised_ms = choice->ms + demand.extra_ms;
     return 0;
@@ -154,7 +157,8 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
 void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
 {
     const struct spl_view *view = &request->view;
-    struct spl_setting setting = {view->method, view->lod, view->supersample};
+    struct spl_setting setting = {view->method, view->lod, view->supersample,
+                                  plan->info->atoms ? view->atoms : SPL_TEXTURE_ATOMS};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
     if (index >= 0)
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);

@@ -22,11 +22,13 @@ static void add_plan(struct spl_headers *headers, const struct spl_job *job)
         return;
     double took_ms = (double)(now - job->began_ns) / SPL_NS_PER_MS;
     bool late = took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
-    char psnr[32] = "";
+    char psnr[32] = "", atoms[32] = "";
     if (isfinite(choice->psnr))
         snprintf(psnr, sizeof psnr, "; psnr=%.2f", choice->psnr);
-    spl_headers_add(headers, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g",
-                    spl_method_name(choice->setting.method), choice->setting.lod, choice->setting.supersample);
+    if (job->entry && job->entry->info->atoms)
+        snprintf(atoms, sizeof atoms, "; atoms=%u", choice->setting.atoms);
+    spl_headers_add(headers, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g%s",
+                    spl_method_name(choice->setting.method), choice->setting.lod, choice->setting.supersample, atoms);
     spl_headers_add(headers, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
     spl_headers_add(headers, "Splatd-Took", "ms=%.2f", took_ms);
     spl_headers_add(headers, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");

@@ -222,6 +222,69 @@ static void test_without_a_profile_nothing_is_promised(void **state)
     spl_planner_finish(&planner);
 }
 
+static void test_atoms_are_chosen_and_kept(void **state)
+{
+    (void)state;
+    struct spl_profile profile = make_profile(0);
+    struct spl_planner planner;
+    struct spl_error err = {0};
+    profile.points[2].setting = profile.points[3].setting; // splat at lod 1: a coarser sum costs half
+    profile.points[2].setting.atoms = 2;
+    profile.points[3].setting.atoms = 8;
+    assert_int_equal(spl_planner_init(&planner, &profile, NULL, &err), 0);
+    struct spl_demand wanted = demand(120, NAN);
+    struct spl_choice choice;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 2 && choice.setting.atoms == 2 && choice.setting.lod == 1);
+    wanted = demand(NAN, 33);
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 3 && choice.setting.atoms == 8);
+    struct spl_setting drawn = {SPL_METHOD_SPLAT, 1, 1, 8}, points = {SPL_METHOD_POINTS, 2, 1, 5};
+    assert_int_equal(spl_planner_find(&planner, &drawn), 3);
+    drawn.atoms = 4;
+    assert_int_equal(spl_planner_find(&planner, &drawn), -1);
+    assert_int_equal(spl_planner_find(&planner, &points), 0); // points draw no textures
+    wanted = demand(1000, NAN);
+    wanted.keep_atoms = true;
+    wanted.kept.atoms = 2;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_int_equal(choice.index, 2);
+    wanted.kept.atoms = 5; // points alone are what they were measured as
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_int_equal(choice.index, 4);
+    wanted.keep_method = true;
+    wanted.kept.method = SPL_METHOD_SPLAT;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "atoms");
+    spl_planner_finish(&planner);
+    spl_profile_finish(&profile);
+}
+
+static void test_atoms_that_nobody_measured(void **state)
+{
+    (void)state;
+    struct spl_profile profile = make_profile(0);
+    struct spl_planner planner;
+    struct spl_choice choice;
+    for (size_t i = 0; i < setting_count; i++)
+        profile.points[i].setting.atoms = 8; // as a profile from before textures is read
+    assert_int_equal(spl_planner_init(&planner, &profile, NULL, NULL), 0);
+    struct spl_demand wanted = demand(120, NAN);
+    wanted.keep_atoms = true;
+    wanted.kept.atoms = 1;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 2 && choice.setting.atoms == 1 && choice.meets && isnan(choice.psnr));
+    assert_int_equal(spl_planner_find(&planner, &choice.setting), 2);
+    wanted.psnr = 25; // of points it is known, of what was asked for in place of all atoms it is not
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_false(choice.meets);
+    wanted.kept.atoms = 8;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 1 && choice.meets && choice.psnr == 28);
+    spl_planner_finish(&planner);
+    spl_profile_finish(&profile);
+}
+
 static double normal(unsigned short seed[3])
 {
     return sqrt(-2 * log(1 - erand48(seed))) * cos(2 * 3.14159265358979 * erand48(seed));
@@ -344,6 +407,8 @@ int main(void)
         cmocka_unit_test(test_settings_of_unknown_accuracy),
         cmocka_unit_test(test_unusable_settings_are_left_out),
         cmocka_unit_test(test_without_a_profile_nothing_is_promised),
+        cmocka_unit_test(test_atoms_are_chosen_and_kept),
+        cmocka_unit_test(test_atoms_that_nobody_measured),
         cmocka_unit_test(test_a_slower_machine_is_learned_through_noise),
         cmocka_unit_test(test_layers_learn_apart),
         cmocka_unit_test(test_outliers_and_nonsense_are_bounded),

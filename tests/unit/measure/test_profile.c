@@ -27,7 +27,7 @@ static void make(struct spl_profile *profile)
     profile->views = 8;
     profile->width = 1280;
     profile->height = 720;
-    profile->points[0] = (struct spl_profile_point){.setting = {SPL_METHOD_SPLAT, 1, 1},
+    profile->points[0] = (struct spl_profile_point){.setting = {SPL_METHOD_SPLAT, 1, 1, 2},
                                                     .ms = 80.5,
                                                     .ms_q90 = 99,
                                                     .fixed_ms = 20,
@@ -43,7 +43,7 @@ static void make(struct spl_profile *profile)
                                                     .see_through = 1,
                                                     .halo = NAN,
                                                     .normal_mean = 2};
-    profile->points[1] = (struct spl_profile_point){.setting = {SPL_METHOD_POINTS, 2.5, 0.5},
+    profile->points[1] = (struct spl_profile_point){.setting = {SPL_METHOD_POINTS, 2.5, 0.5, 8},
                                                     .ms = 0.75,
                                                     .ms_q90 = 0.75,
                                                     .fixed_ms = 0,
@@ -83,6 +83,7 @@ static void test_round_trip(void **state)
                 again.height == 720 && again.count == 2 && !again.software);
     struct spl_profile_point *p = again.points;
     assert_true(p[0].setting.method == SPL_METHOD_SPLAT && p[0].ms == 80.5 && p[0].psnr_q05 == 32 && isnan(p[0].halo));
+    assert_true(p[0].setting.atoms == 2 && p[1].setting.atoms == 8);
     assert_true(p[0].see_through == 1 && p[0].ms_per_mpx == 65.6 && isnan(p[0].splats));
     assert_true(p[1].setting.method == SPL_METHOD_POINTS && p[1].setting.lod == 2.5 && p[1].setting.supersample == 0.5);
     assert_true(p[1].psnr == SPL_PROFILE_PSNR_MAX && isnan(p[1].psnr_sd) && p[1].front && !p[0].front);
@@ -141,6 +142,14 @@ static void test_what_cannot_be_loaded_is_not_saved(void **state)
 #define OTHER                                                                                                          \
     "{\"method\": \"points\", \"lod\": 1, \"supersample\": 1, \"ms\": 80, \"ms_q90\": 90, \"fixed_ms\": 10, "          \
     "\"ms_per_mpx\": 70}"
+#define TEXTURED                                                                                                       \
+    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"atoms\": 2, \"ms\": 8, \"ms_q90\": 9, \"fixed_ms\": "   \
+    "1, "                                                                                                              \
+    "\"ms_per_mpx\": 7}"
+#define FEWER_OF_POINTS                                                                                                \
+    "{\"method\": \"points\", \"lod\": 1, \"supersample\": 1, \"atoms\": 2, \"ms\": 8, \"ms_q90\": 9, \"fixed_ms\": "  \
+    "1, "                                                                                                              \
+    "\"ms_per_mpx\": 7}"
 #define GOOD                                                                                                           \
     "{\"format\": \"splatd-profile\", \"format_version\": 1, \"splatd\": \"0.1.0\", \"dataset\": {\"id\": \"hall\", "  \
     "\"version\": \"0123456789abcdef\"}, \"device\": {\"backend\": \"egl\", \"name\": \"n\", \"driver\": \"d\", "      \
@@ -169,6 +178,7 @@ static void test_every_broken_field_is_named(void **state)
     assert_int_equal(spl_profile_parse(GOOD, strlen(GOOD), "file", &profile, NULL), 0);
     assert_true(profile.count == 2 && isnan(profile.points[0].holes) && isnan(profile.points[1].psnr));
     assert_true(profile.points[0].front && !profile.points[1].front && profile.software);
+    assert_true(profile.points[0].setting.atoms == 8); // from before textures: all
     spl_profile_finish(&profile);
 
     static const struct {
@@ -209,6 +219,12 @@ static void test_every_broken_field_is_named(void **state)
         {"\"lod\": 1", "\"lod\": 65", "lod"},
         {"\"lod\": 1", "\"lod\": \"1\"", "lod"},
         {"\"supersample\": 1", "\"supersample\": 3", "supersample"},
+        {"\"future\": {}", "\"atoms\": 9", "atoms"},
+        {"\"future\": {}", "\"atoms\": -1", "atoms"},
+        {"\"future\": {}", "\"atoms\": 2.5", "atoms"},
+        {"\"future\": {}", "\"atoms\": null", "atoms"},
+        {OTHER, TEXTURED ", " TEXTURED, "points"},
+        {OTHER, OTHER ", " FEWER_OF_POINTS, "points"}, // which draw no textures
         {"\"ms\": 80", "\"ms\": 0", "ms"},
         {"\"ms\": 80", "\"ms\": -80", "ms"},
         {"\"ms\": 80", "\"ms\": null", "ms"},

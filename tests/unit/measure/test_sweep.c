@@ -455,7 +455,7 @@ static void test_report(void **state)
     struct spl_dataset *dataset = make_dataset(&splat, 1);
     struct spl_named_view views[] = {named_view("a", 5), named_view("b", 6)};
     struct spl_view_list list = {.views = views, .count = 2};
-    struct spl_setting settings[] = {{SPL_METHOD_SPLAT, 1, 1}, {SPL_METHOD_POINTS, 2, 2}};
+    struct spl_setting settings[] = {{SPL_METHOD_SPLAT, 1, 1, 2}, {SPL_METHOD_POINTS, 2, 2, 8}};
     struct spl_sweep_options options = {
         .dataset = dataset, .views = &list, .settings = settings, .setting_count = 2, .repeats = 3, .folder = folder};
     struct spl_sweep_accuracy accuracy[4] = {{.metrics = {.psnr = 20, .ssim = 0.5, .depth_rmse = 3, .holes = NAN}},
@@ -483,7 +483,7 @@ static void test_report(void **state)
     size_t length;
     assert_int_equal(spl_report_to_csv(&report, &csv, &length, NULL), 0);
     assert_int_equal(count_of(csv, "\n"), 3);
-    assert_non_null(strstr(csv, "splat,1,1,0,16,19.2,12,0,"));
+    assert_non_null(strstr(csv, "splat,1,1,2,0,16,19.2,12,0,"));
     free(csv);
     json_t *json = spl_report_to_json(&report, NULL);
     const json_t *view =
@@ -501,8 +501,15 @@ static void test_report(void **state)
     struct spl_peer peer[] = {{"other", 5, 33}, {"third", 6, 31}, {"other", 9, 35}};
     assert_int_equal(spl_report_chart(&report.profile, 1, 22, &(struct spl_peers){peer, 3}, &svg, &length, NULL), 0);
     assert_int_equal(count_of(svg, "<circle"), 5);
-    assert_int_equal(count_of(svg, "<polyline"), 4); /* two settings' curves, two peers */
+    assert_int_equal(count_of(svg, "<polyline"), 4);      /* two settings' curves, two peers */
+    assert_int_equal(count_of(svg, "stroke-opacity"), 3); /* fewer atoms are paler: curve, legend, point */
+    assert_non_null(strstr(svg, "splat atoms=2"));
     free(svg);
+    char name[64];
+    spl_report_setting_name(&settings[0], name);
+    assert_string_equal(name, "splat lod=1 atoms=2");
+    spl_report_setting_name(&settings[1], name);
+    assert_string_equal(name, "points lod=2 2×2");
     spl_report_finish(&report);
     spl_dataset_close(dataset);
 }
