@@ -84,6 +84,12 @@ static void help(void)
         "  --repeats N --size WxH    times each pass is timed, and the size of its frames (9; 1280x720)\n"
         "  --threads N --memory MB --device NAME      (all cores; 2048; auto)\n"
         "\n"
+        "Photographs left out of packing, with --left-out first: renders from their poses, with textures and without,\n"
+        "apart for pixels whose splat is wider than 2 pixels: as they are, with exposure matched, and with each block\n"
+        "of 16x16 pixels moved by up to 2 pixels to where it fits best. MODEL holds the poses of those photographs;\n"
+        "OUT gets the photograph and both renders of each.\n"
+        "  --left-out NAME.spld --cameras MODEL [--images DIR] [--lod L] [--device D] [-o OUT]\n"
+        "\n"
         "  splatd bench hall.spld\n"
         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
@@ -378,6 +384,8 @@ int spl_cmd_bench(int argc, char **argv)
     struct arguments a = {0};
     if (argc > 1 && !strcmp(argv[1], "--textures"))
         return spl_cmd_bench_textures(argc - 1, argv + 1, &err) ? spl_cmd_fail(&err) : 0;
+    if (argc > 1 && !strcmp(argv[1], "--left-out"))
+        return spl_cmd_bench_left_out(argc - 1, argv + 1, &err) ? spl_cmd_fail(&err) : 0;
     int status = parse(&a, argc, argv, &err);
     if (status)
         goto done;

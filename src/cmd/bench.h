@@ -1,5 +1,6 @@
 /* What the files of 'splatd bench' share: bench.c reads the options, bench_table.c prints frame times, bench_sweep.c
- * runs the comparison with a reference, bench_textures.c that of texture coders. */
+ * runs the comparison with a reference, bench_textures.c that of texture coders, bench_left_out.c
+ * that with photographs left out of packing. */
 #ifndef SPL_CMD_BENCH_H
 #define SPL_CMD_BENCH_H
 
@@ -33,5 +34,8 @@ int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_da
 
 /* splatd bench --textures, argv[0] being that option: coders of the textures in a file beside each other. */
 int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err);
+
+/* splatd bench --left-out, argv[0] being that option: renders against photographs that packing did not have. */
+int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err);
 
 #endif

@@ -163,6 +163,17 @@ with tempfile.TemporaryDirectory() as folder:
         assert sum(counts) == sum(level["splats"] for level in levels), (counts, levels)
         assert len(atoms[counts.index(max(counts))][2]) == 40, atoms
 
+    # the same photograph as one that was left out: textures gain where splats are wide, and pictures show it
+    table = run("bench", "--left-out", "wall.spld", "--cameras", "views.json", "-o", "compared").splitlines()
+    row = table[-1].split()
+    assert row[:4] == ["rings", ">", "2", "px"] and float(row[7]) > 1, table
+    assert sorted(os.listdir("compared")) == ["rings.coloured.png", "rings.photograph.png", "rings.textured.png"]
+    shutil.rmtree("compared")
+    for arguments, words in (((), "--cameras"), (("--cameras", "nowhere"), "nowhere"),
+                             (("--cameras", "views.json", "--lod", "x"), "--lod")):
+        done = subprocess.run([SPLATD, "bench", "--left-out", "wall.spld", *arguments], stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
+
     # the textures as they were before: coders beside each other, the photograph itself on the splats, a view that was
     # left out and whose photograph is the same plane seen from nearer
     cameras = {"rings": camera((0, -1.5, 0), (0, 0, 0), (128, 96)), "nearer": camera((0, -1, 0), (0, 0, 0), (128, 96))}

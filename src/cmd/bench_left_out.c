@@ -1,0 +1,155 @@
+/* splatd bench --left-out: what textures gain on photographs that a dataset was packed without. A table to stdout, the
+ * pictures into a folder where one is given. */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "cmd/bench.h"
+#include "cmd/cmd.h"
+#include "cmd/options.h"
+#include "cmd/output.h"
+#include "image/load.h"
+#include "measure/left_out.h"
+
+struct arguments {
+    const char *dataset, *cameras, *images, *folder, *device;
+    double lod;
+};
+
+static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
+{
+    struct spl_image_info info = {0};
+    int rc = spl_image_get_info(path, &info, err);
+    *width = info.width;
+    *height = info.height;
+    return rc;
+}
+
+static int write_picture(const struct arguments *a, const char *view, const char *what, const struct spl_image *image,
+                         struct spl_error *err)
+{
+    char path[4096];
+    struct spl_encoded encoded = {0};
+    if (snprintf(path, sizeof path, "%s/%s.%s.png", a->folder, view, what) >= (int)sizeof path)
+        return spl_fail(err, SPL_E_USAGE, "%s: the path is too long", a->folder);
+    int rc = spl_image_encode(image, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, err);
+    if (!rc)
+        rc = spl_cmd_write_output(path, encoded.bytes, encoded.length, err);
+    spl_encoded_finish(&encoded);
+    return rc;
+}
+
+static void print_row(const char *name, const struct spl_left_out *sums)
+{
+    static const char *const widths[] = {"<= 2 px", "> 2 px"};
+    uint64_t all = sums->pixels[0] + sums->pixels[1];
+    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
+        if (!sums->pixels[w])
+            continue;
+        printf("%-16.16s %-7s %6.1f", name, widths[w], 100 * (double)sums->pixels[w] / (double)all);
+        for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++) {
+            double colored = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_COLORED, step);
+            double textured = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_TEXTURED, step);
+            printf(" %6.2f %6.2f %+6.2f", colored, textured, textured - colored);
+        }
+        for (int kind = 0; kind < SPL_LEFT_OUT_KINDS; kind++) {
+            const double *squared = sums->squared[w][kind];
+            printf(" %5.0f", 100 * squared[SPL_LEFT_OUT_REGISTERED] / fmax(squared[SPL_LEFT_OUT_MATCHED], 1e-9));
+        }
+        printf(" %6.1f\n", 100 * (double)sums->worse[w] / (double)sums->pixels[w]);
+    }
+}
+
+static int compare_view(const struct arguments *a, struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                        const struct spl_named_view *view, struct spl_left_out *sums, struct spl_error *err)
+{
+    static const char *const names[] = {"coloured", "textured"};
+    struct spl_image photograph = {0}, render[SPL_LEFT_OUT_KINDS] = {0};
+    struct spl_left_out_images images = {.photograph = &photograph, .render = {&render[0], &render[1]}};
+    struct spl_left_out found = {0};
+    float *width_px = NULL;
+    int rc = spl_left_out_load(view, &photograph, err);
+    if (!rc)
+        rc = spl_left_out_render(renderer, dataset, view, a->lod, render, &width_px, err);
+    images.width_px = width_px;
+    if (!rc)
+        rc = spl_left_out_compare(&images, 0, &found, err);
+    if (!rc && a->folder)
+        rc = write_picture(a, view->name, "photograph", &photograph, err);
+    for (int kind = 0; !rc && a->folder && kind < SPL_LEFT_OUT_KINDS; kind++)
+        rc = write_picture(a, view->name, names[kind], &render[kind], err);
+    if (!rc) {
+        print_row(view->name, &found);
+        fflush(stdout);
+        spl_left_out_add(sums, &found);
+    }
+    spl_image_finish(&photograph);
+    spl_image_finish(&render[0]);
+    spl_image_finish(&render[1]);
+    free(width_px);
+    return rc;
+}
+
+static int run(const struct arguments *a, struct spl_error *err)
+{
+    const struct spl_photograph_options how = {.images = a->images, .get_size = get_size};
+    struct spl_view_list list = {0};
+    struct spl_dataset *dataset = NULL;
+    struct spl_renderer *renderer = NULL;
+    struct spl_left_out sums = {0};
+    int rc = spl_view_list_load_photographs(&list, a->cameras, &how, err);
+    if (rc || (rc = spl_dataset_open(a->dataset, true, &dataset, err)) ||
+        (rc = spl_renderer_create(&(struct spl_renderer_options){.device = a->device}, &renderer, err)) ||
+        (rc = spl_renderer_add(renderer, dataset, err)))
+        goto done;
+    if (a->folder && mkdir(a->folder, 0777) && errno != EEXIST) {
+        rc = spl_fail_errno(err, errno, "%s", a->folder);
+        goto done;
+    }
+    printf("%-16s %-7s %6s %20s %20s %20s %11s %6s\n", "photograph", "splats", "pixels", "as they are, dB",
+           "exposure matched, dB", "registered, dB", "remains, %", "worse,");
+    printf("%-16s %-7s %6s", "", "", "%");
+    for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++)
+        printf(" %6s %6s %6s", "colour", "textur", "gain");
+    printf(" %5s %5s %6s\n", "col.", "text.", "%");
+    for (size_t i = 0; !rc && i < list.count; i++)
+        rc = compare_view(a, renderer, dataset, &list.views[i], &sums, err);
+    if (!rc && list.count > 1)
+        print_row("all", &sums);
+done:
+    spl_renderer_destroy(renderer);
+    spl_dataset_close(dataset);
+    spl_view_list_finish(&list);
+    return rc;
+}
+
+int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err)
+{
+    static const struct option options[] = {
+        {"cameras", required_argument, NULL, 'c'}, {"images", required_argument, NULL, 'i'},
+        {"output", required_argument, NULL, 'o'},  {"lod", required_argument, NULL, 'l'},
+        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
+    struct arguments a = {.lod = 1};
+    int option, rc = 0;
+    while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
+        if (option == 'c')
+            a.cameras = optarg;
+        else if (option == 'i')
+            a.images = optarg;
+        else if (option == 'o')
+            a.folder = optarg;
+        else if (option == 'd')
+            a.device = optarg;
+        else if (option == 'l')
+            rc = spl_cmd_parse_real("--lod", optarg, 0, 1024, &a.lod, err);
+        else
+            rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
+    if (!rc && (argc - optind != 1 || !a.cameras))
+        rc = spl_fail(err, SPL_E_USAGE, "bench --left-out takes one NAME.spld and --cameras MODEL");
+    a.dataset = argv[optind];
+    return rc ? rc : run(&a, err);
+}
