@@ -70,7 +70,8 @@ static void help(void)
         "  --repeats N               times each view and setting is timed (5)\n"
         "  --peers FILE.csv          rows name,ms,psnr of other programs, for the same chart\n"
         "  --profile FILE, --no-profile\n"
-        "  --restart                 forget what OUT/state.jsonl holds\n"
+        "  --restart                 forget what OUT/state.jsonl holds");
+    puts(
         "\n"
         "Textures, with --textures first: how dictionaries are learned, and their bytes against quality, beside the\n"
         "sparse-coding paper's settings (D8W4, D12W4, D16W8). FILE is what 'splatd pack --keep-textures' wrote, NAME.spld\n"
