@@ -82,11 +82,11 @@ uint pixel_sample(ivec2 corner, uint i)
 void main()
 {
     load_frame();
-    uint side = frame.supersample, width = frame.width / side, pixel = gl_GlobalInvocationID.x;
-    if (pixel >= width * (frame.height / side))
+    uint side = frame.supersample, width = frame.crop_width, pixel = gl_GlobalInvocationID.x;
+    if (pixel >= width * frame.crop_height)
         return;
     precise float row = floor((float(pixel) + 0.5) / float(width)); /* exact below 2^23 pixels */
-    ivec2 corner = ivec2(int(pixel) - int(row) * int(width), int(row)) * int(side);
+    ivec2 corner = ivec2(int(pixel) - int(row) * int(width), int(row)) * int(side) + ivec2(frame.crop_x, frame.crop_y);
     uint covered = 0u, nearest = SPL_NOTHING, id = SPL_NOTHING;
     uvec3 color = uvec3(0u);
     vec3 normal = vec3(0.0);

@@ -69,6 +69,12 @@ void put_frame()
     put(frame.inverse_fx), put(frame.inverse_fy), put(frame.inverse_low_pass_squared);
     put(frame.output_word);
     put(frame.texture_size);
+    put(frame.crop_x), put(frame.crop_y), put(frame.crop_width), put(frame.crop_height);
+    put(frame.fill_radius), put(frame.fill_reach), put(frame.fill_kernel), put(frame.fill_margin);
+    put(frame.fill_threshold);
+    put(frame.fill_levels), put(frame.fill_level);
+    put(frame.fill_from), put(frame.fill_to), put(frame.fill_stride);
+    put(frame.fill_keep);
 }
 
 void put_chunk(spl_draw_chunk c)

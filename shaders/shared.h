@@ -109,6 +109,16 @@
 #define SPL_TEXTURE_STEP 9         /* 9..16, of spl_code_step() */
 #define SPL_TEXTURE_OFFSET 17      /* 17..31, of the plane's codes, words from the chunk's first */
 
+/* Method fill. A depth word of its points has, from the low end: whether the point is linear, and its radius as a multiple
+ * of frame.fill_radius, a float of one bit of mantissa (the field's word for it here is spacing, which is in proportion). */
+#define SPL_FILL_LINEAR 1u
+#define SPL_FILL_SPACING_BITS 5
+#define SPL_FILL_DEPTH_BITS 63u
+#define SPL_FILL_HOLE 0x80000000u
+#define SPL_FILL_LEVELS_MAX 8
+/* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
+#define SPL_FILL_SLOPE 4.0f
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */
@@ -201,6 +211,18 @@ struct spl_frame_params {
     SPL_F32 inverse_fx, inverse_fy, inverse_low_pass_squared;
     SPL_U32 output_word;                  /* resolve: where the layer's pixels start in the output buffer */
     SPL_U32 texture_size;                 /* texels of a side of the dataset's textures */
+    SPL_U32 crop_x, crop_y;               /* samples: where the pixels that are resolved begin */
+    SPL_U32 crop_width, crop_height;      /* pixels */
+    SPL_F32 fill_radius;                  /* metres, of a splat whose spacing has code 0 */
+    SPL_F32 fill_reach;                   /* how far a point of radius 1 m hides others, samples at depth 1 */
+    SPL_F32 fill_kernel;                  /* the same at most, samples */
+    SPL_F32 fill_margin;                  /* radii that a point must be nearer by to hide another */
+    SPL_F32 fill_threshold;               /* open sectors, of 8, from which on a sample is visible */
+    SPL_U32 fill_levels;                  /* of the rings that are looked at; the coarse level */
+    SPL_U32 fill_level;                   /* that this pass makes */
+    SPL_U32 fill_from, fill_to;           /* words of its planes */
+    SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
+    SPL_U32 fill_keep;                    /* 1: samples are visible in any case */
 };
 
 #ifndef SPL_GLSL
@@ -208,7 +230,7 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(sizeof(struct spl_frame_params) == 128, "spl_frame_params is 128 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 188, "spl_frame_params is 188 bytes on both sides");
 #endif
 
 #endif

@@ -16,11 +16,22 @@ struct spl_renderer;
 enum spl_method {
     SPL_METHOD_SPLAT,   /* oriented discs, blended within a margin behind the first surface */
     SPL_METHOD_POINTS,  /* one pixel each */
+    SPL_METHOD_FILL,    /* one pixel each, hidden ones removed and holes filled in screen space */
     SPL_METHOD_COUNT
 };
 const char *spl_method_name(enum spl_method method);
 int spl_method_from_name(const char *name);  /* -1 for an unknown name */
 bool spl_method_has_textures(enum spl_method method); /* draws them where there are any; else their mean colours */
+
+/* Method fill: which points are removed as hidden, and how holes are found. */
+enum spl_visibility {
+    SPL_VISIBILITY_ADAPTIVE, /* as far as the points lie apart on the image, in proportion to inverse depth */
+    SPL_VISIBILITY_CONSTANT, /* as far as the kernel everywhere, every pixel of it: the earlier work, slow */
+    SPL_VISIBILITY_NONE,     /* no point is removed; holes as adaptive finds them */
+    SPL_VISIBILITY_COUNT
+};
+const char *spl_visibility_name(enum spl_visibility visibility);
+int spl_visibility_from_name(const char *name); /* -1 for an unknown name */
 
 struct spl_view {
     struct spl_camera camera;
@@ -31,6 +42,12 @@ struct spl_view {
                                    enlarged */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
     uint32_t atoms;             /* of a splat's texture that are drawn at most, 0..8; 0 = its mean colour */
+    enum spl_visibility visibility; /* method fill, as the next three */
+    double kernel;              /* side of the visibility kernel where it is largest, pixels: 3 to 129; 0 = from the
+                                   points' spacing on the image */
+    double threshold;           /* share of the eight sectors that must be open where a point is visible, 0..1;
+                                   negative = default 0.3125 */
+    uint32_t pyramid;           /* levels of the pyramid that holes are filled from, 1..8; 0 = from the kernel */
     double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };

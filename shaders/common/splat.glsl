@@ -183,6 +183,19 @@ bool is_linear(spl_draw_chunk chunk, uint index)
     return (mode & (SPL_LINEAR_ALL | ((mask >> (index & 31u)) << 1))) != 0u;
 }
 
+/* A splat's radius alone. */
+float load_radius(spl_draw_chunk chunk, uint index)
+{
+    uint widths = chunk.geometry_bits;
+    uint before = bitfieldExtract(widths, SPL_GEOMETRY_X, 5) + bitfieldExtract(widths, SPL_GEOMETRY_Y, 5) +
+                  bitfieldExtract(widths, SPL_GEOMETRY_Z, 5) + bitfieldExtract(widths, SPL_GEOMETRY_U, 4) +
+                  bitfieldExtract(widths, SPL_GEOMETRY_V, 4);
+    uint width = bitfieldExtract(widths, SPL_GEOMETRY_RADIUS, 4);
+    bit_run run = load_run(chunk.geometry_word, index * (before + width) + before, 2);
+    precise float radius = chunk.radius_min + chunk.radius_step * float(take(run, width));
+    return radius;
+}
+
 /* 8 bit sRGB, exact. */
 uvec3 load_color(spl_draw_chunk chunk, uint index)
 {

@@ -45,7 +45,7 @@ static void help(void)
         "  --frames N                places on the path (20)\n"
         "  --size WxH                (1280x720)\n"
         "  --device LIST             such as vulkan,egl (auto); 'splatd devices' lists them\n"
-        "  --method LIST             such as splat,points (splat)\n"
+        "  --method LIST             such as splat,points,fill (splat)\n"
         "  --lod LIST                pixels a splat, such as 1,2 (1)\n"
         "  --memory-limit MB         device memory; less than the dataset needs measures paging\n"
         "  --json                    everything, quartiles too, as one JSON object\n"
@@ -64,7 +64,7 @@ static void help(void)
         "  --photographs             the views' photographs; without either: the dataset's own render with every "
         "splat\n"
         "                            and 4x4 samples a pixel\n"
-        "  --method LIST --lod LIST  (splat,points; 0.5,0.75,1,1.5,2,3)\n"
+        "  --method LIST --lod LIST  (all; 0.5,0.75,1,1.5,2,3)\n"
         "  --supersample LIST        samples a pixel side, of 0.25,0.5,1,2,4 (0.25,0.5,1,2)\n"
         "  --atoms LIST              of a splat's texture at most, where the dataset has textures (0,2,8)\n"
         "  --repeats N               times each view and setting is timed (5)\n"
@@ -125,8 +125,8 @@ static int take_method(struct arguments *a, const char *text, struct spl_error *
 {
     int method = spl_method_from_name(text);
     if (method < 0)
-        return spl_fail(err, SPL_E_USAGE, "--method takes %s or %s, not '%s'", spl_method_name(SPL_METHOD_SPLAT),
-                        spl_method_name(SPL_METHOD_POINTS), text);
+        return spl_fail(err, SPL_E_USAGE, "--method takes %s, %s or %s, not '%s'", spl_method_name(SPL_METHOD_SPLAT),
+                        spl_method_name(SPL_METHOD_POINTS), spl_method_name(SPL_METHOD_FILL), text);
     a->methods[a->bench.method_count++] = (enum spl_method)method;
     return 0;
 }
@@ -260,7 +260,8 @@ static int finish_sweep(struct arguments *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE, "a reference is of views that have names: give them with --views");
     if (!a->listed[0]) {
         a->methods[1] = SPL_METHOD_POINTS;
-        a->bench.method_count = 2;
+        a->methods[2] = SPL_METHOD_FILL;
+        a->bench.method_count = SPL_METHOD_COUNT;
     }
     if (!a->listed[1]) {
         memcpy(a->lods, lods, sizeof lods);

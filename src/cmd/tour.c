@@ -61,7 +61,7 @@ static void usage(FILE *out)
             "  --closed                 the last camera is followed by the first\n"
             "Drawing:\n"
             "  --size WxH               pixels (the path's own, or 1280x720)\n"
-            "  --method splat|points, --lod L, --supersample N, --background COLOUR, --margin M,\n"
+            "  --method splat|points|fill, --lod L, --supersample N, --background COLOUR, --margin M,\n"
             "  --atoms N\n"
             "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"
             "Output:\n"

@@ -17,6 +17,7 @@ enum { default_margin = 1 };
 static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
     [SPL_METHOD_SPLAT] = &spl_method_splat,
     [SPL_METHOD_POINTS] = &spl_method_points,
+    [SPL_METHOD_FILL] = &spl_method_fill,
 };
 
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
@@ -31,6 +32,7 @@ struct frame_job {
     const struct spl_view *view;
     uint64_t deadline_ns;
     struct spl_frame *frame;
+    struct spl_fill_plan fill;   /* method fill */
     struct spl_error page_error; /* why a page could not be loaded, unless it was only the limit */
 };
 
@@ -76,26 +78,33 @@ static void fill_params(struct spl_tile *tile)
         .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
         .texture_size = spl_dataset_get_info(tile->resident->dataset)->texture_size,
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
+        .crop_width = tile->width,
+        .crop_height = tile->height,
     };
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)
             tile->params.rotation[4 * row + column] = (float)camera->rotation[3 * row + column];
 }
 
-static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+static struct spl_select_params selection(struct frame_job *job, const struct spl_camera *camera)
 {
-    struct spl_renderer *r = job->renderer;
-    struct spl_select_params params = {
+    return (struct spl_select_params){
         .dataset = job->resident->dataset,
-        .camera = &tile->camera,
+        .camera = camera,
         .lod = job->view->lod,
-        .low_pass = tile->params.low_pass,
-        .points = job->view->method == SPL_METHOD_POINTS,
+        .low_pass = SPL_LOW_PASS,
+        .points = job->view->method != SPL_METHOD_SPLAT,
         .resident = ask_page,
         .atoms = spl_view_is_textured(job->view) ? job->view->atoms : 0,
         .textured = ask_textures,
         .context = job,
     };
+}
+
+static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_renderer *r = job->renderer;
+    struct spl_select_params params = selection(job, &tile->camera);
     spl_residency_begin_frame(&r->residency);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
     int rc = spl_select(&params, &r->list, &why);
@@ -201,30 +210,78 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     return SPL_OK;
 }
 
+/* The range [begin, end) of pixels along an axis of `size` pixels, in samples, with what is drawn around it. */
+static void widen(const struct spl_fill_plan *plan, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
+                  int64_t *from, int64_t *to)
+{
+    *from = (int64_t)begin * side - plan->apron;
+    *from = *from < -(int64_t)plan->guard ? -(int64_t)plan->guard : *from - *from % (int64_t)plan->align;
+    *to = (int64_t)end * side + plan->apron;
+    *to = *to > (int64_t)size * side + plan->guard ? (int64_t)size * side + plan->guard : *to;
+}
+
 /* The tile whose corner is (x, y): as wide as the image, as high as the scratch allows, in whole pixels. */
 static void place_tile(const struct frame_job *job, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
                        struct spl_tile *tile)
 {
     const struct spl_camera *whole = &job->view->camera;
     uint32_t side = (uint32_t)job->view->supersample;
+    int64_t from[2] = {(int64_t)x * side, (int64_t)y * side}, to[2] = {from[0] + width * side, from[1] + height * side};
     *tile = (struct spl_tile){
         .renderer = job->renderer,
         .resident = job->resident,
         .view = job->view,
         .camera = *whole,
+        .fill = job->fill,
         .x = x,
         .y = y,
         .width = width,
         .height = height,
-        .samples = (uint64_t)width * side * height * side,
     };
-    tile->camera.width = width * side;
-    tile->camera.height = height * side;
+    if (job->view->method == SPL_METHOD_FILL) {
+        widen(&job->fill, side, whole->width, x, x + width, &from[0], &to[0]);
+        widen(&job->fill, side, whole->height, y, y + height, &from[1], &to[1]);
+    }
+    tile->camera.width = (uint32_t)(to[0] - from[0]);
+    tile->camera.height = (uint32_t)(to[1] - from[1]);
+    tile->samples = (uint64_t)tile->camera.width * tile->camera.height;
     tile->camera.fx = whole->fx * side;
     tile->camera.fy = whole->fy * side;
-    tile->camera.cx = (whole->cx - x) * side;
-    tile->camera.cy = (whole->cy - y) * side;
+    tile->camera.cx = whole->cx * side - (double)from[0];
+    tile->camera.cy = whole->cy * side - (double)from[1];
     fill_params(tile);
+    tile->params.crop_x = (uint32_t)((int64_t)x * side - from[0]);
+    tile->params.crop_y = (uint32_t)((int64_t)y * side - from[1]);
+    if (job->view->method == SPL_METHOD_FILL)
+        spl_fill_set_params(tile);
+}
+
+/* The largest tile in pixels: whole rows where they fit. What is drawn around it must fit too. */
+static int tile_size(struct frame_job *job, uint32_t *width, uint32_t *height, struct spl_error *err)
+{
+    const struct spl_view *view = job->view;
+    uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
+    uint64_t samples = job->renderer->scratch.samples, around = 0, square = (uint64_t)sqrt((double)samples);
+    if (view->method == SPL_METHOD_FILL) {
+        const struct spl_fill_plan *plan = &job->fill;
+        uint64_t guard = 2 * (uint64_t)plan->guard;
+        around = 2 * (uint64_t)plan->apron + plan->align;
+        if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
+            around = guard;
+        if (square < around + side)
+            return spl_fail_field(err, SPL_E_LIMIT, "kernel",
+                                  "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
+                                  2 * plan->kernel / side, (unsigned long long)samples);
+    }
+    uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
+    uint64_t widest = around
+                          ? (samples / 2 / (around + side) > square ? samples / 2 / (around + side) : square) - around
+                          : samples / per_pixel * side;
+    *width = view->camera.width < widest / side ? view->camera.width : (uint32_t)(widest / side);
+    uint64_t rows = (samples / (*width * side + around) - around) / side, most = samples / layers / *width;
+    rows = rows < most ? rows : most;
+    *height = view->camera.height < rows ? view->camera.height : (uint32_t)rows;
+    return SPL_OK;
 }
 
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
@@ -244,6 +301,26 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
     return SPL_OK;
 }
 
+/* The plan is the whole image's, or tiles would show where they meet. */
+static int plan_fill(struct frame_job *job, struct spl_error *err)
+{
+    struct spl_camera camera = job->view->camera;
+    double side = job->view->supersample, spacing = 1;
+    camera.width *= (uint32_t)side;
+    camera.height *= (uint32_t)side;
+    camera.fx *= side;
+    camera.fy *= side;
+    camera.cx *= side;
+    camera.cy *= side;
+    struct spl_select_params params = selection(job, &camera);
+    uint64_t clock = spl_now_ns();
+    spl_residency_begin_frame(&job->renderer->residency);
+    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
+    job->frame->stats.select_ms += since_ms(&clock);
+    spl_fill_plan_init(&job->fill, job->view, spacing);
+    return rc;
+}
+
 /* A view with at least one sample a pixel. */
 static int render_view(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                        struct spl_frame *frame, struct spl_error *err)
@@ -255,13 +332,13 @@ static int render_view(struct spl_renderer *renderer, const struct spl_dataset *
     if (!job.resident)
         return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
     frame->stats.complete = true;
-    rc = make_images(frame, view, err);
-
-    uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
-    uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
-    uint64_t pixels = renderer->scratch.samples / per_pixel;
-    uint32_t width = view->camera.width < pixels ? view->camera.width : (uint32_t)pixels;
-    uint32_t rows = (uint32_t)(pixels / width);
+    if (view->method == SPL_METHOD_FILL)
+        rc = plan_fill(&job, err);
+    uint32_t width = 0, rows = 0;
+    if (!rc)
+        rc = tile_size(&job, &width, &rows, err);
+    if (!rc)
+        rc = make_images(frame, view, err);
     for (uint32_t y = 0; y < view->camera.height && !rc; y += rows) {
         uint32_t height = view->camera.height - y < rows ? view->camera.height - y : rows;
         for (uint32_t x = 0; x < view->camera.width && !rc; x += width) {
@@ -286,6 +363,7 @@ static int render_small(struct spl_renderer *renderer, const struct spl_dataset 
     struct spl_frame coarse = {0};
     uint64_t clock = spl_now_ns();
     small.supersample = 1;
+    small.kernel = view->kernel > 0 ? fmax(view->kernel * scale, 3) : view->kernel;
     small.camera.width = (uint32_t)ceil(view->camera.width * scale);
     small.camera.height = (uint32_t)ceil(view->camera.height * scale);
     small.camera.fx *= scale;

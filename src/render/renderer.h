@@ -6,6 +6,7 @@
 #include <splatd/render.h>
 
 #include "gpu/gpu.h"
+#include "render/fill.h"
 #include "render/residency.h"
 #include "render/select.h"
 
@@ -18,7 +19,12 @@ enum spl_kernel_slot {
     SPL_KERNEL_SPLAT_SHADE,                                          /* + 2 SPL_SUMS_* */
     SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + 2 * SPL_SUMS_COUNT, /* + 4 (planes - 1) + 2 smooth */
     SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + 4 * SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
-    SPL_KERNEL_RESOLVE = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT,     /* + 2 layer + method */
+    SPL_KERNEL_FILL_POINTS = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT, /* the same */
+    SPL_KERNEL_FILL_PULL = SPL_KERNEL_FILL_POINTS + 2 * SPL_SUMS_COUNT, /* + first */
+    SPL_KERNEL_FILL_VISIBLE = SPL_KERNEL_FILL_PULL + 2,              /* + adaptive */
+    SPL_KERNEL_FILL_GATHER = SPL_KERNEL_FILL_VISIBLE + 2,            /* + 2 SPL_SUMS_* + first */
+    SPL_KERNEL_FILL_PUSH = SPL_KERNEL_FILL_GATHER + 2 * SPL_SUMS_COUNT, /* + 2 SPL_SUMS_* + last */
+    SPL_KERNEL_RESOLVE = SPL_KERNEL_FILL_PUSH + 2 * SPL_SUMS_COUNT,  /* + 2 layer + (method splat ? 0 : 1) */
     SPL_KERNEL_COUNT = SPL_KERNEL_RESOLVE + 2 * SPL_LAYER_COUNT
 };
 
@@ -52,7 +58,8 @@ struct spl_tile {
     struct spl_renderer *renderer;
     const struct spl_resident_dataset *resident;
     const struct spl_view *view;
-    struct spl_camera camera;        /* of the tile, in samples */
+    struct spl_camera camera;        /* of the tile and what is drawn around it, in samples */
+    struct spl_fill_plan fill;       /* method fill */
     uint32_t x, y, width, height;    /* in the image, pixels */
     uint64_t samples;
     struct spl_frame_params params;  /* common to all dispatches of the tile */
@@ -87,6 +94,9 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
                              struct spl_error *err);
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides. Clobbers the id buffer. */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err);
+/* Records the kernel of `slot`, one invocation for each of `items`, and a barrier. */
+int spl_tile_dispatch_samples(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
+                              uint32_t items, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */
@@ -99,6 +109,9 @@ struct spl_method_ops {
      * frame's first group. */
     int (*record)(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err);
 };
-extern const struct spl_method_ops spl_method_splat, spl_method_points;
+extern const struct spl_method_ops spl_method_splat, spl_method_points, spl_method_fill;
+
+/* Records the points of `group` into cleared depths and payloads, by the kernels from `slot` on. */
+int spl_points_record(struct spl_tile *tile, uint32_t group, uint32_t slot, struct spl_error *err);
 
 #endif

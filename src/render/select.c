@@ -24,7 +24,17 @@ struct walk {
     const uint32_t *textures; /* words of CTEX, NULL = none */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
+    double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
 };
+
+/* Spacings from 2^(i / 4) samples on. */
+enum { SPACING_CLASSES = 64 };
+
+static void add_spacing(struct walk *w, double spacing, uint32_t count)
+{
+    double class = fmin(fmax(floor(4 * log2(spacing)), 0), SPACING_CLASSES - 1);
+    w->covered[(int)class] += count * spacing * spacing;
+}
 
 /* The share of the chunk's splats that keeps them `lod` samples apart, as a count that fills the lanes. */
 static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_samples, double lod)
@@ -129,6 +139,10 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
         box.half[i] += radius;
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
+    if (w->covered) {
+        add_spacing(w, spacing * scale, count);
+        return SPL_OK;
+    }
 
     double low[2] = {-INFINITY, -INFINITY}, high[2] = {INFINITY, INFINITY}, near = 0;
     if (spl_view_box_project(camera, &box, low, high)) {
@@ -250,18 +264,43 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err)
+static struct walk begin_walk(const struct spl_select_params *params)
 {
-    spl_draw_list_clear(list);
-    uint32_t node_count, chunk_count, pages = spl_dataset_get_info(params->dataset)->pages;
-    struct walk w = {
+    uint32_t node_count, chunk_count;
+    return (struct walk){
         .params = params,
-        .list = list,
         .nodes = spl_dataset_get_nodes(params->dataset, &node_count),
         .chunks = spl_dataset_get_chunks(params->dataset, &chunk_count),
         .textures = spl_dataset_get_chunk_textures(params->dataset),
         .focal = fmax(params->camera->fx, params->camera->fy),
     };
+}
+
+int spl_select_spacing(const struct spl_select_params *params, double *spacing, struct spl_error *err)
+{
+    double covered[SPACING_CLASSES] = {0}, sum = 0, sparser = 0;
+    struct spl_draw_list counts = {0}; // its numbers only
+    struct walk w = begin_walk(params);
+    w.list = &counts;
+    w.covered = covered;
+    struct spl_error why = {0};
+    int rc = walk_tree(&w, &why), class = SPACING_CLASSES;
+    if (rc)
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
+    for (int i = 0; i < SPACING_CLASSES; i++)
+        sum += covered[i];
+    while (class > 1 && sparser + covered[class - 1] <= 0.01 * sum)
+        sparser += covered[--class];
+    *spacing = sum > 0 ? exp2(class / 4.0) : 1;
+    return SPL_OK;
+}
+
+int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err)
+{
+    spl_draw_list_clear(list);
+    uint32_t pages = spl_dataset_get_info(params->dataset)->pages;
+    struct walk w = begin_walk(params);
+    w.list = list;
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;

@@ -40,4 +40,8 @@ static inline bool spl_view_is_textured(const struct spl_view *view)
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);
 
+/* How far apart, in samples, the drawn splats lie where they are sparsest: all but a hundredth of what they cover on
+ * the image has a spacing of at most so much. 1 where nothing is drawn. */
+int spl_select_spacing(const struct spl_select_params *params, double *spacing, struct spl_error *err);
+
 #endif

@@ -29,12 +29,28 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
         *count = 3;
         return wide ? "splat_shade64" : "splat_shade";
     }
-    *count = 2;
-    if (slot < SPL_KERNEL_RESOLVE) {
-        constants[0] = (slot - SPL_KERNEL_POINTS) / 2;
+    if (slot < SPL_KERNEL_FILL_PULL) {
+        *count = 3;
+        constants[0] = (slot - SPL_KERNEL_POINTS) / 2 % SPL_SUMS_COUNT;
         constants[1] = (slot - SPL_KERNEL_POINTS) % 2;
+        constants[2] = slot >= SPL_KERNEL_FILL_POINTS;
         return wide ? "points64" : "points";
     }
+    if (slot < SPL_KERNEL_FILL_GATHER) {
+        bool pull = slot < SPL_KERNEL_FILL_VISIBLE;
+        *count = 2;
+        constants[0] = slot - (pull ? SPL_KERNEL_FILL_PULL : SPL_KERNEL_FILL_VISIBLE);
+        constants[1] = wide;
+        return pull ? "fill_pull" : "fill_visible";
+    }
+    if (slot < SPL_KERNEL_RESOLVE) {
+        *count = 3;
+        constants[0] = (slot - SPL_KERNEL_FILL_GATHER) / 2 % SPL_SUMS_COUNT;
+        constants[1] = (slot - SPL_KERNEL_FILL_GATHER) % 2;
+        constants[2] = wide;
+        return slot < SPL_KERNEL_FILL_PUSH ? "fill_gather" : "fill_push";
+    }
+    *count = 2;
     constants[0] = (slot - SPL_KERNEL_RESOLVE) / 2;
     constants[1] = (slot - SPL_KERNEL_RESOLVE) % 2;
     return wide && constants[1] ? "resolve64" : "resolve";
@@ -129,7 +145,8 @@ static int dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, size
     if (!rc)
         rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
     if (!rc)
-        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (uint32_t)((count + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
+        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
+                         (uint32_t)((count + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
     spl_gpu_barrier(tile->renderer->gpu);
     return rc;
 }
@@ -146,10 +163,25 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struc
     return rc;
 }
 
+int spl_tile_dispatch_samples(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
+                              uint32_t items, struct spl_error *err)
+{
+    struct spl_gpu_kernel *kernel;
+    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
+    bind_scratch(tile, bindings);
+    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
+    if (!rc)
+        rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
+    if (!rc)
+        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
+    spl_gpu_barrier(tile->renderer->gpu);
+    return rc;
+}
+
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)
 {
     struct spl_gpu_kernel *kernel;
-    uint32_t slot = SPL_KERNEL_RESOLVE + 2 * layer + (tile->view->method == SPL_METHOD_POINTS);
+    uint32_t slot = SPL_KERNEL_RESOLVE + 2 * layer + (tile->view->method != SPL_METHOD_SPLAT);
     int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
     if (rc)
         return rc;

@@ -13,6 +13,13 @@ enum { side_max = 32768 };
 static const char *const method_names[SPL_METHOD_COUNT] = {
     [SPL_METHOD_SPLAT] = "splat",
     [SPL_METHOD_POINTS] = "points",
+    [SPL_METHOD_FILL] = "fill",
+};
+
+static const char *const visibility_names[SPL_VISIBILITY_COUNT] = {
+    [SPL_VISIBILITY_ADAPTIVE] = "adaptive",
+    [SPL_VISIBILITY_CONSTANT] = "constant",
+    [SPL_VISIBILITY_NONE] = "none",
 };
 
 const char *spl_method_name(enum spl_method method)
@@ -33,6 +40,19 @@ bool spl_method_has_textures(enum spl_method method)
     return method == SPL_METHOD_SPLAT;
 }
 
+const char *spl_visibility_name(enum spl_visibility visibility)
+{
+    return (unsigned)visibility < SPL_VISIBILITY_COUNT ? visibility_names[visibility] : "unknown";
+}
+
+int spl_visibility_from_name(const char *name)
+{
+    for (int i = 0; i < SPL_VISIBILITY_COUNT; i++)
+        if (!strcmp(name, visibility_names[i]))
+            return i;
+    return -1;
+}
+
 void spl_view_init(struct spl_view *view)
 {
     *view = (struct spl_view){
@@ -43,6 +63,7 @@ void spl_view_init(struct spl_view *view)
         .background = {0, 0, 0, 255},
         .atoms = SPL_TEXTURE_ATOMS,
         .margin = -1,
+        .threshold = -1,
         .deadline_ns = UINT64_MAX,
     };
 }
@@ -72,6 +93,16 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     if (view->atoms > SPL_TEXTURE_ATOMS)
         return spl_fail_field(err, SPL_E_USAGE, "atoms", "atoms %u is not within 0 and %d", view->atoms,
                               SPL_TEXTURE_ATOMS);
+    if ((unsigned)view->visibility >= SPL_VISIBILITY_COUNT)
+        return spl_fail_field(err, SPL_E_USAGE, "visibility", "visibility %d does not exist", (int)view->visibility);
+    if (view->kernel != 0 && !(view->kernel >= 3 && view->kernel <= 129))
+        return spl_fail_field(err, SPL_E_USAGE, "kernel", "kernel %g is neither 0 nor within 3 and 129 pixels",
+                              view->kernel);
+    if (!(view->threshold <= 1))
+        return spl_fail_field(err, SPL_E_USAGE, "threshold", "threshold %g is not a number up to 1", view->threshold);
+    if (view->pyramid > SPL_FILL_LEVELS_MAX)
+        return spl_fail_field(err, SPL_E_USAGE, "pyramid", "pyramid %u is not within 0 and %d", view->pyramid,
+                              SPL_FILL_LEVELS_MAX);
     if (!(view->margin <= 16))
         return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not a number up to 16", view->margin);
     return SPL_OK;

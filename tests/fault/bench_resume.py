@@ -99,7 +99,7 @@ def test_profile(folder, dataset):
     splatd("bench", dataset, "--size", "96x54", "--frames", "2", "--repeats", "1", "--lod", "1,2", "-o",
            folder / "o")
     profile = json.loads((folder / "small.profile.json").read_text())
-    assert profile["format"] == "splatd-profile" and len(profile["points"]) == 16 and profile["views"] == 2
+    assert profile["format"] == "splatd-profile" and len(profile["points"]) == 24 and profile["views"] == 2
     splatd("bench", dataset, "--size", "96x54", "--frames", "2", "--repeats", "1", "--lod", "1,2", "-o",
            folder / "o", "--profile", folder / "elsewhere.json")
     assert (folder / "elsewhere.json").read_text() == (folder / "small.profile.json").read_text()

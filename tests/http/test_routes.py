@@ -60,7 +60,7 @@ def test_datasets_are_described():
         assert re.fullmatch("[0-9a-f]{16}", full["version"])
         low, high = full["bounds"]["min"], full["bounds"]["max"]
         assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
-        assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points"]
+        assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill"]
         assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 

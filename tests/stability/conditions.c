@@ -157,7 +157,7 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
     struct spl_view views[2] = {*view, step_aside(view, &truths[0][SPL_LAYER_DEPTH])};
     crop = crop_view(&views[1]);
     truth_render(world, &crop.camera, truths[1]);
-    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+    for (int method = 0; method < JUDGED_METHODS; method++) {
         struct row row = {condition, value, spl_method_name((enum spl_method)method), whole_only, {0}};
         views[0].method = views[1].method = (enum spl_method)method;
         bool measured = measure(c, world, views, truths, true, &row);

@@ -46,13 +46,13 @@ static void must(int rc)
 
 static void check_path(struct suite *suite, const struct world *world, size_t p)
 {
-    struct spl_motion motion[SPL_METHOD_COUNT], own; /* own: the truth's, against an image that never changes */
+    struct spl_motion motion[JUDGED_METHODS], own; /* own: the truth's, against an image that never changes */
     struct spl_error err = {0};
     uint8_t *grey = calloc((size_t)WIDTH * HEIGHT, 4);
     struct spl_image still = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, WIDTH, HEIGHT, grey};
     double flicker, popping, steps, step;
     bool rendered = grey;
-    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+    for (int method = 0; method < JUDGED_METHODS; method++)
         spl_motion_init(&motion[method]);
     spl_motion_init(&own);
     for (int i = 0; i < FRAMES && rendered; i++) {
@@ -60,7 +60,7 @@ static void check_path(struct suite *suite, const struct world *world, size_t p)
         struct spl_image truth[SPL_LAYER_COUNT];
         truth_render(world, &view.camera, truth);
         must(spl_motion_add(&own, &truth[SPL_LAYER_COLOR], &still, 0, &err));
-        for (int method = 0; method < SPL_METHOD_COUNT && rendered; method++) {
+        for (int method = 0; method < JUDGED_METHODS && rendered; method++) {
             struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
             struct spl_frame frame;
             view.method = (enum spl_method)method;
@@ -75,7 +75,7 @@ static void check_path(struct suite *suite, const struct world *world, size_t p)
         truth_finish(truth);
     }
     spl_motion_finish(&own, &steps, &step);
-    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+    for (int method = 0; method < JUDGED_METHODS; method++) {
         struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
         spl_motion_finish(&motion[method], &flicker, &popping);
         bool shimmers = method == SPL_METHOD_POINTS;

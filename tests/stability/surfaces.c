@@ -24,7 +24,7 @@ static void check_place(struct suite *suite, const struct scan *scan)
         struct spl_view view = world_view(&world, v, WIDTH, HEIGHT);
         struct spl_image truth[SPL_LAYER_COUNT];
         truth_render(&world, &view.camera, truth);
-        for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        for (int method = 0; method < JUDGED_METHODS; method++) {
             struct spl_frame frame;
             double shift[2];
             view.method = (enum spl_method)method;
@@ -93,7 +93,7 @@ void check_far_away(struct suite *suite)
     world_init_points(&there, "courtyard-5000km", points, count);
     free(points);
     static const double eye[3] = {-9.3, -7.3, 1.7}, target[3] = {3, 2, 1.9};
-    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+    for (int method = 0; method < JUDGED_METHODS; method++) {
         struct spl_view view = world_look(&here, eye, target, 70, WIDTH, HEIGHT);
         view.method = (enum spl_method)method;
         struct place place = {there.name, "overview", spl_method_name(view.method), "color"};

@@ -144,7 +144,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         const char *choices;
     } table[] = {
         [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
-        [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points"},
+        [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points, fill"},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
                                                          ? "jpeg, png, webp, npy, raw"

@@ -1,0 +1,78 @@
+/* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to the
+ * nearest one's surface. The last run (constant 1) fills the holes among the samples and writes depth and payload as
+ * method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a linear sample
+ * stays where it is nearer than what fills its place. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "common/fill.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
+layout(constant_id = 1) const uint LAST = 0;
+layout(constant_id = 2) const uint WIDE = 0;
+
+#include "common/payload.glsl"
+
+layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
+layout(std430, binding = SPL_BIND_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_BIND_ID) writeonly buffer id_buffer { uint payloads[]; };
+
+/* The mean over the level above, whose planes begin at frame.fill_from; word 0 = there is none. */
+uint interpolate(ivec2 at, out uint filled)
+{
+    uint level = frame.fill_level;
+    uvec2 size = level_size(level + 1u);
+    ivec2 cell = at >> 1, other = clamp(cell + 2 * (at & 1) - 1, ivec2(0), ivec2(size) - 1);
+    uint word[4], payload[4], nearest = 0u, nearest_payload = 0u;
+    for (int i = 0; i < 4; i++) {
+        ivec2 c = ivec2((i & 1) != 0 ? other.x : cell.x, (i & 2) != 0 ? other.y : cell.y);
+        uint from = frame.fill_from + uint(c.y) * size.x + uint(c.x);
+        word[i] = plane_word(from);
+        payload[i] = plane_word(from + frame.fill_stride);
+        bool nearer = word[i] > nearest;
+        nearest = nearer ? word[i] : nearest;
+        nearest_payload = nearer ? payload[i] : nearest_payload;
+    }
+    float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level)));
+    float sum = 0.0, weight = 0.0;
+    vec3 vector = vec3(0.0);
+    for (int i = 0; i < 4; i++) {
+        float w = inverse_depth(word[i], SPACING_MASK), share = i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
+        share = word[i] != 0u && w >= least ? share : 0.0;
+        sum += share * w;
+        weight += share;
+        vector += share * payload_vector(payload[i]);
+    }
+    filled = payload_of(vector, max(weight, 1.0), nearest_payload);
+    return weight > 0.0 ? (floatBitsToUint(sum / weight) & ~SPACING_MASK) | (nearest & SPACING_MASK) : 0u;
+}
+
+void main()
+{
+    load_frame();
+    uint i = gl_GlobalInvocationID.x, level = frame.fill_level;
+    uvec2 size = level_size(level);
+    if (i >= size.x * size.y)
+        return;
+    uint own = plane_word(frame.fill_to + i), filled;
+    uint word = interpolate(place_of(i, size.x), filled);
+    if (LAST == 0u) {
+        uint kept = plane_word(frame.fill_to + frame.fill_stride + i);
+        planes[frame.fill_to + i] = own != 0u ? own : word;
+        planes[frame.fill_to + frame.fill_stride + i] = own != 0u ? kept : filled;
+        return;
+    }
+    uint bits = depth_word(i, WIDE), kept = payload_word(i, WIDE);
+    uint clean = bits == SPL_NOTHING ? SPL_NOTHING : (bits & ~SPL_FILL_DEPTH_BITS) | (SPL_FILL_DEPTH_BITS + 1u) / 2u;
+    uint surface = word != 0u ? floatBitsToUint(1.0 / inverse_depth(word, SPACING_MASK)) : SPL_NOTHING;
+    bool linear = bits != SPL_NOTHING && (bits & SPL_FILL_LINEAR) != 0u;
+    bool fills = own == SPL_FILL_HOLE && word != 0u && !(linear && clean <= surface);
+    uint result = fills ? surface : clean, payload = fills ? filled : kept;
+    if (WIDE != 0u) {
+        depth[2u * i] = payload;
+        depth[2u * i + 1u] = result;
+    } else {
+        depth[i] = result;
+        payloads[i] = payload;
+    }
+}

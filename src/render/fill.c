@@ -1,0 +1,131 @@
+/* Recording the screen-space filter: pull of the nearest samples, visibility, pull of what is visible, push. All passes
+ * work on planes of words in the sums buffer, which method splat alone uses otherwise: nearest samples, levels 0 …
+ * rings; states, one a sample; means of depth and of payload, levels 1 … levels. That is 3 words a sample and a little;
+ * the buffer has 4. Tiles begin at multiples of the coarsest cell and overlap by as far as samples act on each other,
+ * so a pixel is the same in whatever tile it lies. */
+#include "render/fill.h"
+
+#include <math.h>
+
+#include "dataset/dataset.h"
+#include "dataset/format.h"
+#include "render/renderer.h"
+
+/* A sector of a kernel that reaches k spacings holds k^2 pi / 8 points on average. With three it is 3.5, and a random
+ * cloud leaves three or more sectors of eight empty, which the threshold takes for open, in one pixel of a thousand. */
+static const double reach_spacings = 3;
+/* Between two open sectors, a hole in a surface, and three, the edge of one. */
+static const double default_threshold = 2.5 / 8;
+/* Two surfaces less than a spacing apart cannot be told from one that is rough. */
+static const double margin_spacings = 1;
+static const double kernel_most = 64;
+
+static uint32_t round_up(double value, uint32_t align)
+{
+    return (uint32_t)ceil(value / align) * align;
+}
+
+void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view, double spacing)
+{
+    double side = view->supersample;
+    double kernel = view->kernel > 0 ? view->kernel * side / 2 : reach_spacings * spacing;
+    kernel = fmin(fmax(kernel, 1.5), kernel_most * (side > 1 ? side : 1));
+    int rings = 1 + (int)floor(log2(kernel) + 0.25);
+    rings = rings < 1 ? 1 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
+    *plan = (struct spl_fill_plan){.kernel = kernel, .rings = (uint32_t)rings};
+    plan->levels = view->pyramid ? view->pyramid : plan->rings;
+    uint32_t top = plan->levels > plan->rings ? plan->levels : plan->rings;
+    double looks = view->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
+    plan->align = 1u << top;
+    plan->guard = round_up(kernel, plan->align);
+    plan->apron = round_up(looks + (2u << plan->levels), plan->align);
+}
+
+void spl_fill_set_params(struct spl_tile *tile)
+{
+    struct spl_frame_params *p = &tile->params;
+    const struct spl_fill_plan *plan = &tile->fill;
+    const struct spl_view *view = tile->view;
+    double median = spl_dataset_get_info(tile->resident->dataset)->splat_radius;
+    p->fill_radius = (float)(median > 0 ? median / 16 : 1e-3);
+    p->fill_reach = (float)(reach_spacings / SPL_RADIUS_SPACING * fmax(tile->camera.fx, tile->camera.fy));
+    p->fill_kernel = (float)plan->kernel;
+    p->fill_margin = (float)(margin_spacings / SPL_RADIUS_SPACING);
+    p->fill_threshold = (float)(8 * (view->threshold < 0 ? default_threshold : view->threshold));
+    p->fill_levels = plan->rings;
+    p->fill_keep = view->visibility == SPL_VISIBILITY_NONE;
+}
+
+struct planes {
+    uint32_t nearest[SPL_FILL_LEVELS_MAX + 1], states, means[SPL_FILL_LEVELS_MAX + 1]; /* words; means[0] = states */
+    uint32_t samples[SPL_FILL_LEVELS_MAX + 1];
+    uint32_t stride; /* from a mean's depth to its payload */
+};
+
+static void lay_out(const struct spl_tile *tile, struct planes *planes)
+{
+    const struct spl_fill_plan *plan = &tile->fill;
+    uint32_t at = 0;
+    for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
+        uint32_t add = (1u << level) - 1;
+        planes->samples[level] = ((tile->camera.width + add) >> level) * ((tile->camera.height + add) >> level);
+    }
+    for (uint32_t level = 0; level <= plan->rings; level++) {
+        planes->nearest[level] = at;
+        at += planes->samples[level];
+    }
+    planes->states = planes->means[0] = at;
+    at += planes->samples[0];
+    uint32_t first = at;
+    for (uint32_t level = 1; level <= plan->levels; level++) {
+        planes->means[level] = at;
+        at += planes->samples[level];
+    }
+    planes->stride = at - first;
+    spl_assert((uint64_t)at + planes->stride <= 4 * tile->renderer->scratch.samples);
+}
+
+struct pass {
+    uint32_t slot, level, from, to, items;
+};
+
+static int record_pass(struct spl_tile *tile, const struct planes *planes, const struct pass *pass,
+                       struct spl_error *err)
+{
+    struct spl_frame_params params = tile->params;
+    params.fill_level = pass->level;
+    params.fill_from = pass->from;
+    params.fill_to = pass->to;
+    params.fill_stride = planes->stride;
+    return spl_tile_dispatch_samples(tile, pass->slot, &params, pass->items, err);
+}
+
+int spl_fill_record(struct spl_tile *tile, uint32_t group, struct spl_error *err)
+{
+    const struct spl_fill_plan *plan = &tile->fill;
+    struct planes p;
+    int rc = SPL_OK;
+    lay_out(tile, &p);
+    for (uint32_t level = 1; level <= plan->rings && !rc; level++)
+        rc = record_pass(tile, &p,
+                         &(struct pass){SPL_KERNEL_FILL_PULL + (level == 1), level, p.nearest[level - 1],
+                                        p.nearest[level], p.samples[level]},
+                         err);
+    if (!rc)
+        rc = record_pass(tile, &p,
+                         &(struct pass){SPL_KERNEL_FILL_VISIBLE + (tile->view->visibility != SPL_VISIBILITY_CONSTANT),
+                                        0, p.states, p.nearest[plan->rings], p.samples[0]},
+                         err);
+    for (uint32_t level = 1; level <= plan->levels && !rc; level++)
+        rc = record_pass(tile, &p,
+                         &(struct pass){SPL_KERNEL_FILL_GATHER + 2 * group + (level == 1), level, p.means[level - 1],
+                                        p.means[level], p.samples[level]},
+                         err);
+    for (uint32_t level = plan->levels; level-- > 0 && !rc;)
+        rc = record_pass(tile, &p,
+                         &(struct pass){SPL_KERNEL_FILL_PUSH + 2 * group + (level == 0), level, p.means[level + 1],
+                                        p.means[level], p.samples[level]},
+                         err);
+    spl_tile_stamp(tile, SPL_STAGE_SHADE);
+    return rc;
+}

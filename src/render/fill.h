@@ -1,0 +1,35 @@
+/* The screen-space filter: closes the holes between samples and removes those that shine through from behind.
+ * Paper: screen-space-filling, section 2. Everything belongs to the renderer's thread. */
+#ifndef SPL_RENDER_FILL_H
+#define SPL_RENDER_FILL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <splatd/render.h>
+
+#include "base/error.h"
+
+struct spl_tile;
+
+/* What one image is filtered with, whatever its tiles. Lengths in samples. */
+struct spl_fill_plan {
+    double kernel;   /* the farthest that a point hides others */
+    uint32_t rings;  /* levels of the pyramid that visibility looks at */
+    uint32_t levels; /* of the pyramid that holes are filled from */
+    uint32_t align;  /* tiles begin at multiples of it */
+    uint32_t guard;  /* drawn around the image, and looked at; a multiple of align */
+    uint32_t apron;  /* how far samples act on each other: drawn around a tile; a multiple of align */
+};
+
+/* `spacing`: how far points lie apart where the image shows them sparsest, samples. */
+void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view, double spacing);
+
+/* Fills in what the kernels read of the tile's parameters. */
+void spl_fill_set_params(struct spl_tile *tile);
+
+/* Records the filter over the depth and payloads of `group`, as method points leaves them with depth words of method
+ * fill; leaves them the same way, with plain depths. Clobbers the sums buffer. */
+int spl_fill_record(struct spl_tile *tile, uint32_t group, struct spl_error *err);
+
+#endif
