@@ -112,11 +112,11 @@ def test_atoms(folder, dataset):
     command = ["bench", textured, "--views", cams, "--repeats", "1", "-o", out]
     splatd(*command, "--lod", "0,2", "--supersample", "1,4", "--atoms", "0,2,8", "--profile", folder / "t.json")
     points = json.loads((folder / "t.json").read_text())["points"]
-    assert len(points) == 4 * 3 + 4, "points draw no textures"
+    assert len(points) == 4 * 3 + 4 + 4, "points and fill draw no textures"
     splats = {p["atoms"]: p for p in points if (p["method"], p["lod"], p["supersample"]) == ("splat", 0, 4)}
     assert splats[8]["psnr"] == 100, "the reference draws all atoms"
     assert splats[0]["psnr"] < splats[2]["psnr"] < 100, {a: p["psnr"] for a, p in splats.items()}
-    assert all(p["atoms"] == 8 for p in points if p["method"] == "points")
+    assert all(p["atoms"] == 8 for p in points if p["method"] != "splat")
     head, *rows = (out / "bench.csv").read_text().splitlines()
     assert head.startswith("method,lod,supersample,atoms,front,") and any(r.startswith("splat,0,4,2,") for r in rows)
     assert "stroke-opacity" in (out / "chart.svg").read_text()
