@@ -98,16 +98,18 @@
 /* The same word of a drawn chunk has this bit where texels are interpolated. */
 #define SPL_CHUNK_TEXTURE_SMOOTH 27
 
-/* A chunk's codes in TEXP, words:
- *   for each plane a header and a mask: bit i of its 4 words says whether splat i has this plane's atom
- *   for each plane the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits; the
- *   next plane starts on a word
- * Plane t's mask holds no splat that plane t - 1's does not. The weight's code is signed. Header: */
-#define SPL_TEXTURE_PLANE_WORDS (1 + SPL_CHUNK_SPLATS / 32)
+/* A chunk's codes in TEXP, a stream of bits that begins on a word; for each plane
+ *   a header of SPL_TEXTURE_HEADER_BITS
+ *   a mask: a bit for each splat that has the plane before (the first plane: for each of SPL_CHUNK_SPLATS), set where it
+ *   has this one too
+ *   the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits
+ * The weight's code is signed. Header: */
+#define SPL_TEXTURE_HEADER_BITS 16
 #define SPL_TEXTURE_INDEX_BITS 0   /* 0..4, 0..16 */
-#define SPL_TEXTURE_WEIGHT_BITS 5  /* 5..8, 1..8 */
-#define SPL_TEXTURE_STEP 9         /* 9..16, of spl_code_step() */
-#define SPL_TEXTURE_OFFSET 17      /* 17..31, of the plane's codes, words from the chunk's first */
+#define SPL_TEXTURE_WEIGHT_BITS 5  /* 5..7, 1..8 less 1 */
+#define SPL_TEXTURE_STEP 8         /* 8..13, of spl_code_step() */
+#define SPL_TEXTURE_GAP 14         /* 14..15, of spl_code_gap() */
+#define SPL_TEXTURE_TAIL_WORDS 6   /* zeros that end a TEXP: a mask is read as five words wherever it ends */
 
 /* Method fill. A depth word of its points has, from the low end: whether the point is linear, and its radius as a multiple
  * of frame.fill_radius, a float of one bit of mantissa (the field's word for it here is spacing, which is in proportion). */

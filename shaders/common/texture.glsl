@@ -31,23 +31,47 @@ struct splat_texture {
     float side;                    /* texels of the level */
 };
 
-/* The t-th atom of splat `index`, whose chunk's codes start at `word`: its number and weight; atom 0 of weight 0 where it has
- * none: then the code that is read is another's, or none at all, and not used. */
-void load_atom(uint word, uint t, uint index, out uint atom, out float weight)
+/* Where a splat stands in its chunk's codes, plane after plane. */
+struct code_place {
+    uint at;       /* bit of the next plane's header */
+    uint before;   /* splats before this one that have the last plane */
+    uint splats;   /* that have the last plane */
+    bool has;      /* this one too */
+};
+
+uint low_bits(uint count) /* 0..32 */
 {
-    uint header_at = word + t * SPL_TEXTURE_PLANE_WORDS, own = index >> 5, bit = index & 31u;
-    uint header = texture_word(header_at), mask = texture_word(header_at + 1u + own);
-    uint before = bitCount(mask & ((1u << bit) - 1u));
-    for (uint w = 0u; w < SPL_TEXTURE_PLANE_WORDS - 2u; w++) /* of fixed length: it is unrolled */
-        before += w < own ? bitCount(texture_word(header_at + 1u + w)) : 0;
+    return uint(bitfieldInsert(0, -1, 0, int(count)));
+}
+
+/* The atom of the next plane: its number and weight; atom 0 of weight 0 where the splat has none: then the code that is
+ * read is another's, or none at all, and not used. */
+void load_atom(inout code_place place, out uint atom, out float weight)
+{
+    uint word = place.at >> 5, shift = place.at & 31u, before = 0u, splats = 0u, own = 0u;
+    uint low = texture_word(word), high = texture_word(word + 1u), header = funnel(low, high, shift);
+    shift += SPL_TEXTURE_HEADER_BITS;
+    word += 1u + (shift >> 5);
+    low = shift < 32u ? low : high;
+    for (int w = 0; w < SPL_CHUNK_SPLATS / 32; w++) { /* of fixed length: it is unrolled */
+        high = texture_word(word + uint(w));
+        uint mask = funnel(low, high, shift & 31u) & low_bits(uint(clamp(int(place.splats) - 32 * w, 0, 32)));
+        uint below = uint(clamp(int(place.before) - 32 * w, 0, 32));
+        before += bitCount(mask & low_bits(below));
+        own += bitCount(mask & low_bits(uint(clamp(int(place.before) + 1 - 32 * w, 0, 32))));
+        splats += bitCount(mask);
+        low = high;
+    }
     uint index_bits = bitfieldExtract(header, SPL_TEXTURE_INDEX_BITS, 5);
-    uint weight_bits = bitfieldExtract(header, SPL_TEXTURE_WEIGHT_BITS, 4), width = index_bits + weight_bits;
-    uint at = before * width, code_at = word + (header >> SPL_TEXTURE_OFFSET) + (at >> 5);
-    uint code = funnel(texture_word(code_at), texture_word(code_at + 1u), at & 31u);
-    float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 8)) - 224.0) / 16.0);
-    bool has = (mask >> bit & 1u) != 0u;
-    atom = has ? code & ((1u << index_bits) - 1u) : 0u;
-    weight = has ? step * (float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5) : 0.0;
+    uint weight_bits = bitfieldExtract(header, SPL_TEXTURE_WEIGHT_BITS, 3) + 1u, width = index_bits + weight_bits;
+    uint codes = place.at + SPL_TEXTURE_HEADER_BITS + place.splats, at = codes + before * width;
+    uint code = funnel(texture_word(at >> 5), texture_word((at >> 5) + 1u), at & 31u);
+    float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 6)) - 56.0) / 4.0);
+    float gap = 0.25 * float(bitfieldExtract(header, SPL_TEXTURE_GAP, 2) * (bitfieldExtract(header, SPL_TEXTURE_GAP, 2) + 1u));
+    place = code_place(codes + splats * width, before, splats, place.has && own != before);
+    atom = place.has ? code & ((1u << index_bits) - 1u) : 0u;
+    float signed_code = float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5;
+    weight = place.has ? step * (signed_code + gap * sign(signed_code)) : 0.0;
 }
 
 /* `color` is the splat's own. */
@@ -61,10 +85,11 @@ splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
     x.side = float(side);
     uint word = bitfieldExtract(chunk.texture, 0, SPL_CHUNK_TEXTURE_SMOOTH);
     float sum = 0.0;
+    code_place place = code_place(32u * word, s.index, SPL_CHUNK_SPLATS, true);
     for (uint t = 0u; t < PLANES; t++) {
         uint atom;
         float weight;
-        load_atom(word, t, s.index, atom, weight);
+        load_atom(place, atom, weight);
         x.first[t] = atom * atom_size + level;
         x.weight[t] = 255.0 * weight * uintBitsToFloat(atom_word(atom * atom_size));
         sum += x.weight[t];

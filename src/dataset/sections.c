@@ -43,8 +43,7 @@ static int not_a_dataset(const struct spl_dataset *dataset, const char first[8],
         const char *start, *kind;
     } kinds[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        if (dataset->map_bytes > strlen(kinds[i].start) &&
-            !memcmp(first, kinds[i].start, strlen(kinds[i].start)))
+        if (dataset->map_bytes > strlen(kinds[i].start) && !memcmp(first, kinds[i].start, strlen(kinds[i].start)))
             return spl_fail(err, SPL_E_INPUT, "%s is %s, not a packed dataset; 'splatd pack %s -o NAME.spld' makes one",
                             dataset->path, kinds[i].kind, dataset->path);
     size_t letters = dataset->map_bytes < 4 ? dataset->map_bytes : 4;
@@ -150,7 +149,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
             uint32_t *count = page ? &dataset->info.pages : &textures;
             if (s->index != *count)
                 return corrupt(dataset, err, section_name(s, name), "is out of order");
-            if (s->bytes < SPL_PAGE_TAIL_WORDS * sizeof(uint32_t) || s->bytes > SPL_PAGE_BYTES_MAX || s->bytes % 4)
+            if (s->bytes < (page ? SPL_PAGE_TAIL_WORDS : SPL_TEXTURE_TAIL_WORDS) * sizeof(uint32_t) ||
+                s->bytes > SPL_PAGE_BYTES_MAX || s->bytes % 4)
                 return corrupt(dataset, err, section_name(s, name), "has a size that no page can have");
             dataset->info.page_bytes += s->bytes;
             (page ? dataset->pages : dataset->textures)[(*count)++] = s;

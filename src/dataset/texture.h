@@ -9,8 +9,8 @@
 #include "dataset/format.h"
 #include "sparse/code.h"
 
-/* Largest number of words a chunk's codes can need. */
-enum { SPL_TEXTURE_WORDS_MAX = SPL_ATOMS_MAX * (SPL_TEXTURE_PLANE_WORDS + SPL_CHUNK_SPLATS * 24 / 32) };
+/* Largest number of words that a chunk's codes can need: whole planes of the widest codes. */
+enum { SPL_TEXTURE_WORDS_MAX = SPL_ATOMS_MAX * (SPL_TEXTURE_HEADER_BITS + SPL_CHUNK_SPLATS * 25) / 32 };
 
 static inline uint32_t spl_texture_word(uint32_t chunk_texture)
 {

@@ -63,7 +63,7 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
 /* Judges the codes of every chunk of page `index`, whose textures are `words`. */
 static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
 {
-    size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_PAGE_TAIL_WORDS;
+    size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_TEXTURE_TAIL_WORDS;
     for (uint32_t n = 0; n < dataset->info.nodes; n++) {
         const struct spl_node *node = &dataset->nodes[n];
         if (node->page != index)

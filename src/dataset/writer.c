@@ -30,10 +30,10 @@ struct spl_dataset_writer {
     char *path, *part_path;
     int fd;
     bool finished;
-    uint64_t offset;                 /* where the file ends so far */
-    struct words page;               /* the page being filled */
-    struct words textures;           /* of its chunks */
-    struct words chunk_textures;     /* one of each chunk of the dataset */
+    uint64_t offset;                         /* where the file ends so far */
+    struct words page;                       /* the page being filled */
+    struct words textures;                   /* of its chunks */
+    struct words chunk_textures;             /* one of each chunk of the dataset */
     const struct spl_dictionary *dictionary; /* NULL = no textures */
     struct spl_section *sections;
     size_t section_count, section_capacity;
@@ -89,14 +89,15 @@ static int add_section(struct spl_dataset_writer *writer, uint32_t type, uint32_
     return SPL_OK;
 }
 
-static size_t page_bytes(size_t used_words)
+static size_t page_bytes(size_t used_words, size_t tail_words)
 {
-    return align((used_words + SPL_PAGE_TAIL_WORDS) * sizeof(uint32_t), section_alignment);
+    return align((used_words + tail_words) * sizeof(uint32_t), section_alignment);
 }
 
 static int flush_words(struct spl_dataset_writer *writer, uint32_t type, struct words *words, struct spl_error *err)
 {
-    size_t bytes = page_bytes(words->used), used = words->used * sizeof(uint32_t);
+    size_t tail = type == SPL_SECTION_TEXTURES ? SPL_TEXTURE_TAIL_WORDS : SPL_PAGE_TAIL_WORDS;
+    size_t bytes = page_bytes(words->used, tail), used = words->used * sizeof(uint32_t);
     memset((char *)words->at + used, 0, bytes - used);
     words->used = 0;
     return add_section(writer, type, writer->page_count, words->at, bytes, err);
@@ -111,10 +112,10 @@ static int flush_page(struct spl_dataset_writer *writer, struct spl_error *err)
     return rc;
 }
 
-/* Makes room for `count` more words and the tail. */
+/* Makes room for `count` more words and the longer tail. */
 static int reserve(struct words *words, size_t count, struct spl_error *err)
 {
-    size_t wanted = page_bytes(words->used + count) / sizeof *words->at;
+    size_t wanted = page_bytes(words->used + count, SPL_TEXTURE_TAIL_WORDS) / sizeof *words->at;
     if (wanted <= words->capacity)
         return SPL_OK;
     wanted = wanted > 2 * words->capacity ? wanted : 2 * words->capacity;
@@ -227,11 +228,13 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
 {
     struct words *to = &writer->page;
     size_t larger = word_count > textures->word_count ? word_count : textures->word_count;
-    if (larger > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) || page_bytes(larger) > SPL_PAGE_BYTES_MAX)
+    if (larger > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) ||
+        page_bytes(larger, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES_MAX)
         return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)", writer->path,
                         larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
-    if (to->used && (page_bytes(to->used + word_count) > SPL_PAGE_BYTES ||
-                     page_bytes(writer->textures.used + textures->word_count) > SPL_PAGE_BYTES)) {
+    if (to->used &&
+        (page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > SPL_PAGE_BYTES ||
+         page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES)) {
         int rc = flush_page(writer, err);
         if (rc)
             return rc;

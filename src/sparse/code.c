@@ -6,19 +6,20 @@
 
 float spl_code_step(uint8_t step_code)
 {
-    return exp2f(((float)step_code - 224.0f) / 16.0f);
+    return exp2f(((float)step_code - 56.0f) / 4.0f);
 }
 
 uint64_t spl_chunk_code_bits(const struct spl_chunk_code *code)
 {
-    uint64_t bits = code->planes ? SPL_CODE_CHUNK_BITS : 0;
+    uint64_t bits = 0, before = SPL_CHUNK_SPLATS;
     for (uint32_t t = 0; t < code->planes; t++) {
         uint64_t codes = 0, width = code->plane[t].index_bits + code->plane[t].weight_bits;
         for (uint32_t i = 0; i < code->splats; i++)
             codes += code->splat[i].count > t;
-        bits += SPL_PLANE_BITS + (codes * width + 31) / 32 * 32;
+        bits += SPL_TEXTURE_HEADER_BITS + before + codes * width;
+        before = codes;
     }
-    return bits;
+    return bits ? SPL_CODE_CHUNK_BITS + (bits + 31) / 32 * 32 : 0;
 }
 
 void spl_code_decode(const struct spl_dictionary *dictionary, const struct spl_code_plane *planes,

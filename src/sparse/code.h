@@ -13,12 +13,13 @@
 
 #define SPL_ATOMS_MAX 8
 
-/* The grid of weights of the t-th atom of a chunk's splats: weight = step · (code + 0.5), code signed and weight_bits
- * wide, -2^(weight_bits-1) .. 2^(weight_bits-1) - 1, so that no code is wasted on zero. index_bits may be 0 (all use
- * atom 0). */
+/* The grid of weights of the t-th atom of a chunk's splats: weight = step · (code + 0.5 ± gap), code signed and
+ * weight_bits wide, -2^(weight_bits-1) .. 2^(weight_bits-1) - 1, the gap away from zero: an atom that weighs little is
+ * not taken, so no code is wasted on it. index_bits may be 0 (all use atom 0). */
 struct spl_code_plane {
-    float step;          /* what spl_code_step gives for a step code */
-    uint8_t step_code;   /* its 8 bit code */
+    float step, gap;     /* what spl_code_step and spl_code_gap give for these codes */
+    uint8_t step_code;   /* 0..63 */
+    uint8_t gap_code;    /* 0..3 */
     uint8_t index_bits;  /* 0..16 */
     uint8_t weight_bits; /* 1..8 */
 };
@@ -38,21 +39,28 @@ struct spl_chunk_code {
     struct spl_splat_code splat[SPL_CHUNK_SPLATS];
 };
 
-/* What a plane costs beside its codes: a header word and a mask of the splats that have it; and a chunk with any plane.
- * The coder weighs gain against bits with these. */
-#define SPL_PLANE_BITS (32 + SPL_CHUNK_SPLATS)
+/* What a chunk with any plane costs beside its planes' headers, masks and codes: its word in CTEX. */
 #define SPL_CODE_CHUNK_BITS 32
 
-/* step = 2^((step_code - 224) / 16): 6·10⁻⁵ (code 0) to 3.8 (255), in steps of 4.4 %, in the units of dictionary.h. */
+enum { SPL_CODE_STEPS = 64, SPL_CODE_GAPS = 4 };
+
+/* step = 2^((step_code - 56) / 4): 6·10⁻⁵ (code 0) to 3.4 (63), in steps of 19 %, in the units of dictionary.h;
+ * gap = 0, 0.5, 1.5, 3. */
 float spl_code_step(uint8_t step_code);
+
+static inline float spl_code_gap(uint8_t gap_code)
+{
+    return 0.25f * (float)(gap_code * (gap_code + 1));
+}
 
 static inline float spl_code_weight(const struct spl_code_plane *plane, int16_t weight)
 {
-    return plane->step * ((float)weight + 0.5f);
+    return plane->step * ((float)weight + 0.5f + (weight < 0 ? -plane->gap : plane->gap));
 }
 
-/* Bits of `code` as it is stored: SPL_CODE_CHUNK_BITS, and per plane SPL_PLANE_BITS and index_bits + weight_bits a
- * splat that has it, each plane's codes up to a whole word; 0 without planes. */
+/* Bits of `code` as it is stored: SPL_CODE_CHUNK_BITS, and, up to a whole word, per plane SPL_TEXTURE_HEADER_BITS, a
+ * bit for each splat that has the plane before (the first: SPL_CHUNK_SPLATS) and index_bits + weight_bits for each that
+ * has it; 0 without planes. */
 uint64_t spl_chunk_code_bits(const struct spl_chunk_code *code);
 
 struct spl_code_settings {

@@ -1,17 +1,21 @@
-/* Pursuit of a chunk, plane by plane: all splats that may take a further atom share its widths and step, take it
- * quantised, and then settle the weights they already have on their grids against each other (coordinate descent; it is
- * what orthogonalising is to weights that are not quantised). A splat that does not take plane t has none beyond. */
+/* With lambda, and room for a Gram matrix: a beam finds each splat's atoms (beam.c), then the chunk's weights are
+ * rounded (weights.c). Else the paper's greedy pursuit, plane by plane: all splats that may take a further atom share
+ * its widths and step, take it quantised, and then settle the weights they already have on their grids against each
+ * other (coordinate descent; it is what orthogonalising is to weights that are not quantised). A splat that does not
+ * take plane t has none beyond. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "sparse/beam.h"
 #include "sparse/blas.h"
 #include "sparse/code.h"
 #include "sparse/matrix.h"
 #include "sparse/plane.h"
 #include "sparse/pursuit.h"
+#include "sparse/weights.h"
 
-enum { settle_sweeps = 4 };
+enum { settle_sweeps = 4, expected_weight_bits = 4 };
 
 struct spl_coder {
     struct spl_atoms atoms;
@@ -113,12 +117,16 @@ static bool may_take(const struct pursuit *p, uint32_t row)
 }
 
 /* The best atom of every row that may take one, for each width of an index. */
-static void collect(struct pursuit *p)
+static void collect(struct pursuit *p, uint32_t t)
 {
     struct spl_candidates *c = &p->candidates;
     uint32_t atoms = p->block.atoms->count;
     c->count = 0;
     c->index_bits = p->coder->index_bits;
+    c->last = t + 1 == SPL_ATOMS_MAX;
+    c->mask_bits = t ? 0 : SPL_CHUNK_SPLATS;
+    for (uint32_t i = 0; t && i < p->code->splats; i++)
+        c->mask_bits += p->code->splat[i].count == t;
     for (uint32_t row = 0; row < p->rows; row++) {
         if (!may_take(p, row))
             continue;
@@ -183,10 +191,10 @@ static bool add_plane(struct pursuit *p, uint32_t t)
     struct spl_code_plane *plane = &p->code->plane[t];
     uint32_t takers = 0;
     spl_block_step(&p->block);
-    collect(p);
+    collect(p, t);
     if (!p->candidates.count || !spl_plane_choose(&p->candidates, settings, plane))
         return false;
-    float price = settings->lambda * (float)(plane->index_bits + plane->weight_bits);
+    float price = settings->lambda * spl_plane_atom_bits(&p->candidates, plane->index_bits, plane->weight_bits);
     for (uint32_t i = 0; i < p->candidates.count; i++) {
         uint32_t row = p->candidate[i];
         struct spl_splat_code *splat = &p->code->splat[p->splat[row]];
@@ -206,6 +214,45 @@ static bool add_plane(struct pursuit *p, uint32_t t)
         if (p->code->splat[p->splat[row]].count <= t)
             p->done[row] = true;
     return takers > 0;
+}
+
+/* With lambda: all atoms of a texture are sought together, then their weights are rounded. A chunk whose atoms save
+ * less than they all cost has none. */
+static int code_jointly(struct pursuit *p, struct spl_error *err)
+{
+    const struct spl_coder *coder = p->coder;
+    const struct spl_atoms *atoms = &coder->atoms;
+    struct spl_beam *beam = spl_beam_create(atoms, err);
+    struct spl_beam_aim aim = {.atoms = coder->settings.atoms, .enough = p->enough};
+    double norm[SPL_CHUNK_SPLATS], saved = 0;
+    aim.price = (double)coder->settings.lambda * (coder->index_bits + expected_weight_bits + 1);
+    if (!beam)
+        return SPL_E_NOMEM;
+    for (uint32_t row = 0; row < p->rows; row++) {
+        norm[row] = p->error[row];
+        spl_beam_search(beam, p->block.match + (size_t)row * atoms->count, norm[row], &aim,
+                        &p->code->splat[p->splat[row]]);
+    }
+    spl_beam_destroy(beam);
+    const struct spl_weights_input input = {.atoms = atoms,
+                                            .settings = &coder->settings,
+                                            .match = p->block.match,
+                                            .norm = norm,
+                                            .splat = p->splat,
+                                            .rows = p->rows};
+    int rc = spl_weights_fit(&input, p->code, p->error, err);
+    if (rc)
+        return rc;
+    for (uint32_t row = 0; row < p->rows; row++)
+        saved += norm[row] - p->error[row];
+    if (saved > (double)coder->settings.lambda * (double)spl_chunk_code_bits(p->code))
+        return 0;
+    p->code->planes = 0;
+    for (uint32_t row = 0; row < p->rows; row++) {
+        p->code->splat[p->splat[row]].count = 0;
+        p->error[row] = norm[row];
+    }
+    return 0;
 }
 
 /* What rounding a texture's mean colour to bytes costs. */
@@ -250,8 +297,13 @@ int spl_coder_code(const struct spl_coder *coder, const uint8_t *const *texture,
     }
     if (p->rows && coder->atoms.count) {
         spl_block_begin(&p->block, y, p->rows);
-        while (out->planes < coder->settings.atoms && add_plane(p, out->planes))
-            out->planes++;
+        if (coder->settings.lambda > 0 && coder->gram) {
+            if (code_jointly(p, err))
+                goto done;
+        } else {
+            while (out->planes < coder->settings.atoms && add_plane(p, out->planes))
+                out->planes++;
+        }
     }
     for (uint32_t row = 0; row < p->rows; row++) {
         sums->squared_error += p->error[row] > 0 ? p->error[row] : 0;

@@ -69,10 +69,12 @@ void make_code(const struct spl_dictionary *dictionary, uint32_t planes, uint32_
         uint32_t bits = 1 + hash(key, t) % 8;
         double largest = 0.1 * sqrt(spl_texture_values(dictionary->size)) / (1 + t);
         code->plane[t] = (struct spl_code_plane){
-            .step_code = (uint8_t)lround(fmin(fmax(224 + 16 * log2(largest / (1 << bits >> 1)), 0), 255)),
+            .step_code = (uint8_t)lround(fmin(fmax(56 + 4 * log2(largest / (1 << bits >> 1)), 0), SPL_CODE_STEPS - 1)),
+            .gap_code = (uint8_t)(hash(key, 50 + t) % SPL_CODE_GAPS),
             .index_bits = (uint8_t)(t == 0 && chunk % 4 == 1 ? 0 : index_max),
             .weight_bits = (uint8_t)bits};
         code->plane[t].step = spl_code_step(code->plane[t].step_code);
+        code->plane[t].gap = spl_code_gap(code->plane[t].gap_code);
     }
     for (uint32_t i = 0; i < splats && chunk % 5 != 3; i++) {
         struct spl_splat_code *s = &code->splat[i];

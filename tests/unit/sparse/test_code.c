@@ -6,6 +6,8 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
+#include "sparse/beam.h"
+#include "sparse/blas.h"
 #include "sparse/code.h"
 #include "unit/sparse/plant.h"
 
@@ -97,9 +99,9 @@ static void test_refuses(void **state)
 static void test_steps(void **state)
 {
     (void)state;
-    assert_float_equal(spl_code_step(224), 1, 0);
-    assert_float_equal(spl_code_step(208), 0.5, 0);
-    for (int i = 1; i < 256; i++)
+    assert_float_equal(spl_code_step(56), 1, 0);
+    assert_float_equal(spl_code_step(52), 0.5, 0);
+    for (int i = 1; i < SPL_CODE_STEPS; i++)
         assert_true(spl_code_step((uint8_t)i) > spl_code_step((uint8_t)(i - 1)));
 }
 
@@ -187,7 +189,7 @@ static void test_next_sees_the_quantised(void **state)
 
 static void check_form(const struct coded *c, const struct spl_dictionary *d)
 {
-    uint32_t planes = 0;
+    uint32_t planes = 0, before = SPL_CHUNK_SPLATS;
     uint64_t bits = 0;
     for (uint32_t i = 0; i < c->code.splats; i++) {
         const struct spl_splat_code *splat = &c->code.splat[i];
@@ -198,6 +200,7 @@ static void check_form(const struct coded *c, const struct spl_dictionary *d)
             assert_true(splat->weight[t] >= -(1 << (plane->weight_bits - 1)));
             assert_true(splat->weight[t] < 1 << (plane->weight_bits - 1));
             assert_float_equal(plane->step, spl_code_step(plane->step_code), 0);
+            assert_float_equal(plane->gap, spl_code_gap(plane->gap_code), 0);
         }
     }
     assert_int_equal(c->code.planes, planes);
@@ -205,9 +208,10 @@ static void check_form(const struct coded *c, const struct spl_dictionary *d)
         uint32_t codes = 0;
         for (uint32_t i = 0; i < c->code.splats; i++)
             codes += c->code.splat[i].count > t;
-        bits += SPL_PLANE_BITS + (codes * (c->code.plane[t].index_bits + c->code.plane[t].weight_bits) + 31u) / 32 * 32;
+        bits += SPL_TEXTURE_HEADER_BITS + before + codes * (c->code.plane[t].index_bits + c->code.plane[t].weight_bits);
+        before = codes;
     }
-    assert_int_equal(spl_chunk_code_bits(&c->code), planes ? bits + SPL_CODE_CHUNK_BITS : 0);
+    assert_int_equal(spl_chunk_code_bits(&c->code), planes ? (bits + 31) / 32 * 32 + SPL_CODE_CHUNK_BITS : 0);
     assert_int_equal(c->sums.bits, spl_chunk_code_bits(&c->code));
 }
 
@@ -252,6 +256,10 @@ static void test_lambda(void **state)
         struct coded c;
         code_textures(coder, &p, 128, &c);
         check_form(&c, &d);
+        double decoded = 0;
+        for (uint32_t k = 0; k < 128; k++)
+            decoded += decoded_error(&p, &d, &c, k, 8);
+        assert_true(fabs(decoded / c.sums.squared_error - 1) < 0.01);
         bits[i] = (double)c.sums.bits;
         error[i] = c.sums.squared_error;
         spl_coder_destroy(coder);
@@ -264,6 +272,53 @@ static void test_lambda(void **state)
     assert_int_equal(bits[4], 0);
     assert_true(bits[0] > 0);
     spl_dictionary_finish(&d);
+    plant_finish(&p);
+}
+
+/* Of a texture that is the sum of two atoms that a third lies between, the greedy pursuit takes the third first; the
+ * beam does not. */
+static void test_beam(void **state)
+{
+    struct plant p = plant_make(4, 40, 1, 2, 0.5f);
+    uint32_t n = p.n, count = 40;
+    float *gram = calloc(count * count, sizeof *gram), *match = calloc(count, sizeof *match), y[48], norm = 0,
+          third = 0;
+    struct spl_atoms atoms = {.count = count, .n = n, .d = p.atoms, .gram = gram};
+    struct spl_splat_code found;
+    (void)state;
+    for (uint32_t k = 0; k < n; k++) {
+        p.atoms[2 * n + k] = p.atoms[k] + p.atoms[n + k] + 0.3f * p.atoms[3 * n + k];
+        third += p.atoms[2 * n + k] * p.atoms[2 * n + k];
+    }
+    for (uint32_t k = 0; k < n; k++) {
+        p.atoms[2 * n + k] /= sqrtf(third);
+        y[k] = p.atoms[k] + p.atoms[n + k];
+        norm += y[k] * y[k];
+    }
+    for (uint32_t a = 0; a < count; a++) {
+        for (uint32_t k = 0; k < n; k++)
+            match[a] += p.atoms[a * n + k] * y[k];
+        for (uint32_t b = 0; b < count; b++)
+            for (uint32_t k = 0; k < n; k++)
+                gram[a * count + b] += p.atoms[a * n + k] * p.atoms[b * n + k];
+    }
+    assert_int_equal(spl_blas_open(NULL), 0);
+    assert_true(fabsf(match[2]) > fabsf(match[0]) && fabsf(match[2]) > fabsf(match[1]));
+    struct spl_beam *beam = spl_beam_create(&atoms, NULL);
+    struct spl_beam_aim aim = {.atoms = 8, .price = 1e-3, .enough = 0};
+    assert_true(spl_beam_search(beam, match, (double)norm, &aim, &found) < 1e-4);
+    assert_int_equal(found.count, 2);
+    assert_int_equal(found.atom[0] + found.atom[1], 1);
+    aim.price = 10;
+    assert_true(spl_beam_search(beam, match, (double)norm, &aim, &found) == (double)norm);
+    assert_int_equal(found.count, 0);
+    aim = (struct spl_beam_aim){.atoms = 1};
+    spl_beam_search(beam, match, (double)norm, &aim, &found);
+    assert_int_equal(found.count, 1);
+    assert_int_equal(found.atom[0], 2);
+    spl_beam_destroy(beam);
+    free(gram);
+    free(match);
     plant_finish(&p);
 }
 
@@ -340,6 +395,7 @@ int main(void)
         cmocka_unit_test(test_next_sees_the_quantised),
         cmocka_unit_test(test_sums_are_what_decoding_gives),
         cmocka_unit_test(test_lambda),
+        cmocka_unit_test(test_beam),
         cmocka_unit_test(test_nothing_to_code),
         cmocka_unit_test(test_no_memory),
     };
