@@ -22,14 +22,15 @@ static int write_rows(const struct spl_textures_report *report, const char *fold
     FILE *out = open_memstream(&text, &length);
     if (!out)
         return spl_fail(err, SPL_E_NOMEM, "out of memory: the table");
-    fputs("name,geometry_bytes,color_bytes,codes_bytes,shared_bytes,psnr_db,packed_views_db,left_out_views_db,atoms,"
+    fputs("name,geometry_bytes,color_bytes,codes_bytes,shared_bytes,psnr_db,packed_views_db,packed_tile_db,left_out_"
+          "views_db,left_out_tile_db,atoms,"
           "dictionary,trained_on,seconds\n",
           out);
     for (uint32_t i = 0; i < report->rows; i++) {
         const struct spl_textures_row *r = &report->row[i];
-        fprintf(out, "\"%s\",%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f,%.3f,%u,%llu,%.1f\n", r->name, report->geometry,
-                r->color, r->codes, r->shared, r->psnr, r->packed, r->left_out, r->atoms, r->count,
-                (unsigned long long)r->sample, r->seconds);
+        fprintf(out, "\"%s\",%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%u,%llu,%.1f\n", r->name,
+                report->geometry, r->color, r->codes, r->shared, r->psnr, r->packed.psnr, r->packed.tile,
+                r->left_out.psnr, r->left_out.tile, r->atoms, r->count, (unsigned long long)r->sample, r->seconds);
     }
     int rc = fclose(out) ? spl_fail(err, SPL_E_NOMEM, "out of memory: the table") : 0;
     if (!rc)
@@ -110,8 +111,10 @@ static void print_row(const struct spl_textures_report *report, const struct spl
     print_figure(6, 1, whole ? (report->geometry + spl_textures_row_bytes(whole)) / all : NAN);
     print_figure(6, 1, whole ? spl_textures_row_bytes(whole) / texture : NAN);
     print_figure(7, 2, r->psnr);
-    print_figure(7, 2, r->packed);
-    print_figure(7, 2, r->left_out);
+    print_figure(7, 2, r->packed.psnr);
+    print_figure(6, 2, r->packed.tile);
+    print_figure(7, 2, r->left_out.psnr);
+    print_figure(6, 2, r->left_out.tile);
     print_figure(6, 2, r->atoms);
     if (r->count)
         printf(" %7u", r->count);
@@ -160,10 +163,11 @@ void spl_cmd_print_textures(const struct spl_textures_report *report, const stru
     for (uint32_t i = 0; i < report->rows && !whole; i++)
         if (report->row[i].kind == SPL_TEXTURES_PHOTOGRAPHS)
             whole = &report->row[i];
-    printf("%-24s %7s %7s %7s %7s %8s %8s %6s %6s %7s %7s %7s %6s %7s\n", "bytes a splat", "geo-", "colour", "codes",
-           "atoms,", "in all", "in all", "T_all", "T_tex", "PSNR of", "packed", "left", "atoms", "dictio-");
-    printf("%-24s %7s %7s %7s %7s %8s %8s %6s %6s %7s %7s %7s %6s %7s\n", "", "metry", "or id", "", "photos", "", "MB",
-           "", "", "texture", "views", "out", "", "nary");
+    static const char layout[] = "%-24s %7s %7s %7s %7s %8s %8s %6s %6s %7s %7s %6s %7s %6s %6s %7s\n";
+    printf(layout, "bytes a splat", "geo-", "colour", "codes", "atoms,", "in all", "in all", "T_all", "T_tex",
+           "PSNR of", "packed", "", "left", "", "atoms", "dictio-");
+    printf(layout, "", "metry", "or id", "", "photos", "", "MB", "", "", "texture", "views", "tile", "out", "tile", "",
+           "nary");
     for (uint32_t i = 0; i < report->rows; i++)
         print_row(report, &report->row[i], whole);
     for (uint32_t i = 0; i < report->rows; i++)
@@ -173,10 +177,10 @@ void spl_cmd_print_textures(const struct spl_textures_report *report, const stru
     if (*report->left_away)
         printf("left away, %s\n", report->left_away);
     if (projected)
-        printf(
-            "views: %u that were packed, %llu pixels; %u left out, %llu pixels; PSNR of frames against photographs\n",
-            projected->packed.views, (unsigned long long)projected->packed.pixels, projected->left_out.views,
-            (unsigned long long)projected->left_out.pixels);
+        printf("views: %u that were packed, %llu pixels; %u left out, %llu pixels; PSNR of frames against photographs, "
+               "of all pixels and of the median tile of %d x %d\n",
+               projected->packed.views, (unsigned long long)projected->packed.pixels, projected->left_out.views,
+               (unsigned long long)projected->left_out.pixels, SPL_PROJECTED_TILE, SPL_PROJECTED_TILE);
     print_rates(report);
     print_atoms(report);
 }

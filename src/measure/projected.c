@@ -16,25 +16,37 @@
 #include "geom/tangent.h"
 #include "image/load.h"
 #include "measure/blocks.h"
+#include "measure/summary.h"
 
 enum { pixel_bytes = 12, compared_splats = 50000 };
 
+/* What frames are compared: the projections, then the dataset's own. */
+enum { colored = SPL_PROJECTED_COUNT, textured, frames };
+
+struct tile {
+    double error[frames]; /* squared, of 255 */
+    uint32_t pixels;
+};
+
 struct compared {
     const struct spl_named_view *view;
-    struct spl_projected_views *sums; /* whose it is; PSNRs are squared errors of 255 meanwhile */
-    uint16_t *photo;                  /* by pixel: SPL_TEXTURE_NO_PHOTO where there is nothing to look up */
+    bool left_out;
+    struct tile *tiles; /* rows of them */
+    uint32_t across, down;
+    uint16_t *photo; /* by pixel: SPL_TEXTURE_NO_PHOTO where there is nothing to look up */
     float *depth;
     uint8_t (*truth)[3], (*colored)[3];
 };
 
 struct work {
     const struct spl_projected_options *options;
-    struct spl_projected_report *report;
     struct compared *compared;
     size_t count;
     double texture[SPL_PROJECTED_COUNT];
     uint64_t texture_values;
 };
+
+static const double most = 99; /* of a tile, dB: medians are between two */
 
 /* A photograph's pyramid as it is, in BC7, in BC1. */
 enum { forms = 3 };
@@ -82,6 +94,7 @@ static double squared_bytes(const uint8_t rgb[3], const uint8_t truth[3])
 
 static void finish_compared(struct compared *v)
 {
+    free(v->tiles);
     free(v->photo);
     free(v->depth);
     free(v->truth);
@@ -110,18 +123,25 @@ static int render(const struct work *w, const struct spl_named_view *named, uint
     return spl_renderer_render(w->options->renderer, w->options->dataset, &view, frame, err);
 }
 
+static struct tile *find_tile(const struct compared *v, size_t pixel)
+{
+    size_t x = pixel % v->view->camera.width, y = pixel / v->view->camera.width;
+    return &v->tiles[y / SPL_PROJECTED_TILE * v->across + x / SPL_PROJECTED_TILE];
+}
+
 /* Takes what the frames and the photograph say of each pixel. */
 static void take_pixels(const struct work *w, struct compared *v, const struct spl_image *photograph,
-                        const struct spl_frame *textured, const struct spl_frame *colored)
+                        const struct spl_frame *with, const struct spl_frame *without)
 {
     const struct spl_texture_origin *origin = w->options->origin;
     const uint8_t(*truth)[4] = photograph->pixels;
-    const uint8_t(*full)[4] = textured->images[SPL_LAYER_COLOR].pixels;
-    const uint8_t(*plain)[4] = colored->images[SPL_LAYER_COLOR].pixels;
-    const uint32_t *id = textured->images[SPL_LAYER_ID].pixels;
-    const float *depth = textured->images[SPL_LAYER_DEPTH].pixels;
+    const uint8_t(*full)[4] = with->images[SPL_LAYER_COLOR].pixels;
+    const uint8_t(*plain)[4] = without->images[SPL_LAYER_COLOR].pixels;
+    const uint32_t *id = with->images[SPL_LAYER_ID].pixels;
+    const float *depth = with->images[SPL_LAYER_DEPTH].pixels;
     size_t pixels = (size_t)photograph->width * photograph->height;
     for (size_t i = 0; i < pixels; i++) {
+        struct tile *tile = find_tile(v, i);
         memcpy(v->truth[i], truth[i], 3);
         memcpy(v->colored[i], plain[i], 3);
         v->depth[i] = depth[i];
@@ -129,37 +149,37 @@ static void take_pixels(const struct work *w, struct compared *v, const struct s
         if (id[i] >= origin->splats || !(depth[i] > 0) || truth[i][3] < 255)
             continue;
         double error = squared_bytes(plain[i], truth[i]);
-        v->sums->pixels++;
-        v->sums->colored += error;
-        v->sums->textured += squared_bytes(full[i], truth[i]);
+        tile->pixels++;
+        tile->error[colored] += error;
+        tile->error[textured] += squared_bytes(full[i], truth[i]);
         v->photo[i] = origin->photo[id[i]];
         for (int k = 0; v->photo[i] == SPL_TEXTURE_NO_PHOTO && k < SPL_PROJECTED_COUNT; k++)
-            v->sums->projected[k] += error;
+            tile->error[k] += error;
     }
 }
 
 static int take_view(struct work *w, struct compared *v, struct spl_error *err)
 {
     struct spl_image photograph = {0};
-    struct spl_frame textured = {0}, colored = {0};
+    struct spl_frame with = {0}, without = {0};
     size_t pixels = (size_t)v->view->camera.width * v->view->camera.height;
     int rc = SPL_E_NOMEM;
+    v->across = (v->view->camera.width + SPL_PROJECTED_TILE - 1) / SPL_PROJECTED_TILE;
+    v->down = (v->view->camera.height + SPL_PROJECTED_TILE - 1) / SPL_PROJECTED_TILE;
+    v->tiles = spl_alloc((size_t)v->across * v->down, sizeof *v->tiles, err);
     v->photo = spl_alloc_raw(pixels, sizeof *v->photo, err);
     v->depth = spl_alloc_raw(pixels, sizeof *v->depth, err);
     v->truth = spl_alloc_raw(pixels, sizeof *v->truth, err);
     v->colored = spl_alloc_raw(pixels, sizeof *v->colored, err);
-    if (!v->photo || !v->depth || !v->truth || !v->colored)
+    if (!v->tiles || !v->photo || !v->depth || !v->truth || !v->colored)
         return rc;
     if (!(rc = load(v->view, &photograph, err)) &&
-        !(rc = render(w, v->view, 8, 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_ID | 1u << SPL_LAYER_DEPTH, &textured,
-                      err)) &&
-        !(rc = render(w, v->view, 0, 1u << SPL_LAYER_COLOR, &colored, err))) {
-        take_pixels(w, v, &photograph, &textured, &colored);
-        v->sums->views++;
-    }
+        !(rc = render(w, v->view, 8, 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_ID | 1u << SPL_LAYER_DEPTH, &with, err)) &&
+        !(rc = render(w, v->view, 0, 1u << SPL_LAYER_COLOR, &without, err)))
+        take_pixels(w, v, &photograph, &with, &without);
     spl_image_finish(&photograph);
-    spl_frame_finish(&textured);
-    spl_frame_finish(&colored);
+    spl_frame_finish(&with);
+    spl_frame_finish(&without);
     return rc;
 }
 
@@ -196,8 +216,7 @@ static int choose_views(struct work *w, struct spl_error *err)
             if (n * take / of_kind[left_out] == (n + 1) * take / of_kind[left_out])
                 continue;
             bytes += pixels * pixel_bytes;
-            w->compared[w->count++] =
-                (struct compared){.view = view, .sums = left_out ? &w->report->left_out : &w->report->packed};
+            w->compared[w->count++] = (struct compared){.view = view, .left_out = left_out};
         }
     uint64_t needed = bytes + largest * (4 * forms + pixel_bytes) * 4 / 3;
     return needed > o->memory_bytes
@@ -213,43 +232,35 @@ static int choose_views(struct work *w, struct spl_error *err)
 struct rows {
     const struct compared *view;
     const struct source *source;
-    double (*error)[SPL_PROJECTED_COUNT]; /* by row */
 };
 
+/* Rows of tiles. */
 static void look_rows(void *context, size_t begin, size_t end, unsigned worker)
 {
     const struct rows *r = context;
     const struct compared *v = r->view;
-    uint32_t width = v->view->camera.width;
+    const struct spl_camera *camera = &v->view->camera;
     (void)worker;
-    for (size_t y = begin; y < end; y++)
-        for (uint32_t x = 0; x < width; x++) {
-            size_t i = y * width + x;
+    for (size_t y = begin * SPL_PROJECTED_TILE; y < end * SPL_PROJECTED_TILE && y < camera->height; y++)
+        for (uint32_t x = 0; x < camera->width; x++) {
+            size_t i = y * camera->width + x;
             const double pixel[2] = {x + 0.5, (double)y + 0.5};
             for (int k = 0; v->photo[i] == r->source->index && k < SPL_PROJECTED_COUNT; k++) {
                 float rgb[3];
-                bool found = spl_projected_look(&v->view->camera, pixel, (double)v->depth[i], r->source->view,
+                bool found = spl_projected_look(camera, pixel, (double)v->depth[i], r->source->view,
                                                 &r->source->form[k % forms], least_footprint(k), rgb);
-                r->error[y][k] += found ? squared(rgb, v->truth[i]) : squared_bytes(v->colored[i], v->truth[i]);
+                find_tile(v, i)->error[k] +=
+                    found ? squared(rgb, v->truth[i]) : squared_bytes(v->colored[i], v->truth[i]);
             }
         }
 }
 
-static int look(struct work *w, const struct source *source, struct spl_error *err)
+static void look(struct work *w, const struct source *source)
 {
     for (size_t i = 0; i < w->count; i++) {
-        const struct compared *v = &w->compared[i];
-        uint32_t height = v->view->camera.height;
-        struct rows rows = {v, source, spl_alloc(height, sizeof *rows.error, err)};
-        if (!rows.error)
-            return SPL_E_NOMEM;
-        spl_parallel_for(w->options->threads, height, 16, look_rows, &rows);
-        for (uint32_t y = 0; y < height; y++)
-            for (int k = 0; k < SPL_PROJECTED_COUNT; k++)
-                v->sums->projected[k] += rows.error[y][k];
-        free(rows.error);
+        struct rows rows = {&w->compared[i], source};
+        spl_parallel_for(w->options->threads, w->compared[i].down, 1, look_rows, &rows);
     }
-    return 0;
 }
 
 /* Adds how far one splat's texture is from the photograph's own in each form. */
@@ -330,10 +341,10 @@ static int take_photograph(struct work *w, uint16_t index, struct spl_error *err
         rc = spl_blocks_code(&source.form[0], spl_block_bc7, o->threads, &source.form[1], err);
     if (!rc)
         rc = spl_blocks_code(&source.form[0], spl_block_bc1, o->threads, &source.form[2], err);
-    if (!rc)
-        rc = look(w, &source, err);
-    if (!rc)
+    if (!rc) {
+        look(w, &source);
         compare_textures(w, &source);
+    }
     for (int f = 0; f < forms; f++)
         spl_pyramid_finish(&source.form[f]);
     return rc;
@@ -344,18 +355,46 @@ static double to_psnr(double sum, uint64_t values)
     return values == 0 ? NAN : sum > 0 ? -10 * log10(sum / (65025.0 * (double)values)) : INFINITY;
 }
 
-static void finish_sums(struct spl_projected_views *views)
+/* Sums and medians of one kind of views. */
+static int finish_views(const struct work *w, bool left_out, struct spl_projected_views *out, struct spl_error *err)
 {
-    views->colored = to_psnr(views->colored, 3 * views->pixels);
-    views->textured = to_psnr(views->textured, 3 * views->pixels);
-    for (int k = 0; k < SPL_PROJECTED_COUNT; k++)
-        views->projected[k] = to_psnr(views->projected[k], 3 * views->pixels);
+    double sum[frames] = {0}, *psnr = NULL;
+    size_t room = 1, full = 0;
+    for (size_t i = 0; i < w->count; i++)
+        room += (size_t)w->compared[i].across * w->compared[i].down;
+    if (!(psnr = spl_alloc_raw(room, sizeof *psnr * frames, err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < w->count; i++) {
+        const struct compared *v = &w->compared[i];
+        if (v->left_out != left_out)
+            continue;
+        out->views++;
+        for (const struct tile *t = v->tiles; t < v->tiles + (size_t)v->across * v->down; t++) {
+            bool whole = t->pixels == SPL_PROJECTED_TILE * SPL_PROJECTED_TILE;
+            out->pixels += t->pixels;
+            for (int k = 0; k < frames; k++) {
+                sum[k] += t->error[k];
+                if (whole)
+                    psnr[k * room + full] = fmin(to_psnr(t->error[k], 3 * t->pixels), most);
+            }
+            full += whole;
+        }
+    }
+    for (int k = 0; k < frames; k++) {
+        struct spl_projected_figure *figure = k == colored    ? &out->colored
+                                              : k == textured ? &out->textured
+                                                              : &out->projected[k];
+        figure->psnr = to_psnr(sum[k], 3 * out->pixels);
+        figure->tile = full ? spl_summarise(psnr + k * room, full).median : NAN;
+    }
+    free(psnr);
+    return 0;
 }
 
 int spl_projected_measure(const struct spl_projected_options *o, struct spl_projected_report *report,
                           struct spl_error *err)
 {
-    struct work w = {.options = o, .report = report};
+    struct work w = {.options = o};
     const struct spl_dataset_info *info = spl_dataset_get_info(o->dataset);
     *report = (struct spl_projected_report){0};
     if (info->splats != o->origin->splats)
@@ -366,12 +405,14 @@ int spl_projected_measure(const struct spl_projected_options *o, struct spl_proj
         rc = take_view(&w, &w.compared[i], err);
     for (uint32_t i = 0; !rc && i < o->origin->photographs; i++)
         rc = *o->origin->names[i] ? take_photograph(&w, (uint16_t)i, err) : 0;
+    if (!rc)
+        rc = finish_views(&w, false, &report->packed, err);
+    if (!rc)
+        rc = finish_views(&w, true, &report->left_out, err);
     for (size_t i = 0; i < w.count; i++)
         finish_compared(&w.compared[i]);
     free(w.compared);
     for (int k = 0; k < SPL_PROJECTED_COUNT; k++)
         report->texture[k] = to_psnr(w.texture[k], w.texture_values);
-    finish_sums(&report->packed);
-    finish_sums(&report->left_out);
     return rc;
 }

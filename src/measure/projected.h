@@ -33,12 +33,20 @@ struct spl_projected_options {
     void *context;
 };
 
-/* Over all pixels of the views that a splat covers and the photograph shows; PSNR over R, G, B of all of them, dB. */
+/* PSNR over R, G, B of all pixels, dB, and the median of it over tiles, which says what most of a picture looks like:
+ * where the splats' surface is wrong, over sky and beside silhouettes, a few pixels make up nearly all of the mean. */
+struct spl_projected_figure {
+    double psnr, tile;
+};
+
+enum { SPL_PROJECTED_TILE = 32 }; /* pixels a side; tiles that are covered in part are left out */
+
+/* Of the pixels of views that a splat covers and the photograph shows. */
 struct spl_projected_views {
     uint32_t views;
     uint64_t pixels;
-    double colored, textured;              /* the dataset's own frames at lod 1 without and with atoms */
-    double projected[SPL_PROJECTED_COUNT]; /* where no photograph is, the coloured frame */
+    struct spl_projected_figure colored, textured; /* the dataset's own frames at lod 1 without and with atoms */
+    struct spl_projected_figure projected[SPL_PROJECTED_COUNT]; /* where no photograph is, the coloured frame */
 };
 
 struct spl_projected_report {

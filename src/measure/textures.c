@@ -128,7 +128,7 @@ static struct spl_textures_row *add_row(struct spl_textures_report *report, cons
 {
     spl_assert(report->rows < SPL_TEXTURES_ROWS_MAX);
     struct spl_textures_row *row = &report->row[report->rows++];
-    *row = (struct spl_textures_row){.atoms = NAN, .packed = NAN, .left_out = NAN, .kind = kind};
+    *row = (struct spl_textures_row){.atoms = NAN, .packed = {NAN, NAN}, .left_out = {NAN, NAN}, .kind = kind};
     snprintf(row->name, sizeof row->name, "%s", name);
     return row;
 }
@@ -236,10 +236,10 @@ static int measure_colors(const struct spl_textures_options *o, struct spl_textu
     struct spl_textures_row *row = add_row(report, "colours only", SPL_TEXTURES_OTHER);
     row->color = find_color_bytes(o);
     row->psnr = to_psnr(error, (double)compared * 3 * texels * 255 * 255);
-    if (o->projected && o->projected->packed.views)
+    if (o->projected) {
         row->packed = o->projected->packed.colored;
-    if (o->projected && o->projected->left_out.views)
         row->left_out = o->projected->left_out.colored;
+    }
     return 0;
 }
 
@@ -257,8 +257,8 @@ static void add_photographs(const struct spl_textures_options *o, struct spl_tex
         row->color = sizeof *o->origin->photo;
         row->shared = mips * forms[k].bytes * (double)o->origin->pixels / (double)o->origin->splats;
         row->psnr = p->texture[k];
-        row->packed = p->packed.views ? p->packed.projected[k] : NAN;
-        row->left_out = p->left_out.views ? p->left_out.projected[k] : NAN;
+        row->packed = p->packed.projected[k];
+        row->left_out = p->left_out.projected[k];
     }
     struct spl_textures_row *row = add_row(report, "a texture for each splat", SPL_TEXTURES_OTHER);
     row->codes = mips * spl_texture_values(o->source->size) * (double)o->source->count / (double)o->origin->splats;
@@ -284,10 +284,10 @@ static void add_packed(const struct spl_textures_options *o, struct spl_textures
         json_is_number(json_object_get(textures, "psnr")) ? json_number_value(json_object_get(textures, "psnr")) : NAN;
     row->atoms = textured > 0 ? (double)used / textured : NAN;
     row->count = info->atoms;
-    if (o->projected && o->projected->packed.views)
+    if (o->projected) {
         row->packed = o->projected->packed.textured;
-    if (o->projected && o->projected->left_out.views)
         row->left_out = o->projected->left_out.textured;
+    }
 }
 
 static double find_geometry_bytes(const struct spl_dataset *dataset)

@@ -28,9 +28,9 @@ struct spl_textures_options {
 struct spl_textures_row {
     char name[40];
     double color, codes, shared;
-    double psnr;                      /* against the textures, dB; infinite where they are the textures */
-    double packed, left_out;          /* of frames against photographs, dB; NaN = not measured */
-    double atoms;                     /* a splat with a texture, mean; NaN for what has none */
+    double psnr;                                  /* against the textures, dB; infinite where they are the textures */
+    struct spl_projected_figure packed, left_out; /* of frames against photographs; NaN = not measured */
+    double atoms;                                 /* a splat with a texture, mean; NaN for what has none */
     double shares[SPL_ATOMS_MAX + 1]; /* splats with a texture by their number of atoms; all 0 for what has none */
     uint32_t count;                   /* atoms of the dictionary */
     uint64_t sample;                  /* textures that were trained on, others measured; 0 = all, both */

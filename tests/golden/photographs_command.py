@@ -183,13 +183,14 @@ with tempfile.TemporaryDirectory() as folder:
     table = run("bench", *arguments, "--epochs", "2")
     rows = {line[:24].strip(): line[24:].split() for line in table.splitlines()}
     assert "paper D12W4" in rows and "paper D16W8" in rows and "adaptive, lambda 0.00029" in rows, table
-    columns = dict(geometry=0, all=4, megabytes=5, psnr=8, packed=9, left_out=10)
+    columns = dict(geometry=0, all=4, megabytes=5, psnr=8, packed=9, tile=10, left_out=11)
 
     def figure(row, column):
         return float(rows[row][columns[column]].replace("-", "nan"))
     # the photograph itself, but at the frame's edge, where splats reach in whose centres it does not show
     assert figure("LOD 0", "psnr") == math.inf
     assert figure("LOD 0", "packed") > figure("colours only", "packed") + 10, table
+    assert figure("LOD 0", "tile") > figure("colours only", "tile") + 10, table
     assert figure("LOD 0", "left_out") > figure("colours only", "left_out") + 6, table
     assert figure("LOD 0 BC7", "psnr") > figure("LOD 0 BC1", "psnr") > 25, table
     assert figure("LOD 0", "psnr") > figure("LOD 1", "psnr") > figure("LOD 1 BC1", "psnr"), table

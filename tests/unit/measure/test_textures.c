@@ -178,7 +178,8 @@ static void test_measure(void **state)
     struct plant p = plant_make(8, 40, 1200, 2, 1), few = plant_make(4, 1, 2, 1, 1);
     const struct spl_texture_origin origin = {.splats = 2400, .pixels = 100000};
     struct spl_projected_report projected = {.texture = {INFINITY, 45, 40, 37, 36, 35},
-                                             .packed = {.views = 2, .colored = 20, .projected = {99, 40}}};
+                                             .packed = {.views = 2, .colored = {20, 22}, .projected = {{99, 60}}},
+                                             .left_out = {.colored = {NAN, NAN}}};
     struct spl_textures_options o = {.source = plant_source(&p),
                                      .origin = &origin,
                                      .projected = &projected,
@@ -195,10 +196,11 @@ static void test_measure(void **state)
     assert_true(report.batches_epochs >= 1 && report.ksvd_epochs >= 1);
     assert_true(report.geometry == 0 && !*report.left_away);
     const struct spl_textures_row *colors = find_row(&report, "colours only");
-    assert_true(colors->color == 3 && colors->codes == 0 && colors->psnr < 30 && colors->packed == 20);
-    assert_true(isnan(colors->left_out));
+    assert_true(colors->color == 3 && colors->codes == 0 && colors->psnr < 30 && colors->packed.psnr == 20 &&
+                colors->packed.tile == 22);
+    assert_true(isnan(colors->left_out.psnr));
     const struct spl_textures_row *whole = find_row(&report, "LOD 0"), *half = find_row(&report, "LOD 1 BC1");
-    assert_true(isinf(whole->psnr) && whole->packed == 99 && whole->color == 2);
+    assert_true(isinf(whole->psnr) && whole->packed.tile == 60 && whole->color == 2);
     assert_true(fabs(whole->shared - 4 * 100000 / 2400.0) < 1e-6);
     assert_true(fabs(half->shared - whole->shared / 24) < 1e-6 && half->psnr == 35);
     /* half of the splats have a texture: 192 bytes and their mips */
