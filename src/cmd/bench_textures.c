@@ -4,6 +4,7 @@
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 
 #include "cmd/bench.h"
@@ -37,30 +38,58 @@ struct arguments {
     const char *textures, *dataset, *folder, *cameras, *images, *device;
     uint64_t epochs, threads, memory_mb, views, rounds;
     uint32_t width, height;
+    unsigned runs;
 };
+
+static int parse_runs(char *text, unsigned *runs, struct spl_error *err)
+{
+    static const struct {
+        const char *name;
+        unsigned runs;
+    } names[] = {{"training", SPL_TEXTURES_RUN_TRAININGS}, {"D8W4", SPL_TEXTURES_RUN_D8W4},
+                 {"D12W4", SPL_TEXTURES_RUN_D12W4},        {"D16W8", SPL_TEXTURES_RUN_D16W8},
+                 {"adaptive", SPL_TEXTURES_RUN_ADAPTIVE},  {"none", 0}};
+    *runs = 0;
+    for (char *piece; (piece = strsep(&text, ","));) {
+        size_t i = 0;
+        while (i < sizeof names / sizeof *names && strcmp(piece, names[i].name))
+            i++;
+        if (i == sizeof names / sizeof *names)
+            return spl_fail(err, SPL_E_USAGE,
+                            "--codings takes a list of training, D8W4, D12W4, D16W8 and adaptive, or none, not '%.32s'",
+                            piece);
+        *runs |= names[i].runs;
+    }
+    return 0;
+}
 
 static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                            {"epochs", required_argument, NULL, 'e'},
-                                            {"threads", required_argument, NULL, 't'},
-                                            {"memory", required_argument, NULL, 'm'},
-                                            {"cameras", required_argument, NULL, 'c'},
-                                            {"images", required_argument, NULL, 'i'},
-                                            {"views", required_argument, NULL, 'v'},
-                                            {"repeats", required_argument, NULL, 'r'},
-                                            {"size", required_argument, NULL, 's'},
-                                            {"device", required_argument, NULL, 'd'},
-                                            {NULL, 0, NULL, 0}};
+    static const struct option options[] = {
+        {"output", required_argument, NULL, 'o'},  {"epochs", required_argument, NULL, 'e'},
+        {"codings", required_argument, NULL, 'C'}, {"threads", required_argument, NULL, 't'},
+        {"memory", required_argument, NULL, 'm'},  {"cameras", required_argument, NULL, 'c'},
+        {"images", required_argument, NULL, 'i'},  {"views", required_argument, NULL, 'v'},
+        {"repeats", required_argument, NULL, 'r'}, {"size", required_argument, NULL, 's'},
+        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
     int option, rc = 0;
-    *a = (struct arguments){.epochs = 12, .memory_mb = 2048, .views = 8, .rounds = 9, .width = 1280, .height = 720};
+    *a = (struct arguments){.epochs = 12,
+                            .memory_mb = 2048,
+                            .views = 8,
+                            .rounds = 9,
+                            .width = 1280,
+                            .height = 720,
+                            .runs = SPL_TEXTURES_RUN_ALL};
     while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
         switch (option) {
         case 'o':
             a->folder = optarg;
             break;
         case 'e':
-            rc = spl_cmd_parse_count("--epochs", optarg, 0, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
+            rc = spl_cmd_parse_count("--epochs", optarg, 1, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
+            break;
+        case 'C':
+            rc = parse_runs(optarg, &a->runs, err);
             break;
         case 't':
             rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a->threads, err);
@@ -169,6 +198,7 @@ int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err)
                                              .dataset = b->dataset,
                                              .projected = b->a.cameras ? &b->projected : NULL,
                                              .epochs = (uint32_t)b->a.epochs,
+                                             .runs = b->a.runs,
                                              .memory_bytes = b->a.memory_mb << 20,
                                              .seed = 1,
                                              .threads = (unsigned)b->a.threads,

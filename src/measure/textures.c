@@ -307,10 +307,15 @@ static int measure_paper(const struct spl_textures_options *o, struct spl_textur
     static const struct {
         const char *name;
         uint32_t atoms, weight_bits;
-    } codings[] = {{"paper D8W4", 256, 4}, {"paper D12W4", 4096, 4}, {"paper D16W8", 65536, 8}};
+        enum spl_textures_runs run;
+    } codings[] = {{"paper D8W4", 256, 4, SPL_TEXTURES_RUN_D8W4},
+                   {"paper D12W4", 4096, 4, SPL_TEXTURES_RUN_D12W4},
+                   {"paper D16W8", 65536, 8, SPL_TEXTURES_RUN_D16W8}};
     int rc = 0;
     for (size_t i = 0; !rc && i < sizeof codings / sizeof *codings; i++) {
         struct spl_error why = {0};
+        if (!(o->runs & codings[i].run))
+            continue;
         rc = measure_coding(o, report, codings[i].name, codings[i].atoms, codings[i].weight_bits, 0, &why);
         if (rc == SPL_E_LIMIT) {
             snprintf(report->left_away, sizeof report->left_away, "%s: %.400s", codings[i].name, why.message);
@@ -358,12 +363,11 @@ int spl_textures_measure(const struct spl_textures_options *o, struct spl_textur
         add_photographs(o, report);
     if (!rc && o->dataset)
         add_packed(o, report);
-    if (rc || !o->epochs)
-        return rc;
-    rc = measure_trainings(o, report, err);
+    if (!rc && o->runs & SPL_TEXTURES_RUN_TRAININGS)
+        rc = measure_trainings(o, report, err);
     if (!rc)
         rc = measure_paper(o, report, err);
-    for (size_t i = 0; !rc && i < sizeof shares / sizeof *shares; i++) {
+    for (size_t i = 0; !rc && o->runs & SPL_TEXTURES_RUN_ADAPTIVE && i < sizeof shares / sizeof *shares; i++) {
         char name[40];
         double lambda = shares[i] * spl_texture_values(o->source->size) * pow(10, -cut_off / 10);
         snprintf(name, sizeof name, "adaptive, lambda %.2g", lambda);

@@ -11,12 +11,23 @@
 
 enum { SPL_TEXTURES_EPOCHS_MAX = 64, SPL_TEXTURES_ROWS_MAX = 24 };
 
+/* What is trained and coded; bits. */
+enum spl_textures_runs {
+    SPL_TEXTURES_RUN_TRAININGS = 1, /* k-SVD and mini-batches, for their chart */
+    SPL_TEXTURES_RUN_D8W4 = 2,
+    SPL_TEXTURES_RUN_D12W4 = 4,
+    SPL_TEXTURES_RUN_D16W8 = 8,
+    SPL_TEXTURES_RUN_ADAPTIVE = 16,
+    SPL_TEXTURES_RUN_ALL = 31
+};
+
 struct spl_textures_options {
     const struct spl_texture_source *source;
     const struct spl_texture_origin *origin;
     const struct spl_dataset *dataset; /* what was packed: its geometry is charged to every row; may be NULL */
     const struct spl_projected_report *projected; /* rows of photographs; may be NULL */
-    uint32_t epochs; /* of each training, 0..SPL_TEXTURES_EPOCHS_MAX; 0: no coding but the dataset's own is measured */
+    uint32_t epochs;                              /* of each training, 1..SPL_TEXTURES_EPOCHS_MAX */
+    unsigned runs;                                /* bit per enum spl_textures_runs; 0: what needs none */
     uint64_t memory_bytes, seed;
     unsigned threads;
     void (*progress)(void *context, const char *what, const struct spl_train_progress *epoch); /* may be NULL */

@@ -202,10 +202,11 @@ with tempfile.TemporaryDirectory() as folder:
     assert sorted(os.listdir("coders")) == ["rate.svg", "textures.csv", "training.csv", "training.svg"]
 
     def not_measured(words, *arguments):
-        done = subprocess.run([SPLATD, "bench", "--textures", *arguments, "-o", "coders", "--epochs", "0", "--repeats",
-                               "1", "--size", "16x9"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        done = subprocess.run([SPLATD, "bench", "--textures", *arguments, "-o", "coders", "--codings", "none",
+                               "--repeats", "1", "--size", "16x9"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
     not_measured("no textures", "wall.spld")
+    not_measured("not 'D9'", "images/kept", "--codings", "D8W4,D9")
     not_measured("NAME.spld, which is missing", "images/kept", "--cameras", "views.json")
     not_measured("--cameras MODEL", "images/kept", "wall.spld", "--images", "images")
     put_views({"nearer": cameras["nearer"]})

@@ -184,6 +184,7 @@ static void test_measure(void **state)
                                      .origin = &origin,
                                      .projected = &projected,
                                      .epochs = 3,
+                                     .runs = SPL_TEXTURES_RUN_ALL,
                                      .memory_bytes = 1 << 28,
                                      .seed = 1};
     static struct spl_textures_report report;
@@ -228,7 +229,7 @@ static void test_measure(void **state)
     assert_int_equal(spl_textures_chart_training(&report, &svg, &length, &err), 0);
     assert_non_null(strstr(svg, "k-SVD"));
     free(svg);
-    o.epochs = 0; /* no codings, and none of photographs */
+    o.runs = 0; /* no codings, and none of photographs */
     o.projected = NULL;
     assert_int_equal(spl_textures_measure(&o, &report, &err), 0);
     assert_int_equal(report.rows, 2);
