@@ -63,6 +63,8 @@ struct spl_pack_options {
     unsigned neighbours;       /* K of eq. 20 and of the PCA; 0 = 12 */
     double position_error;     /* mean, as a share of the splat radius; 0 = 0.016 */
     double normal_error;       /* mean, degrees; 0 = 1 */
+    bool points_only;          /* neither normals nor radii: fast, for methods that need none (points, fill) */
+    bool no_linear;            /* wires, poles and cables are not looked for */
     unsigned threads;          /* 0 = all cores */
     const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
@@ -71,6 +73,7 @@ struct spl_pack_options {
 
 struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
+    uint64_t linear; /* leaf splats on wires, poles and cables */
     uint32_t levels, nodes, chunks, pages;
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT];
     double position_error;     /* measured mean, share of the radius */

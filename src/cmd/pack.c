@@ -19,7 +19,7 @@ static void usage(FILE *out)
     fprintf(
         out,
         "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
-        "                   [--normal-error DEG] [--threads N]\n"
+        "                   [--normal-error DEG] [--points-only] [--no-linear] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]]\n\n"
         "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
         "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
@@ -32,6 +32,8 @@ static void usage(FILE *out)
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"
         "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
+        "Points as they are, several times faster, to be rendered with method fill or points:\n"
+        "  splatd pack street.las --points-only -o street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
         "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
@@ -39,6 +41,8 @@ static void usage(FILE *out)
         "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
         "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
         "      --normal-error DEG   mean, degrees (default 1)\n"
+        "      --points-only        position, color and class alone: no normals and radii, so no method splat\n"
+        "      --no-linear          do not look for wires, poles and cables, which method fill draws as they are\n"
         "      --cameras MODEL      poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a "
         "folder\n"
         "                           of poses, or a list of views; in the scan's coordinates\n"
@@ -112,6 +116,8 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
             r->normal_error);
+    if (r->linear)
+        fprintf(stderr, "%llu points on wires, poles and cables\n", (unsigned long long)r->linear);
     if (r->photos.photographs)
         fprintf(stderr, "%u photographs in %.1f s (%u could not be used); %.1f %% of the splats are on none\n",
                 r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);
@@ -153,6 +159,8 @@ int spl_cmd_pack(int argc, char **argv)
         opt_neighbours,
         opt_position,
         opt_normal,
+        opt_points_only,
+        opt_no_linear,
         opt_threads,
         opt_cameras,
         opt_images,
@@ -169,6 +177,8 @@ int spl_cmd_pack(int argc, char **argv)
         {"neighbours", required_argument, NULL, opt_neighbours},
         {"position-error", required_argument, NULL, opt_position},
         {"normal-error", required_argument, NULL, opt_normal},
+        {"points-only", no_argument, NULL, opt_points_only},
+        {"no-linear", no_argument, NULL, opt_no_linear},
         {"threads", required_argument, NULL, opt_threads},
         {"cameras", required_argument, NULL, opt_cameras},
         {"images", required_argument, NULL, opt_images},
@@ -205,6 +215,12 @@ int spl_cmd_pack(int argc, char **argv)
             break;
         case opt_normal:
             result = spl_cmd_parse_real("--normal-error", optarg, 0.01, 30, &o.normal_error, &err);
+            break;
+        case opt_points_only:
+            o.points_only = true;
+            break;
+        case opt_no_linear:
+            o.no_linear = true;
             break;
         case opt_threads:
             result = spl_cmd_parse_count("--threads", optarg, 1, 64, &number, &err);

@@ -56,6 +56,7 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
     }
     s->radius = p->radius[i];
     s->uncertainty = p->uncertainty[i];
+    s->linear = p->linear && p->linear[i];
     set_color(s, p->color_class[i]);
 }
 
@@ -69,6 +70,7 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
     }
     s->radius = from->radius;
     s->uncertainty = from->uncertainty;
+    s->linear = from->linear;
     set_color(s, from->color_class);
 }
 
@@ -89,6 +91,16 @@ static void grow_box(struct spl_node *node, const struct spl_splat *splats, doub
             node->box_min[c] = fminf(node->box_min[c], (float)(position[i][c] - reach));
             node->box_max[c] = fmaxf(node->box_max[c], (float)(position[i][c] + reach));
         }
+}
+
+/* Without a surface a chunk's splats are all as large as their mean, which takes no bits. */
+static void level_radii(struct spl_splat *splats, uint32_t count)
+{
+    double sum = 0;
+    for (uint32_t i = 0; i < count; i++)
+        sum += splats[i].radius;
+    for (uint32_t i = 0; i < count; i++)
+        splats[i].radius = (float)(sum / count);
 }
 
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
@@ -134,6 +146,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
             else
                 load_inner(node, at, &splats[i], position[i]);
         }
+        if (p->no_surface)
+            level_radii(splats, used);
         struct spl_chunk_error error;
         uint32_t words = spl_chunk_encode(splats, (const double(*)[3])position, used, e->options, &out->chunks[c],
                                           w->words + out->word_count, &error);

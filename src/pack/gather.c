@@ -160,6 +160,7 @@ void spl_points_finish(struct spl_points *points)
     free(points->normal);
     free(points->radius);
     free(points->uncertainty);
+    free(points->linear);
     free(points->stations);
     *points = (struct spl_points){0};
 }

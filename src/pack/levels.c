@@ -26,7 +26,7 @@ struct cluster {
     uint32_t votes; /* of `classification`, majority by pairing off */
     uint8_t classification;
     float largest;
-    double weight, position[3], squared, normal[3], color[3], uncertainty;
+    double weight, linear, position[3], squared, normal[3], color[3], uncertainty;
 };
 
 struct scratch { /* of one worker */
@@ -69,6 +69,7 @@ static size_t take_child(const struct spl_points *p, const struct spl_tree_node 
         out->radius = p->radius[i];
         out->uncertainty = p->uncertainty[i];
         out->color_class = p->color_class[i];
+        out->linear = p->linear && p->linear[i];
     }
     return child->splat_count;
 }
@@ -114,6 +115,7 @@ static void add_to(struct cluster *k, const struct spl_inner_splat *s)
         k->squared += w * s->position[c] * s->position[c];
     }
     k->weight += w;
+    k->linear += s->linear ? w : 0;
     k->uncertainty += w * s->uncertainty;
     k->largest = fmaxf(k->largest, s->radius);
     uint8_t classification = s->color_class >> 24;
@@ -171,6 +173,7 @@ static void finish_cluster(const struct cluster *k, double cell, struct spl_inne
     out->radius = fmaxf((float)radius, k->largest);
     out->uncertainty = (float)(k->uncertainty / weight);
     out->color_class = (uint32_t)k->classification << 24;
+    out->linear = 2 * k->linear > weight;
     for (int c = 0; c < 3; c++)
         out->color_class |= (uint32_t)(k->color[c] / weight + 0.5) << 8 * c;
 }

@@ -17,6 +17,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/emit.h"
+#include "pack/linear.h"
 #include "pack/texture/pass.h"
 #include "pack/view.h"
 
@@ -106,18 +107,19 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
             json_array_append_new(pose, json_real(points->stations[s][i]));
         json_array_append_new(stations, pose);
     }
-    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b}, s:o, s:o, s:o,"
+    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b, s:b}, s:o, s:o, s:o,"
                      " s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
-                     (int)points->has_color, "class", (int)points->has_class, "uncertainty", 1, "bits", bits, "sources",
-                     sources, "stations", stations, "pack", "neighbours", (int)p->neighbours, "position_error_bound",
-                     p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
-                     "points_skipped", (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates,
-                     "position_error", p->emitted.error.position_over_radius / (double)p->emitted.splats,
-                     "normal_error", p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
+                     (int)points->has_color, "class", (int)points->has_class, "uncertainty", !points->no_surface,
+                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "pack",
+                     "neighbours", (int)p->neighbours, "position_error_bound", p->chunk.position_error,
+                     "normal_error_bound", p->chunk.normal_error * 180 / M_PI, "points_skipped",
+                     (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates, "position_error",
+                     p->emitted.error.position_over_radius / (double)p->emitted.splats, "normal_error",
+                     p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
 }
 
 static int write_dataset(struct pack *p, struct spl_error *err)
@@ -158,6 +160,8 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
         .normal_error = p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI,
         .seconds = (double)(spl_now_ns() - begin_ns) / 1e9,
     };
+    for (size_t i = 0; p->points.linear && i < p->points.count; i++)
+        report->linear += p->points.linear[i];
     memcpy(report->attribute_bits, p->emitted.bits, sizeof report->attribute_bits);
 }
 
@@ -176,8 +180,11 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
         rc = spl_points_gather(&p.points, options->inputs, options->input_count, options->columns, &p.stage, err);
     if (!rc)
         rc = spl_points_order(&p.points, &p.stage, err);
+    if (!rc && !options->no_linear)
+        rc = spl_linear_find(&p.points, &p.stage, err);
     if (!rc)
-        rc = spl_surface(&p.points, p.neighbours, &p.stage, err);
+        rc = options->points_only ? spl_bare_points(&p.points, &p.stage, err)
+                                  : spl_surface(&p.points, p.neighbours, &p.stage, err);
     if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
@@ -231,5 +238,8 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_pack_r
 
 int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
+    if (options->points_only && options->photos)
+        return spl_fail_field(err, SPL_E_USAGE, "points-only",
+                              "photographs are put onto discs; pack without --points-only, or without --cameras");
     return options->photos ? pack_photos(options, report, err) : pack_scan(options, options->output, report, err);
 }

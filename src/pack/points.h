@@ -19,10 +19,11 @@ struct spl_points {
     uint32_t *color_class;       /* r | g << 8 | b << 16 | class << 24 */
     uint16_t *station;           /* index into stations or SPL_NO_STATION; NULL when no input has any */
     float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
-    float *radius, *uncertainty; /* made by spl_surface() */
+    uint8_t *linear;             /* 1 on a wire, a pole or a cable; made by spl_linear_find(); may be NULL: none is */
+    float *radius, *uncertainty; /* made by spl_surface() or spl_bare_points() */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
-    bool has_color, has_class;
+    bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
     uint64_t points_read, points_skipped, duplicates;
 };
@@ -37,6 +38,11 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
 /* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX); needs sorted points. */
 enum { SPL_NEIGHBOURS_MAX = 64 };
 int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err);
+
+/* Instead: normals are (0, 0, 1), uncertainties 0, and radii those of a square grid as dense as the points around,
+ * which are counted in cells, not searched. What levels of detail are chosen by; no surface to draw. Needs sorted
+ * points. */
+int spl_bare_points(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
 
 void spl_points_finish(struct spl_points *points);
 

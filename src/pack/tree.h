@@ -11,6 +11,7 @@ struct spl_inner_splat {
     float position[3], normal[3];
     float radius, uncertainty;
     uint32_t color_class; /* as in struct spl_points */
+    bool linear;          /* most of what it stands for is */
 };
 
 struct spl_tree_node {

@@ -246,6 +246,57 @@ static void test_degenerate_clouds(void **state)
     free(position);
 }
 
+/* A field with a wire over it, whole and as bare points: the same points are linear, at every level some; bare points
+ * have neither normals nor radii to pay for. */
+static void test_linear_and_bare_points(void **state)
+{
+    (void)state;
+    enum { side = 150, wire = 400, count = side * side + wire };
+    double(*position)[3] = malloc(count * sizeof *position);
+    uint64_t random = 71;
+    for (size_t i = 0; i < count; i++) {
+        bool on_wire = i >= side * side;
+        position[i][0] =
+            on_wire ? 15.0 * (double)(i - side * side) / wire : 0.1 * ((double)(i % side) + uniform(&random));
+        position[i][1] = on_wire ? 7 : 0.1 * ((double)(i / side) + uniform(&random));
+        position[i][2] = (on_wire ? 4 : 0) + 0.0005 * uniform(&random);
+    }
+    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    for (int run = 0; run < 4; run++) {
+        const char *input = path_of("in.ply");
+        struct spl_pack_options options = {.inputs = &input,
+                                           .input_count = 1,
+                                           .output = path_of("out.spld"),
+                                           .threads = 2,
+                                           .points_only = run & 1,
+                                           .no_linear = run & 2};
+        struct spl_pack_report report;
+        struct spl_error err = {0};
+        struct spl_dataset *dataset;
+        assert_int_equal(spl_pack(&options, &report, &err), 0);
+        check_dataset(path_of("out.spld"), (const double(*)[3])position, count, true);
+        assert_int_equal(report.linear, options.no_linear ? 0 : wire);
+        assert_int_equal(spl_dataset_open(path_of("out.spld"), true, &dataset, &err), 0);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        uint64_t linear = 0;
+        assert_int_equal(spl_dataset_count_linear(dataset, &linear, &err), 0);
+        assert_int_equal(linear, report.linear);
+        assert_true(info->has_linear == !options.no_linear && info->has_surface == !options.points_only);
+        assert_true(!options.points_only == (info->attribute_bits[SPL_ATTRIBUTE_NORMAL] > 0));
+        if (options.points_only)
+            assert_true(!info->has_uncertainty && info->attribute_bits[SPL_ATTRIBUTE_RADIUS] == 0 &&
+                        info->attribute_bits[SPL_ATTRIBUTE_UNCERTAINTY] == 0);
+        assert_true(info->splat_radius > 0.05 && info->splat_radius < 0.2);
+        uint32_t chunk_count, inner = 0;
+        const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+        for (uint32_t c = 0; c < spl_dataset_get_nodes(dataset, &(uint32_t){0})[0].chunk_count; c++)
+            inner += chunks[c].geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
+        assert_true(options.no_linear == (inner == 0));
+        spl_dataset_close(dataset);
+    }
+    free(position);
+}
+
 static void expect_refusal(const char *input, const char *output, int code, const char *part)
 {
     struct spl_error err = {0};
@@ -286,6 +337,12 @@ static void test_refusals(void **state)
     wrong.position_error = -1;
     err = (struct spl_error){0};
     assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
+    wrong = options;
+    wrong.points_only = true;
+    wrong.photos = &(struct spl_photo_options){.cameras = "poses"};
+    err = (struct spl_error){0};
+    assert_true(spl_pack(&wrong, NULL, &err) != 0);
+    assert_string_equal(err.field, "points-only");
     wrong = options;
     wrong.normal_error = NAN;
     err = (struct spl_error){0};
@@ -337,11 +394,9 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_point_is_there),
-        cmocka_unit_test(test_default_view),
-        cmocka_unit_test(test_threads_do_not_matter),
-        cmocka_unit_test(test_degenerate_clouds),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_every_point_is_there),   cmocka_unit_test(test_default_view),
+        cmocka_unit_test(test_threads_do_not_matter),  cmocka_unit_test(test_degenerate_clouds),
+        cmocka_unit_test(test_linear_and_bare_points), cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_refused_memory),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
