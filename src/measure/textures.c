@@ -20,10 +20,10 @@ enum {
     compared_atoms = 1024,
     adaptive_atoms = 2048,
     compared_textures = 50000,
-    large_atoms = 16384,    /* above, training takes no more than */
-    large_trained = 196608, /* textures and */
-    large_epochs = 2,       /* rounds over them, and codes */
-    large_coded = 65536,    /* others */
+    large_atoms = 16384,    /* above, a round over this many textures */
+    large_trained = 196608, /* takes minutes, so there is */
+    large_epochs = 1,       /* one, and as many others */
+    large_coded = 16384,    /* are coded: a lower bound of the quality */
 };
 static const double mips = 4.0 / 3, cut_off = 40;
 
@@ -173,7 +173,8 @@ static int measure_coding(const struct spl_textures_options *o, struct spl_textu
     struct spl_dictionary dictionary = {0};
     struct spl_coder *coder = NULL;
     struct spl_code_sums sums = {0};
-    uint64_t begin_ns = spl_now_ns(), used = 0, every = o->source->count / large_trained + 1;
+    uint64_t begin_ns = spl_now_ns(), used = 0;
+    uint64_t every = o->source->count / (o->sample ? o->sample : large_trained) + 1;
     uint64_t coded_every = (o->source->count / every / large_coded + 1) * every;
     bool some = atoms > large_atoms && every > 1;
     struct thinned train_on = {o->source, some ? every : 1, 0}, measure_on = {o->source, some ? coded_every : 1, some};
