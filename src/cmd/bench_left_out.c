@@ -43,25 +43,42 @@ static int write_picture(const struct arguments *a, const char *view, const char
     return rc;
 }
 
-static void print_row(const char *name, const struct spl_left_out *sums)
+static void print_width(const char *name, const char *width, const struct spl_left_out *sums, int w)
 {
-    static const char *const widths[] = {"<= 2 px", "> 2 px"};
-    uint64_t all = sums->pixels[0] + sums->pixels[1];
-    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
-        if (!sums->pixels[w])
-            continue;
-        printf("%-16.16s %-7s %6.1f", name, widths[w], 100 * (double)sums->pixels[w] / (double)all);
-        for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++) {
-            double colored = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_COLORED, step);
-            double textured = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_TEXTURED, step);
-            printf(" %6.2f %6.2f %+6.2f", colored, textured, textured - colored);
-        }
-        for (int kind = 0; kind < SPL_LEFT_OUT_KINDS; kind++) {
-            const double *squared = sums->squared[w][kind];
-            printf(" %5.0f", 100 * squared[SPL_LEFT_OUT_REGISTERED] / fmax(squared[SPL_LEFT_OUT_MATCHED], 1e-9));
-        }
-        printf(" %6.1f\n", 100 * (double)sums->worse[w] / (double)sums->pixels[w]);
+    uint64_t all = 0;
+    const double *squared = sums->squared[w][SPL_LEFT_OUT_TEXTURED];
+    for (int i = 0; i < SPL_LEFT_OUT_WIDTHS; i++)
+        all += sums->pixels[i];
+    if (!sums->pixels[w])
+        return;
+    printf("%-12.12s %-9s %6.1f", name, width, 100 * (double)sums->pixels[w] / (double)all);
+    for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++) {
+        double colored = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_COLORED, step);
+        double textured = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_TEXTURED, step);
+        printf(" %6.2f %6.2f %+6.2f", colored, textured, textured - colored);
     }
+    for (int step = 1; step <= SPL_LEFT_OUT_STEPS; step++)
+        printf(" %4.0f", 100 * (squared[step - 1] - (step < SPL_LEFT_OUT_STEPS ? squared[step] : 0)) /
+                             fmax(squared[SPL_LEFT_OUT_PLAIN], 1e-9));
+    printf(" %6.1f %6.1f\n", 100 * (double)sums->good[w] / (double)sums->pixels[w],
+           100 * (double)sums->worse[w] / (double)sums->pixels[w]);
+}
+
+static void print_rows(const char *name, const struct spl_left_out *sums)
+{
+    static const char *const widths[] = {"<= 2 px", "2 to 8 px", "> 8 px"};
+    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++)
+        print_width(name, widths[w], sums, w);
+}
+
+static void print_heading(void)
+{
+    printf("%-12s %-9s %6s %20s %20s %20s %20s %19s %13s\n", "", "", "", "as they are, dB", "exposure matched, dB",
+           "blocks levelled, dB", "and registered, dB", "textured error, %", "blocks, %");
+    printf("%-12s %-9s %6s", "photograph", "splats", "pixels");
+    for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++)
+        printf(" %6s %6s %6s", "colour", "textur", "gain");
+    printf(" %4s %4s %4s %4s %6s %6s\n", "expo", "lght", "plce", "rest", ">=3 dB", "worse");
 }
 
 static int compare_view(const struct arguments *a, struct spl_renderer *renderer, const struct spl_dataset *dataset,
@@ -83,7 +100,7 @@ static int compare_view(const struct arguments *a, struct spl_renderer *renderer
     for (int kind = 0; !rc && a->folder && kind < SPL_LEFT_OUT_KINDS; kind++)
         rc = write_picture(a, view->name, names[kind], &render[kind], err);
     if (!rc) {
-        print_row(view->name, &found);
+        print_rows(view->name, &found);
         fflush(stdout);
         spl_left_out_add(sums, &found);
     }
@@ -110,16 +127,11 @@ static int run(const struct arguments *a, struct spl_error *err)
         rc = spl_fail_errno(err, errno, "%s", a->folder);
         goto done;
     }
-    printf("%-16s %-7s %6s %20s %20s %20s %11s %6s\n", "photograph", "splats", "pixels", "as they are, dB",
-           "exposure matched, dB", "registered, dB", "remains, %", "worse,");
-    printf("%-16s %-7s %6s", "", "", "%");
-    for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++)
-        printf(" %6s %6s %6s", "colour", "textur", "gain");
-    printf(" %5s %5s %6s\n", "col.", "text.", "%");
+    print_heading();
     for (size_t i = 0; !rc && i < list.count; i++)
         rc = compare_view(a, renderer, dataset, &list.views[i], &sums, err);
     if (!rc && list.count > 1)
-        print_row("all", &sums);
+        print_rows("all", &sums);
 done:
     spl_renderer_destroy(renderer);
     spl_dataset_close(dataset);

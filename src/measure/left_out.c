@@ -1,9 +1,10 @@
 /* Photographs left out of packing against renders.
  *
- * A sharp edge a pixel aside costs as much as no edge at all, so that a plain error does not tell blur from poses and
- * surfaces that are off. Blocks of the photograph are therefore also moved to where they fit the render best: what
- * remains then is what the render does not hold. Both kinds of render are treated alike, with one factor a channel, the
- * coloured one's: a least-squares fit would forgive blur. Blocks are summed in their order. */
+ * What textures can add is detail, so an error's other causes are taken away one by one: exposure, by one factor a
+ * channel, the coloured render's for both (a least-squares fit would forgive blur); light that differs from place to
+ * place, by the means of blocks; and place, since a sharp edge a pixel aside costs as much as no edge at all: blocks of
+ * the photograph are moved to where they fit the render best. What remains the render does not hold. Blocks are summed
+ * in their order. */
 #include "measure/left_out.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@
 #include "base/parallel.h"
 
 enum { SHIFTS = 2 * SPL_LEFT_OUT_SHIFT + 1 };
-static const float wide_px = 2;
+static const float widths_px[] = {2, 8}; /* between one class and the next */
 
 double spl_left_out_psnr(const struct spl_left_out *sums, enum spl_left_out_width width, enum spl_left_out_kind kind,
                          enum spl_left_out_step step)
@@ -25,7 +26,7 @@ double spl_left_out_psnr(const struct spl_left_out *sums, enum spl_left_out_widt
 struct compare {
     const struct spl_left_out_images *images;
     int width, height, across;
-    uint8_t *counts; /* by pixel: enum spl_left_out_width + 1; 0 = not compared */
+    uint8_t *counts; /* by pixel: 1 + enum spl_left_out_width; 0 = not compared */
     float factor[3];
     struct spl_left_out *blocks;
 };
@@ -44,10 +45,10 @@ static void mark_rows(void *context, size_t begin, size_t end, unsigned worker)
                 size_t at = (size_t)(y + i / SHIFTS - r) * (size_t)c->width + (size_t)(x + i % SHIFTS - r);
                 there = photograph[4 * at + 3] == 255;
             }
-            c->counts[(size_t)y * (size_t)c->width + (size_t)x] =
-                (uint8_t)(!there            ? 0
-                          : width > wide_px ? 1 + SPL_LEFT_OUT_WIDE
-                                            : 1 + SPL_LEFT_OUT_NARROW);
+            int class = 1;
+            while (class < SPL_LEFT_OUT_WIDTHS && width > widths_px[class - 1])
+                class ++;
+            c->counts[(size_t)y * (size_t)c->width + (size_t)x] = (uint8_t)(there ? class : 0);
         }
 }
 
@@ -65,51 +66,67 @@ static void find_factors(struct compare *c)
         c->factor[k] = ours[k] ? (float)((double)theirs[k] / (double)ours[k]) : 1;
 }
 
-/* The squared error of the block at (x0, y0), by width, the photograph being moved by (dx, dy). */
-static void add_block(const struct compare *c, int x0, int y0, const uint8_t *render, const float factor[3], int dx,
-                      int dy, double out[SPL_LEFT_OUT_WIDTHS])
+/* Errors of one block, by width: squared, and less what its means differ by. */
+struct block {
+    double squared[SPL_LEFT_OUT_WIDTHS], levelled[SPL_LEFT_OUT_WIDTHS], all_levelled;
+};
+
+/* The block at (x0, y0), the photograph being moved by (dx, dy). */
+static struct block add_block(const struct compare *c, int x0, int y0, const uint8_t *render, const float factor[3],
+                              int dx, int dy)
 {
     const uint8_t *photograph = c->images->photograph->pixels;
-    out[0] = out[1] = 0;
+    struct block block = {0};
+    double sum[SPL_LEFT_OUT_WIDTHS][3] = {0}, count[SPL_LEFT_OUT_WIDTHS] = {0};
     for (int y = y0; y < y0 + SPL_LEFT_OUT_BLOCK && y < c->height; y++)
         for (int x = x0; x < x0 + SPL_LEFT_OUT_BLOCK && x < c->width; x++) {
             size_t at = (size_t)y * (size_t)c->width + (size_t)x;
             size_t there = (size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx);
-            float sum = 0;
             if (!c->counts[at])
                 continue;
+            int w = c->counts[at] - 1;
+            count[w]++;
             for (size_t k = 0; k < 3; k++) {
                 float d = fminf((float)render[4 * at + k] * factor[k], 255) - (float)photograph[4 * there + k];
-                sum += d * d;
+                sum[w][k] += (double)d;
+                block.squared[w] += (double)(d * d);
             }
-            out[c->counts[at] - 1] += (double)sum;
         }
+    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
+        block.levelled[w] = block.squared[w];
+        for (int k = 0; k < 3; k++)
+            block.levelled[w] -= sum[w][k] * sum[w][k] / fmax(count[w], 1);
+        block.levelled[w] = fmax(block.levelled[w], 0);
+        block.all_levelled += block.levelled[w];
+    }
+    return block;
 }
 
 static void compare_kind(const struct compare *c, int x0, int y0, enum spl_left_out_kind kind, struct spl_left_out *out)
 {
     static const float as_it_is[3] = {1, 1, 1};
     const uint8_t *render = c->images->render[kind]->pixels;
-    double plain[SPL_LEFT_OUT_WIDTHS], moved[SPL_LEFT_OUT_WIDTHS], least = INFINITY;
-    add_block(c, x0, y0, render, as_it_is, 0, 0, plain);
+    struct block plain = add_block(c, x0, y0, render, as_it_is, 0, 0),
+                 matched = add_block(c, x0, y0, render, c->factor, 0, 0);
+    struct block best = matched;
     for (int i = 0; i < SHIFTS * SHIFTS; i++) {
-        int dx = i % SHIFTS - SPL_LEFT_OUT_SHIFT, dy = i / SHIFTS - SPL_LEFT_OUT_SHIFT;
-        add_block(c, x0, y0, render, c->factor, dx, dy, moved);
-        for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
-            if (!dx && !dy)
-                out->squared[w][kind][SPL_LEFT_OUT_MATCHED] = moved[w];
-            if (moved[0] + moved[1] < least)
-                out->squared[w][kind][SPL_LEFT_OUT_REGISTERED] = moved[w];
-        }
-        least = fmin(least, moved[0] + moved[1]);
+        struct block moved =
+            add_block(c, x0, y0, render, c->factor, i % SHIFTS - SPL_LEFT_OUT_SHIFT, i / SHIFTS - SPL_LEFT_OUT_SHIFT);
+        if (moved.all_levelled < best.all_levelled)
+            best = moved;
     }
-    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++)
-        out->squared[w][kind][SPL_LEFT_OUT_PLAIN] = plain[w];
+    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
+        out->squared[w][kind][SPL_LEFT_OUT_PLAIN] = plain.squared[w];
+        out->squared[w][kind][SPL_LEFT_OUT_MATCHED] = matched.squared[w];
+        out->squared[w][kind][SPL_LEFT_OUT_LEVELLED] = matched.levelled[w];
+        out->squared[w][kind][SPL_LEFT_OUT_REGISTERED] = best.levelled[w];
+    }
 }
 
 static void compare_blocks(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct compare *c = context;
+    const double bar = pow(10, SPL_LEFT_OUT_BAR / 10.0);
     (void)worker;
     for (size_t i = begin; i < end; i++) {
         struct spl_left_out *out = &c->blocks[i];
@@ -120,14 +137,14 @@ static void compare_blocks(void *context, size_t begin, size_t end, unsigned wor
                 if (counts)
                     out->pixels[counts - 1]++;
             }
-        if (!(out->pixels[0] + out->pixels[1]))
-            continue;
         for (int kind = 0; kind < SPL_LEFT_OUT_KINDS; kind++)
             compare_kind(c, x0, y0, (enum spl_left_out_kind)kind, out);
-        for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++)
-            if (out->squared[w][SPL_LEFT_OUT_TEXTURED][SPL_LEFT_OUT_MATCHED] >
-                out->squared[w][SPL_LEFT_OUT_COLORED][SPL_LEFT_OUT_MATCHED])
-                out->worse[w] = out->pixels[w];
+        for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
+            double textured = out->squared[w][SPL_LEFT_OUT_TEXTURED][SPL_LEFT_OUT_LEVELLED];
+            double colored = out->squared[w][SPL_LEFT_OUT_COLORED][SPL_LEFT_OUT_LEVELLED];
+            out->worse[w] = textured > colored ? out->pixels[w] : 0;
+            out->good[w] = textured * bar <= colored ? out->pixels[w] : 0;
+        }
     }
 }
 
@@ -136,6 +153,7 @@ void spl_left_out_add(struct spl_left_out *sums, const struct spl_left_out *more
     for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++) {
         sums->pixels[w] += more->pixels[w];
         sums->worse[w] += more->worse[w];
+        sums->good[w] += more->good[w];
         for (int i = 0; i < SPL_LEFT_OUT_KINDS * SPL_LEFT_OUT_STEPS; i++)
             sums->squared[w][i / SPL_LEFT_OUT_STEPS][i % SPL_LEFT_OUT_STEPS] +=
                 more->squared[w][i / SPL_LEFT_OUT_STEPS][i % SPL_LEFT_OUT_STEPS];

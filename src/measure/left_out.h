@@ -7,15 +7,18 @@
 #include "cloud/views.h"
 
 enum {
-    SPL_LEFT_OUT_SHIFT = 2, /* pixels that a block of the photograph is moved by at most, either way */
-    SPL_LEFT_OUT_BLOCK = 16 /* pixels of its side */
+    SPL_LEFT_OUT_SHIFT = 2,  /* pixels that a block of the photograph is moved by at most, either way */
+    SPL_LEFT_OUT_BLOCK = 16, /* pixels of its side */
+    SPL_LEFT_OUT_BAR = 3     /* dB */
 };
 
-enum spl_left_out_width { SPL_LEFT_OUT_NARROW, SPL_LEFT_OUT_WIDE, SPL_LEFT_OUT_WIDTHS }; /* up to 2 pixels; more */
+/* Of the splat that is seen in a pixel: up to 2 pixels, up to 8, more. */
+enum spl_left_out_width { SPL_LEFT_OUT_NARROW, SPL_LEFT_OUT_WIDE, SPL_LEFT_OUT_BROAD, SPL_LEFT_OUT_WIDTHS };
 enum spl_left_out_kind { SPL_LEFT_OUT_COLORED, SPL_LEFT_OUT_TEXTURED, SPL_LEFT_OUT_KINDS };
 enum spl_left_out_step {
     SPL_LEFT_OUT_PLAIN,      /* as they are */
-    SPL_LEFT_OUT_MATCHED,    /* the render times a factor a channel, that makes the means equal */
+    SPL_LEFT_OUT_MATCHED,    /* the render times a factor a channel that makes the means equal */
+    SPL_LEFT_OUT_LEVELLED,   /* and each block's means made equal: what is left is detail */
     SPL_LEFT_OUT_REGISTERED, /* and each block of the photograph where it fits best */
     SPL_LEFT_OUT_STEPS
 };
@@ -23,7 +26,8 @@ enum spl_left_out_step {
 /* Sums over pixels and channels of squared differences, of 255 squared. Sums of several photographs add up. */
 struct spl_left_out {
     uint64_t pixels[SPL_LEFT_OUT_WIDTHS];
-    uint64_t worse[SPL_LEFT_OUT_WIDTHS]; /* of them in blocks where the textured error, matched, is the larger */
+    uint64_t worse[SPL_LEFT_OUT_WIDTHS]; /* of them, in blocks whose textured error, levelled, is the larger */
+    uint64_t good[SPL_LEFT_OUT_WIDTHS];  /* in blocks where it is smaller by SPL_LEFT_OUT_BAR dB or more */
     double squared[SPL_LEFT_OUT_WIDTHS][SPL_LEFT_OUT_KINDS][SPL_LEFT_OUT_STEPS];
 };
 

@@ -74,7 +74,7 @@ static void nothing_compared_is_no_figure(void **state)
     for (int i = 0; i < W * H; i++)
         width_px[i] = NAN;
     struct spl_left_out sums = compare(1);
-    assert_int_equal(sums.pixels[0] + sums.pixels[1], 0);
+    assert_int_equal(sums.pixels[0] + sums.pixels[1] + sums.pixels[2], 0);
     assert_true(isnan(spl_left_out_psnr(&sums, SPL_LEFT_OUT_WIDE, SPL_LEFT_OUT_TEXTURED, SPL_LEFT_OUT_PLAIN)));
 }
 
@@ -89,8 +89,11 @@ static void errors_are_told_apart_by_width(void **state)
     struct spl_left_out sums = compare(1);
     assert_int_equal(sums.pixels[SPL_LEFT_OUT_NARROW], INSIDE / 2);
     assert_int_equal(sums.pixels[SPL_LEFT_OUT_WIDE], INSIDE / 2);
-    for (int w = 0; w < SPL_LEFT_OUT_WIDTHS; w++)
+    for (int w = 0; w < SPL_LEFT_OUT_BROAD; w++) {
         assert_float_equal(sums.squared[w][SPL_LEFT_OUT_COLORED][SPL_LEFT_OUT_PLAIN], 100.0 * INSIDE / 2, 1e-6);
+        assert_float_equal(sums.squared[w][SPL_LEFT_OUT_COLORED][SPL_LEFT_OUT_LEVELLED], 0, 20.0 * INSIDE);
+    }
+    assert_int_equal(sums.pixels[SPL_LEFT_OUT_BROAD], 0);
     assert_float_equal(sums.squared[SPL_LEFT_OUT_NARROW][SPL_LEFT_OUT_TEXTURED][0], 25.0 * INSIDE / 2, 1e-6);
     assert_float_equal(sums.squared[SPL_LEFT_OUT_WIDE][SPL_LEFT_OUT_TEXTURED][0], 0, 1e-6);
     double psnr = spl_left_out_psnr(&sums, SPL_LEFT_OUT_WIDE, SPL_LEFT_OUT_COLORED, SPL_LEFT_OUT_PLAIN);
@@ -134,6 +137,24 @@ static void misplacement_is_told_from_blur(void **state)
     assert_true(misplaced[SPL_LEFT_OUT_REGISTERED] < 0.02 * misplaced[SPL_LEFT_OUT_MATCHED]);
     assert_true(blurred[SPL_LEFT_OUT_REGISTERED] > 0.8 * blurred[SPL_LEFT_OUT_MATCHED]);
     assert_true(sums.worse[SPL_LEFT_OUT_WIDE] > INSIDE / 4);
+}
+
+/* Light that differs from block to block is no detail: levelled it is gone, and nothing is gained or lost. */
+static void light_is_told_from_detail(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4 * W * H; i++)
+        if (i % 4 != 3)
+            render[0][i] = render[1][i] =
+                (uint8_t)(photograph[i] + 30 * ((i / 4 % W / SPL_LEFT_OUT_BLOCK + i / 4 / W / SPL_LEFT_OUT_BLOCK) % 2));
+    for (int i = 0; i < W * H; i++)
+        width_px[i] = 9;
+    const struct spl_left_out sums = compare(1);
+    assert_int_equal(sums.pixels[SPL_LEFT_OUT_BROAD], INSIDE);
+    const double *squared = sums.squared[SPL_LEFT_OUT_BROAD][SPL_LEFT_OUT_TEXTURED];
+    assert_true(squared[SPL_LEFT_OUT_MATCHED] > 100.0 * INSIDE);
+    assert_true(squared[SPL_LEFT_OUT_LEVELLED] < 0.2 * squared[SPL_LEFT_OUT_MATCHED]);
+    assert_int_equal(sums.worse[SPL_LEFT_OUT_BROAD], 0);
 }
 
 static void any_number_of_threads_finds_the_same(void **state)
@@ -192,6 +213,7 @@ int main(void)
         cmocka_unit_test_setup(only_what_the_photograph_shows_counts, fill),
         cmocka_unit_test_setup(a_darker_render_is_matched, fill),
         cmocka_unit_test_setup(misplacement_is_told_from_blur, fill),
+        cmocka_unit_test_setup(light_is_told_from_detail, fill),
         cmocka_unit_test_setup(any_number_of_threads_finds_the_same, fill),
         cmocka_unit_test_setup(the_lens_is_taken_out, fill),
     };
