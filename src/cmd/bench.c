@@ -82,6 +82,7 @@ static void help(void)
         "  --textures FILE [NAME.spld [--cameras MODEL [--images DIR]]] -o OUT\n"
         "  --codings LIST            of training (its chart), D8W4, D12W4, D16W8, adaptive (all); none: NAME.spld alone\n"
         "  --epochs N                rounds of each training (12)\n"
+        "  --sample N                textures that are trained on at most, and others coded (all; D16W8: 196608, once)\n"
         "  --views N                 compared at most, of either kind (8)\n"
         "  --repeats N --size WxH    times each pass is timed, and the size of its frames (9; 1280x720)\n"
         "  --threads N --memory MB --device NAME      (all cores; 2048; auto)\n"

@@ -36,7 +36,7 @@ static int get_size(const char *path, uint32_t *width, uint32_t *height, struct 
 
 struct arguments {
     const char *textures, *dataset, *folder, *cameras, *images, *device;
-    uint64_t epochs, threads, memory_mb, views, rounds;
+    uint64_t epochs, sample, threads, memory_mb, views, rounds;
     uint32_t width, height;
     unsigned runs;
 };
@@ -65,13 +65,19 @@ static int parse_runs(char *text, unsigned *runs, struct spl_error *err)
 
 static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {
-        {"output", required_argument, NULL, 'o'},  {"epochs", required_argument, NULL, 'e'},
-        {"codings", required_argument, NULL, 'C'}, {"threads", required_argument, NULL, 't'},
-        {"memory", required_argument, NULL, 'm'},  {"cameras", required_argument, NULL, 'c'},
-        {"images", required_argument, NULL, 'i'},  {"views", required_argument, NULL, 'v'},
-        {"repeats", required_argument, NULL, 'r'}, {"size", required_argument, NULL, 's'},
-        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
+    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                            {"epochs", required_argument, NULL, 'e'},
+                                            {"codings", required_argument, NULL, 'C'},
+                                            {"sample", required_argument, NULL, 'S'},
+                                            {"threads", required_argument, NULL, 't'},
+                                            {"memory", required_argument, NULL, 'm'},
+                                            {"cameras", required_argument, NULL, 'c'},
+                                            {"images", required_argument, NULL, 'i'},
+                                            {"views", required_argument, NULL, 'v'},
+                                            {"repeats", required_argument, NULL, 'r'},
+                                            {"size", required_argument, NULL, 's'},
+                                            {"device", required_argument, NULL, 'd'},
+                                            {NULL, 0, NULL, 0}};
     int option, rc = 0;
     *a = (struct arguments){.epochs = 12,
                             .memory_mb = 2048,
@@ -87,6 +93,9 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
             break;
         case 'e':
             rc = spl_cmd_parse_count("--epochs", optarg, 1, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
+            break;
+        case 'S':
+            rc = spl_cmd_parse_count("--sample", optarg, 1, UINT64_MAX, &a->sample, err);
             break;
         case 'C':
             rc = parse_runs(optarg, &a->runs, err);
@@ -199,6 +208,7 @@ int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err)
                                              .projected = b->a.cameras ? &b->projected : NULL,
                                              .epochs = (uint32_t)b->a.epochs,
                                              .runs = b->a.runs,
+                                             .sample = b->a.sample,
                                              .memory_bytes = b->a.memory_mb << 20,
                                              .seed = 1,
                                              .threads = (unsigned)b->a.threads,

@@ -172,7 +172,7 @@ void spl_cmd_print_textures(const struct spl_textures_report *report, const stru
         print_row(report, &report->row[i], whole);
     for (uint32_t i = 0; i < report->rows; i++)
         if (report->row[i].sample)
-            printf("%s: one round of training over %llu of the textures, measured on others\n", report->row[i].name,
+            printf("%s: trained on %llu of the textures, measured on others\n", report->row[i].name,
                    (unsigned long long)report->row[i].sample);
     if (*report->left_away)
         printf("left away, %s\n", report->left_away);

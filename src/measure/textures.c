@@ -164,6 +164,15 @@ static struct spl_texture_source thin(struct thinned *t)
                                        .context = t};
 }
 
+/* So that every so-manieth texture is no more than are trained on. */
+static uint64_t find_stride(const struct spl_textures_options *o, uint32_t atoms)
+{
+    uint64_t most = o->sample ? o->sample : UINT64_MAX;
+    if (atoms > large_atoms && most > large_trained)
+        most = large_trained;
+    return most < o->source->count ? (o->source->count + most - 1) / most : 1;
+}
+
 /* One row: a dictionary of at most `atoms`, and what coding with it gives. Large dictionaries are trained on some of
  * the textures and measured on some of the others: without a Gram matrix each step multiplies with all atoms. */
 static int measure_coding(const struct spl_textures_options *o, struct spl_textures_report *report, const char *name,
@@ -173,11 +182,11 @@ static int measure_coding(const struct spl_textures_options *o, struct spl_textu
     struct spl_dictionary dictionary = {0};
     struct spl_coder *coder = NULL;
     struct spl_code_sums sums = {0};
-    uint64_t begin_ns = spl_now_ns(), used = 0;
-    uint64_t every = o->source->count / (o->sample ? o->sample : large_trained) + 1;
-    uint64_t coded_every = (o->source->count / every / large_coded + 1) * every;
-    bool some = atoms > large_atoms && every > 1;
-    struct thinned train_on = {o->source, some ? every : 1, 0}, measure_on = {o->source, some ? coded_every : 1, some};
+    uint64_t begin_ns = spl_now_ns(), used = 0, every = find_stride(o, atoms), coded_every = every;
+    bool some = every > 1;
+    if (some && atoms > large_atoms)
+        coded_every *= o->source->count / every / large_coded + 1;
+    struct thinned train_on = {o->source, every, 0}, measure_on = {o->source, coded_every, some};
     struct spl_texture_source trained = thin(&train_on), coded = thin(&measure_on);
     const struct spl_code_settings settings = {
         .atoms = SPL_ATOMS_MAX, .psnr = lambda > 0 ? 0 : (float)cut_off, .lambda = lambda, .weight_bits = weight_bits};
@@ -334,11 +343,14 @@ static int measure_trainings(const struct spl_textures_options *o, struct spl_te
     struct watch ksvd = {o, "k-SVD", report->ksvd, &report->ksvd_epochs};
     struct watch batches = {o, "mini-batches", report->batches, &report->batches_epochs};
     struct spl_dictionary dictionary = {0};
+    struct thinned train_on = {o->source, find_stride(o, compared_atoms), 0};
+    struct spl_texture_source thinned = thin(&train_on);
+    const struct spl_texture_source *trained = train_on.stride > 1 ? &thinned : o->source;
     report->dictionary = compared_atoms;
-    int rc = train(o, o->source, &batches, SPL_TRAIN_BATCHES, compared_atoms, 0, &dictionary, err);
+    int rc = train(o, trained, &batches, SPL_TRAIN_BATCHES, compared_atoms, 0, &dictionary, err);
     spl_dictionary_finish(&dictionary);
     if (!rc)
-        rc = train(o, o->source, &ksvd, SPL_TRAIN_KSVD, compared_atoms, 0, &dictionary, err);
+        rc = train(o, trained, &ksvd, SPL_TRAIN_KSVD, compared_atoms, 0, &dictionary, err);
     spl_dictionary_finish(&dictionary);
     return rc;
 }

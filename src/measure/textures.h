@@ -28,7 +28,8 @@ struct spl_textures_options {
     const struct spl_projected_report *projected; /* rows of photographs; may be NULL */
     uint32_t epochs;                              /* of each training, 1..SPL_TEXTURES_EPOCHS_MAX */
     unsigned runs;                                /* bit per enum spl_textures_runs; 0: what needs none */
-    uint64_t sample; /* textures that more than 16384 atoms are trained on, in one round; 0 = 196608 */
+    uint64_t sample; /* textures that are trained on at most, others being measured; 0 = all, but 196608 in one round
+                        for more than 16384 atoms */
     uint64_t memory_bytes, seed;
     unsigned threads;
     void (*progress)(void *context, const char *what, const struct spl_train_progress *epoch); /* may be NULL */

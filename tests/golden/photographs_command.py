@@ -206,6 +206,7 @@ with tempfile.TemporaryDirectory() as folder:
                                "--repeats", "1", "--size", "16x9"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
     not_measured("no textures", "wall.spld")
+    not_measured("--sample", "images/kept", "--sample", "0")
     not_measured("not 'D9'", "images/kept", "--codings", "D8W4,D9")
     not_measured("NAME.spld, which is missing", "images/kept", "--cameras", "views.json")
     not_measured("--cameras MODEL", "images/kept", "wall.spld", "--images", "images")

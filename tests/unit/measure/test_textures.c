@@ -229,11 +229,13 @@ static void test_measure(void **state)
     assert_int_equal(spl_textures_chart_training(&report, &svg, &length, &err), 0);
     assert_non_null(strstr(svg, "k-SVD"));
     free(svg);
-    o.runs = SPL_TEXTURES_RUN_D16W8; /* every third texture is trained on, all of the next ones are coded */
+    o.runs = SPL_TEXTURES_RUN_D16W8 |
+             SPL_TEXTURES_RUN_D8W4; /* every third texture is trained on, all of the next ones are coded */
     o.sample = 500;
     assert_int_equal(spl_textures_measure(&o, &report, &err), 0);
     large = find_row(&report, "paper D16W8");
     assert_int_equal(large->sample, 400);
+    assert_int_equal(find_row(&report, "paper D8W4")->sample, 400);
     assert_true(large->count <= 400 && large->psnr > colors->psnr + 3);
     assert_true(fabs(large->codes - large->atoms * 3 / 2) < 1e-9); /* of all splats, not of those that were coded */
     o.runs = 0;                                                    /* no codings, and none of photographs */
