@@ -3,7 +3,8 @@
  * trusted without a look is only the pages' codes, and any code decodes to finite numbers.
  *
  * Pages are read from the file when they are wanted, with their checksum, so that a file which is cut or overwritten in
- * place while it is served is an error of that page and never a SIGBUS; only spl_dataset_get_page() looks through a map. */
+ * place while it is served is an error of that page and never a SIGBUS; only spl_dataset_get_page() looks through a
+ * map. */
 #include "dataset/dataset.h"
 
 #include <errno.h>
@@ -113,6 +114,7 @@ void spl_dataset_close(struct spl_dataset *dataset)
     free(dataset->chunks);
     free(dataset->textures);
     free(dataset->atoms);
+    spl_dictionary_finish(&dataset->dictionary);
     free(dataset->chunk_textures);
     free(dataset->sections);
     free(dataset->pages);
@@ -227,11 +229,11 @@ int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t w
 const char *spl_attribute_name(enum spl_attribute attribute)
 {
     static const char *const names[SPL_ATTRIBUTE_COUNT] = {
-        [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
-        [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
-        [SPL_ATTRIBUTE_CLASS] = "class",       [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
-        [SPL_ATTRIBUTE_LINEAR] = "linear",     [SPL_ATTRIBUTE_CLIP] = "clip",
-        [SPL_ATTRIBUTE_CHUNK] = "chunk",       [SPL_ATTRIBUTE_TEXTURE] = "texture",
+        [SPL_ATTRIBUTE_POSITION] = "position",     [SPL_ATTRIBUTE_RADIUS] = "radius",
+        [SPL_ATTRIBUTE_NORMAL] = "normal",         [SPL_ATTRIBUTE_COLOR] = "color",
+        [SPL_ATTRIBUTE_CLASS] = "class",           [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
+        [SPL_ATTRIBUTE_LINEAR] = "linear",         [SPL_ATTRIBUTE_CLIP] = "clip",
+        [SPL_ATTRIBUTE_CHUNK] = "chunk",           [SPL_ATTRIBUTE_TEXTURE] = "texture",
         [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return names[attribute];

@@ -9,56 +9,57 @@
 
 #define SPL_FILE_MAGIC "SPLD\r\n\x1a\n"
 #define SPL_FILE_VERSION 1u
-#define SPL_FILE_ALIGNMENT 65536u        /* of pages; other sections start on 64 bytes */
-#define SPL_PAGE_BYTES (16u << 20)       /* target; a page is at most SPL_PAGE_BYTES_MAX */
+#define SPL_FILE_ALIGNMENT 65536u  /* of pages; other sections start on 64 bytes */
+#define SPL_PAGE_BYTES (16u << 20) /* target; a page is at most SPL_PAGE_BYTES_MAX */
 #define SPL_PAGE_BYTES_MAX (64u << 20)
 #define SPL_NODE_CHUNKS_MAX 4096u
 
-struct spl_file_header {          /* at offset 0 */
+struct spl_file_header { /* at offset 0 */
     char magic[8];
     uint32_t version;
-    uint32_t header_bytes;        /* sizeof(struct spl_file_header) */
+    uint32_t header_bytes; /* sizeof(struct spl_file_header) */
     uint64_t file_bytes;
-    uint64_t table_offset;        /* section table */
+    uint64_t table_offset; /* section table */
     uint32_t section_count;
-    uint32_t reserved;            /* 0 */
-    uint64_t table_hash;          /* XXH3-64 of the section table */
-    uint64_t header_hash;         /* XXH3-64 of the bytes before this field */
+    uint32_t reserved;    /* 0 */
+    uint64_t table_hash;  /* XXH3-64 of the section table */
+    uint64_t header_hash; /* XXH3-64 of the bytes before this field */
 };
 
 #define SPL_FOURCC(a, b, c, d) ((uint32_t)(a) | (uint32_t)(b) << 8 | (uint32_t)(c) << 16 | (uint32_t)(d) << 24)
-#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')  /* JSON: sources, counts, statistics, default view */
-#define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E') /* struct spl_node[], breadth first, node 0 is the root */
+#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')   /* JSON: sources, counts, statistics, default view */
+#define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E')  /* struct spl_node[], breadth first, node 0 is the root */
 #define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* struct spl_chunk[] */
-#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')  /* chunk data; `index` is the page's number */
+#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
-#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')    /* struct spl_atoms_header, scales, texels */
+#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, scales, texels */
 #define SPL_SECTION_CHUNK_TEXTURES SPL_FOURCC('C', 'T', 'E', 'X') /* uint32_t[chunks], see below */
-#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's number */
+#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's number  \
+                                                             */
 
 struct spl_section {
     uint32_t type;
-    uint32_t index;               /* number among the sections of its type */
+    uint32_t index; /* number among the sections of its type */
     uint64_t offset, bytes;
-    uint64_t hash;                /* XXH3-64 of the section's bytes */
+    uint64_t hash; /* XXH3-64 of the section's bytes */
 };
 
 /* An octree node: splats that represent its cube at the node's spacing. A leaf holds the originals. A cut through the
  * tree (each leaf under exactly one drawn node) represents everything. */
 struct spl_node {
-    double origin[3];             /* least corner of the cube, world */
-    float size;                   /* edge of the cube */
-    float spacing;                /* median distance of neighbouring splats, metres: median radius / SPL_RADIUS_SPACING */
+    double origin[3]; /* least corner of the cube, world */
+    float size;       /* edge of the cube */
+    float spacing;    /* median distance of neighbouring splats, metres: median radius / SPL_RADIUS_SPACING */
     float box_min[3], box_max[3]; /* of its splats' and all descendants' discs, relative to origin */
     uint32_t first_child;         /* children are consecutive; 0 and count 0 for a leaf */
     uint32_t child_count;         /* 0..8 */
     uint32_t first_chunk, chunk_count;
-    uint32_t page;                /* all chunks of a node lie in one page */
-    uint32_t depth;               /* root = 0 */
+    uint32_t page;  /* all chunks of a node lie in one page */
+    uint32_t depth; /* root = 0 */
 };
 
-/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number of
- * splats with a clip line 16..23. */
+/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number
+ * of splats with a clip line 16..23. */
 #define SPL_EXTRA_CLASS 0
 #define SPL_EXTRA_UNCERTAINTY 4
 #define SPL_EXTRA_CLASS_BASE 8
@@ -72,26 +73,26 @@ struct spl_node {
  * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
  * the other from the low bits up. */
 struct spl_chunk {
-    float origin[3];              /* relative to the node's origin; position = origin + step * code */
+    float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;
     float radius_min, radius_step;
-    float radius_mean;            /* of the chunk's splats: what level selection and prune-and-scale use */
+    float radius_mean; /* of the chunk's splats: what level selection and prune-and-scale use */
     float normal_u, normal_v, normal_step;
-    uint32_t geometry_word;       /* in the node's page, 32-bit words; the other streams follow in order */
-    uint32_t geometry_bits;       /* as in shared.h */
-    uint32_t color_bits;          /* as in shared.h */
+    uint32_t geometry_word; /* in the node's page, 32-bit words; the other streams follow in order */
+    uint32_t geometry_bits; /* as in shared.h */
+    uint32_t color_bits;    /* as in shared.h */
     uint32_t color_base;
-    uint32_t extra_bits;          /* SPL_EXTRA_* */
-    float uncertainty_max;        /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
-    uint32_t first_id;            /* dataset-wide index of its first splat */
+    uint32_t extra_bits;   /* SPL_EXTRA_* */
+    float uncertainty_max; /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
+    uint32_t first_id;     /* dataset-wide index of its first splat */
     uint32_t count;
 };
 
-/* ATOM: this header, then float scale[count], int8_t texels[count][3][size][size]. */
+/* ATOM: this header, then the stream of atoms.h. */
 struct spl_atoms_header {
-    uint32_t count;               /* 1..SPL_DICTIONARY_MAX, and such that the expanded dictionary fits a binding */
-    uint32_t size;                /* of a texture's side: 8, 16 or 32 */
-    uint32_t reserved[2];         /* 0 */
+    uint32_t count;       /* 1..SPL_DICTIONARY_MAX, and such that the expanded dictionary fits a binding */
+    uint32_t size;        /* of a texture's side: 8, 16 or 32 */
+    uint32_t reserved[2]; /* 0 */
 };
 
 /* CTEX is a uint32_t for each chunk, TEXP words that they name: SPL_CHUNK_TEXTURE_*, SPL_TEXTURE_* of shared.h. */

@@ -27,7 +27,7 @@ struct spl_dataset {
     struct spl_node *nodes;
     struct spl_chunk *chunks;
     const struct spl_section **textures; /* by page; all NULL where there are none */
-    void *atoms;                         /* section ATOM, which `dictionary` points into */
+    void *atoms;                         /* section ATOM, which `dictionary` is read from */
     struct spl_dictionary dictionary;    /* count 0 = no textures */
     uint32_t *chunk_textures;            /* by chunk; NULL = no textures */
     json_t *meta;
@@ -44,8 +44,8 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 /* Header, section table, extents and checksums; fills everything up to `chunks` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);
 
-/* Checks ATOM and CTEX in themselves, and that each page has its TEXP, and fills `dictionary` and info; with no section of
- * these kinds it does nothing. */
+/* Checks ATOM and CTEX in themselves, and that each page has its TEXP, and fills `dictionary` and info; with no section
+ * of these kinds it does nothing. */
 int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *err);
 
 /* Reads every TEXP and holds each code against dictionary and chunks; for a verified dataset. Blocks on disk. */

@@ -3,15 +3,16 @@
  * dataset, at each reading of another. Opening on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "dataset/atoms.h"
 #include "dataset/dictionary.h"
 #include "dataset/open.h"
 #include "dataset/texture.h"
+#include "sparse/atom.h"
 
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *what)
 {
@@ -34,19 +35,15 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
     if (!header->count || header->count > SPL_DICTIONARY_MAX ||
         spl_dictionary_expanded_bytes(header->count, header->size) > SPL_DICTIONARY_BYTES_MAX)
         return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
-    uint64_t scales = header->count * sizeof(float),
-             texels = (uint64_t)header->count * spl_texture_values(header->size);
-    if (bytes != sizeof *header + scales + texels)
-        return wrong(dataset, err, "ATOM", "has a size that is not its atoms'");
-    dataset->dictionary = (struct spl_dictionary){
-        .count = header->count,
-        .size = header->size,
-        .scale = (float *)(void *)((char *)dataset->atoms + sizeof *header),
-        .texels = (int8_t *)dataset->atoms + sizeof *header + scales,
-    };
-    for (uint32_t i = 0; i < header->count; i++)
-        if (!(dataset->dictionary.scale[i] >= 0 && isfinite(dataset->dictionary.scale[i])))
-            return wrong(dataset, err, "ATOM", "has a scale that is negative or not finite");
+    if (8 * (bytes - sizeof *header) < 12 * (uint64_t)header->count)
+        return wrong(dataset, err, "ATOM", "ends before its atoms do");
+    int rc = spl_dictionary_init(&dataset->dictionary, header->count, header->size, err);
+    if (rc)
+        return rc;
+    const char *what =
+        spl_atoms_read((const uint8_t *)dataset->atoms + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
+    if (what)
+        return wrong(dataset, err, "ATOM", what);
     if (dataset->chunk_textures_section->bytes != info->chunks * sizeof(uint32_t))
         return wrong(dataset, err, "CTEX", "has not one word for each chunk");
     info->atoms = header->count;

@@ -16,6 +16,7 @@
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "dataset/atoms.h"
 #include "dataset/dictionary.h"
 
 enum { section_alignment = 64 };
@@ -283,14 +284,14 @@ static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count,
 {
     const struct spl_dictionary *from = writer->dictionary;
     struct spl_atoms_header header = {.count = from->count, .size = from->size};
-    size_t scales = from->count * sizeof *from->scale, texels = (size_t)from->count * spl_texture_values(from->size);
-    char *bytes = spl_alloc_raw(sizeof header + scales + texels, 1, err);
+    spl_assert(from->coefficients);
+    size_t stream = spl_atoms_write(from, NULL);
+    uint8_t *bytes = spl_alloc_raw(sizeof header + stream, 1, err);
     if (!bytes)
         return SPL_E_NOMEM;
     memcpy(bytes, &header, sizeof header);
-    memcpy(bytes + sizeof header, from->scale, scales);
-    memcpy(bytes + sizeof header + scales, from->texels, texels);
-    int rc = add_section(writer, SPL_SECTION_ATOMS, 0, bytes, sizeof header + scales + texels, err);
+    spl_atoms_write(from, bytes + sizeof header);
+    int rc = add_section(writer, SPL_SECTION_ATOMS, 0, bytes, sizeof header + stream, err);
     free(bytes);
     spl_assert(writer->chunk_textures.used == chunk_count);
     return rc ? rc

@@ -13,6 +13,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "dataset/atoms.h"
 #include "sparse/code.h"
 
 enum {
@@ -205,10 +206,11 @@ static int measure_coding(const struct spl_textures_options *o, struct spl_textu
         row->shares[k] = (double)sums.histogram[k] / (double)sums.splats;
     }
     double splats = (double)o->origin->splats, texels = (double)dictionary.count * spl_texture_values(dictionary.size);
+    double stored = (double)spl_atoms_write(&dictionary, NULL);
     double bits = lambda > 0 ? (double)sums.bits : (double)used * (log2(atoms) + weight_bits);
     row->color = lambda > 0 ? find_color_bytes(o) : 3;
     row->codes = bits / 8 / (double)sums.splats * (double)o->source->count / splats;
-    row->shared = (texels + (lambda > 0 ? 4.0 * dictionary.count : 0)) / splats;
+    row->shared = (lambda > 0 ? stored : texels) / splats;
     row->psnr = to_psnr(sums.squared_error, (double)sums.values);
     row->atoms = (double)used / (double)sums.splats;
     row->count = dictionary.count;

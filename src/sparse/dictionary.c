@@ -10,6 +10,7 @@ void spl_dictionary_finish(struct spl_dictionary *dictionary)
 {
     free(dictionary->scale);
     free(dictionary->texels);
+    free(dictionary->coefficients);
     *dictionary = (struct spl_dictionary){0};
 }
 

@@ -1,4 +1,4 @@
-/* The atoms that all textures of a dataset are sums of, as they are stored: 8 bit texels and a scale an atom.
+/* The atoms that all textures of a dataset are sums of, as they are drawn: 8 bit texels and a scale an atom.
  *
  * A texture is size × size colours in sRGB as photographs store them, one byte a channel, channel-planar: the R plane
  * row by row, then G, then B; n = 3·size² values. Its mean colour is kept apart (it is the splat's colour), so atoms
@@ -21,9 +21,10 @@ enum {
 /* Atom a is scale[a] · texels[a·n …], of norm 1 up to rounding. Sorted by use, the most used first, so that planes of
  * common atoms need narrow indices. count may be 0: then all textures are plain. */
 struct spl_dictionary {
-    uint32_t count, size; /* size: 1..SPL_TEXTURE_SIZE_MAX */
-    float *scale;         /* [count] */
-    int8_t *texels;       /* [count][3][size][size], -127..127 */
+    uint32_t count, size;  /* size: 1..SPL_TEXTURE_SIZE_MAX */
+    float *scale;          /* [count] */
+    int8_t *texels;        /* [count][3][size][size], -127..127 */
+    int16_t *coefficients; /* [count][3·size²], atom.h: what a file holds; NULL where it is for none */
 };
 
 static inline uint32_t spl_texture_values(uint32_t size)

@@ -211,12 +211,13 @@ int spl_training_init(struct spl_training *t, const struct spl_texture_source *s
     t->history = spl_alloc(k, sizeof(double), err);
     t->uses = spl_alloc(k, sizeof(uint64_t), err);
     t->benefit = spl_alloc(k, sizeof(double), err);
+    t->power = spl_alloc(k, sizeof(double), err);
     t->row = spl_alloc(t->batch, sizeof *t->row, err);
     t->residual = spl_alloc_raw(t->batch * m, sizeof(float), err);
     t->user = spl_alloc_raw(t->batch * settings->atoms, sizeof *t->user, err);
     t->first_user = spl_alloc_raw(k + 1, sizeof *t->first_user, err);
     if (!t->y || !t->norm || !t->error || !t->atoms || !t->next || (gram && !t->gram) || !t->history || !t->uses ||
-        !t->benefit || !t->row || !t->residual || !t->user || !t->first_user)
+        !t->benefit || !t->power || !t->row || !t->residual || !t->user || !t->first_user)
         goto done;
     rc = read_sample(t, &reader, err);
 done:
@@ -236,6 +237,7 @@ void spl_training_finish(struct spl_training *t)
     free(t->history);
     free(t->uses);
     free(t->benefit);
+    free(t->power);
     free(t->row);
     free(t->residual);
     free(t->user);

@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "sparse/atom.h"
 #include "sparse/blas.h"
 #include "sparse/training.h"
 
@@ -41,6 +42,7 @@ static int epoch(struct spl_training *t, struct spl_error *err)
     t->epoch_weights = 0;
     memset(t->uses, 0, t->count * sizeof *t->uses);
     memset(t->benefit, 0, t->count * sizeof *t->benefit);
+    memset(t->power, 0, t->count * sizeof *t->power);
     for (size_t first = 0; first < t->sample; first += t->batch) {
         size_t count = t->sample - first < t->batch ? t->sample - first : t->batch;
         int rc = spl_training_code(t, first, count, err);
@@ -55,7 +57,9 @@ static int epoch(struct spl_training *t, struct spl_error *err)
 static double cost(const struct spl_training *t)
 {
     double sample = (double)t->sample, price = (double)spl_training_price(t);
-    double dictionary = (double)t->settings->lambda * t->count * (8.0 * t->n + 32) / (double)t->population;
+    double dictionary = 0;
+    for (uint32_t a = 0; a < t->count && t->settings->lambda > 0; a++)
+        dictionary += (double)t->settings->lambda * spl_training_atom_bits(t, a) / (double)t->population;
     return t->epoch_error / sample + price * (double)t->epoch_weights / sample + dictionary;
 }
 
@@ -103,6 +107,25 @@ static int run(struct spl_training *t, uint64_t begin_ns, spl_train_report *repo
     return 0;
 }
 
+float spl_training_step(const struct spl_training *t, uint32_t a)
+{
+    const double finest = 0.002, coarsest = 0.1; /* of an atom's norm */
+    double power = t->power[a] * (double)t->population / (double)t->sample;
+    double step =
+        t->settings->lambda > 0 && power > 0 ? sqrt(6 / log(2) * (double)t->settings->lambda / power) : finest;
+    return (float)fmin(fmax(step, finest), coarsest);
+}
+
+double spl_training_atom_bits(const struct spl_training *t, uint32_t a)
+{
+    double bits = 12, step = (double)spl_training_step(t, a);
+    for (uint32_t k = 0; k < t->m; k++) {
+        double steps = fabs((double)t->atoms[(size_t)a * t->m + k]) / step;
+        bits += steps > 0.5 ? 2.5 + log2(steps) : 1;
+    }
+    return bits;
+}
+
 struct used {
     uint64_t uses;
     uint32_t atom;
@@ -116,33 +139,16 @@ static int by_use(const void *a, const void *b)
     return x->atom < y->atom ? -1 : x->atom > y->atom;
 }
 
-/* Texels of norm 1 / scale, rounded. Returns false for an atom of nothing. */
-static bool round_atom(const float *atom, uint32_t n, int8_t *texels, float *scale)
-{
-    float largest = 0;
-    int64_t squares = 0;
-    for (uint32_t i = 0; i < n; i++)
-        largest = fmaxf(largest, fabsf(atom[i]));
-    if (!(largest > 0))
-        return false;
-    for (uint32_t i = 0; i < n; i++) {
-        texels[i] = (int8_t)lrintf(atom[i] * (127 / largest));
-        squares += texels[i] * texels[i];
-    }
-    *scale = (float)(1 / sqrt((double)squares));
-    return true;
-}
-
 static int finish_atoms(const struct spl_training *t, uint32_t size, struct spl_dictionary *out, struct spl_error *err)
 {
     struct used *order = spl_alloc_raw(t->count, sizeof *order, err);
     float *whole = spl_alloc_raw(t->n, sizeof *whole, err);
     int rc = SPL_E_NOMEM;
-    out->size = size;
-    out->scale = spl_alloc_raw(t->count, sizeof *out->scale, err);
-    out->texels = spl_alloc_raw((size_t)t->count * t->n, 1, err);
-    if (!order || !whole || !out->scale || !out->texels)
+    struct spl_waves waves;
+    if (!order || !whole || spl_dictionary_init(out, t->count, size, err))
         goto done;
+    out->count = 0;
+    spl_waves_init(&waves, size);
     for (uint32_t a = 0; a < t->count; a++)
         order[a] = (struct used){t->uses[a], a};
     qsort(order, t->count, sizeof *order, by_use);
@@ -150,8 +156,10 @@ static int finish_atoms(const struct spl_training *t, uint32_t size, struct spl_
         const float *atom = t->atoms + (size_t)order[i].atom * t->m;
         if (t->basis)
             spl_blas_apply_transposed(t->m, t->n, t->basis, atom, whole);
+        int16_t *coefficient = out->coefficients + (size_t)out->count * t->n;
+        spl_waves_analyse(&waves, t->basis ? whole : atom, spl_training_step(t, order[i].atom), coefficient);
         if (order[i].uses &&
-            round_atom(t->basis ? whole : atom, t->n, out->texels + (size_t)out->count * t->n, &out->scale[out->count]))
+            spl_waves_synthesise(&waves, coefficient, out->texels + (size_t)out->count * t->n, &out->scale[out->count]))
             out->count++;
     }
     rc = 0;

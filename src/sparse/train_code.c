@@ -174,6 +174,7 @@ int spl_training_code(struct spl_training *t, size_t first, size_t count, struct
         for (uint32_t k = 0; k < t->row[i].count; k++) {
             t->uses[t->row[i].atom[k]]++;
             t->benefit[t->row[i].atom[k]] += t->row[i].margin[k];
+            t->power[t->row[i].atom[k]] += (double)t->row[i].weight[k] * (double)t->row[i].weight[k];
         }
     }
     return 0;

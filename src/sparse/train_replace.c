@@ -80,11 +80,11 @@ static int by_benefit(const void *a, const void *b)
 /* Marks in `gone` the atoms that save less than they cost, a quarter of all at most. */
 static void mark_unearned(const struct spl_training *t, bool *gone, struct ranked *ranked)
 {
-    double scale = (double)t->population / (double)t->sample, price = (double)t->settings->lambda * (8.0 * t->n + 32);
+    double scale = (double)t->population / (double)t->sample, lambda = (double)t->settings->lambda;
     for (uint32_t a = 0; a < t->count; a++)
-        ranked[a] = (struct ranked){scale * t->benefit[a], a};
+        ranked[a] = (struct ranked){scale * t->benefit[a] - lambda * spl_training_atom_bits(t, a), a};
     qsort(ranked, t->count, sizeof *ranked, by_benefit);
-    for (uint32_t i = 0; i < (t->count + 3) / 4 && ranked[i].benefit < price; i++)
+    for (uint32_t i = 0; i < (t->count + 3) / 4 && ranked[i].benefit < 0; i++)
         gone[ranked[i].atom] = true;
 }
 
@@ -113,6 +113,7 @@ int spl_training_replace(struct spl_training *t, bool drop, uint32_t *dropped, s
             continue;
         memmove(t->atoms + (size_t)kept * t->m, t->atoms + (size_t)a * t->m, t->m * sizeof(float));
         t->history[kept] = t->history[a];
+        t->power[kept] = t->power[a];
         t->uses[kept++] = t->uses[a];
     }
     *dropped = t->count - kept;

@@ -9,6 +9,7 @@
 
 #include "dataset/dataset.h"
 #include "dataset/retexture.h"
+#include "sparse/atom.h"
 #include "support/make_dataset.h"
 
 static uint32_t hash(uint32_t a, uint32_t b)
@@ -27,14 +28,15 @@ static double unit(uint32_t a, uint32_t b)
 struct spl_dictionary make_dictionary(uint32_t count, uint32_t size, uint32_t seed)
 {
     uint32_t plane = size * size, n = 3 * plane;
-    struct spl_dictionary d = {.count = count, .size = size};
-    d.scale = malloc(count * sizeof *d.scale);
-    d.texels = malloc((size_t)count * n);
+    struct spl_dictionary d;
+    struct spl_waves waves;
     double *value = malloc(n * sizeof *value);
-    spl_assert(d.scale && d.texels && value);
+    float *atom = malloc(n * sizeof *atom);
+    spl_assert(!spl_dictionary_init(&d, count, size, NULL) && value && atom);
+    spl_waves_init(&waves, size);
     for (uint32_t a = 0; a < count; a++) {
         uint32_t key = hash(seed, a);
-        double angle = 6.2831853 * unit(key, 1), wave = 1 + 5 * unit(key, 2) * unit(key, 3), square = 0, largest = 0;
+        double angle = 6.2831853 * unit(key, 1), wave = 1 + 5 * unit(key, 2) * unit(key, 3), square = 0;
         for (uint32_t c = 0; c < 3; c++) {
             double mean = 0, share = 0.4 + unit(key, 4 + c), phase = unit(key, 8) + 0.2 * unit(key, 9 + c);
             for (uint32_t i = 0; i < plane; i++) {
@@ -45,15 +47,16 @@ struct spl_dictionary make_dictionary(uint32_t count, uint32_t size, uint32_t se
             for (uint32_t i = 0; i < plane; i++)
                 value[c * plane + i] -= mean / plane;
         }
-        for (uint32_t i = 0; i < n; i++) {
-            square += value[i] * value[i];
-            largest = fmax(largest, fabs(value[i]));
-        }
-        d.scale[a] = (float)(largest / 127 / sqrt(square));
         for (uint32_t i = 0; i < n; i++)
-            d.texels[(size_t)a * n + i] = (int8_t)lround(value[i] / largest * 127);
+            square += value[i] * value[i];
+        for (uint32_t i = 0; i < n; i++)
+            atom[i] = (float)(value[i] / sqrt(square));
+        int16_t *coefficient = d.coefficients + (size_t)a * n;
+        spl_waves_analyse(&waves, atom, 0.01f, coefficient);
+        spl_assert(spl_waves_synthesise(&waves, coefficient, d.texels + (size_t)a * n, &d.scale[a]));
     }
     free(value);
+    free(atom);
     return d;
 }
 

@@ -13,10 +13,12 @@
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "dataset/atoms.h"
 #include "dataset/dictionary.h"
 #include "dataset/retexture.h"
 #include "dataset/texture.h"
 #include "geom/tangent.h"
+#include "sparse/atom.h"
 #include "support/make_dataset.h"
 #include "support/make_textures.h"
 
@@ -117,6 +119,64 @@ static void test_judge(void **state)
     words[0] &= 0xffff; /* the first plane's mask: bits 16 to 144 */
     words[1] = words[2] = words[3] = words[4] = 0;
     assert_non_null(strstr(spl_texture_judge(words, used, 2, 40, 32), "a plane without atoms"));
+}
+
+/* A dictionary comes back as it was; atoms are what they were made of up to the step of their coefficients; no cut or
+ * changed stream leads out of its bytes. */
+static void test_atoms(void **state)
+{
+    (void)state;
+    static const uint32_t sizes[] = {8, 16, 32};
+    for (int i = 0; i < 3; i++) {
+        struct spl_dictionary d = make_dictionary(40, sizes[i], 7), back;
+        uint32_t n = spl_texture_values(sizes[i]), random = 1;
+        d.coefficients[3] = INT16_MAX; /* of the coarsest waves, one after the other */
+        d.coefficients[n + 4] = -INT16_MAX;
+        d.coefficients[3 * n - 1] = -1; /* the finest of atom 2 */
+        size_t bytes = spl_atoms_write(&d, NULL);
+        uint8_t *stream = malloc(bytes), *damaged = malloc(bytes);
+        assert_int_equal(spl_atoms_write(&d, stream), bytes);
+        assert_true(bytes % 4 == 0 && bytes < 40 * (size_t)n);
+        assert_int_equal(spl_dictionary_init(&back, 40, sizes[i], NULL), SPL_OK);
+        assert_null(spl_atoms_read(stream, bytes, &back));
+        assert_memory_equal(back.coefficients, d.coefficients, 40 * n * sizeof *d.coefficients);
+        assert_memory_equal(back.texels + 3 * n, d.texels + 3 * n, 37 * n); /* the first were changed */
+        assert_memory_equal(back.scale + 3, d.scale + 3, 37 * sizeof *d.scale);
+        assert_string_equal(spl_atoms_read(stream, bytes - 4, &back), "ends before its atoms do");
+        for (int flip = 0; flip < 200; flip++) {
+            random = random * 1664525u + 1013904223u;
+            memcpy(damaged, stream, bytes);
+            damaged[random % bytes] ^= (uint8_t)(1 << (random >> 29));
+            spl_atoms_read(damaged, bytes, &back);
+        }
+        memset(damaged, 0xff, bytes);
+        assert_non_null(spl_atoms_read(damaged, bytes, &back));
+        free(stream);
+        free(damaged);
+        spl_dictionary_finish(&d);
+        spl_dictionary_finish(&back);
+
+        struct spl_waves waves;
+        float atom[SPL_TEXTURE_VALUES_MAX], scale, off = 0, length = 0;
+        int16_t coefficient[SPL_TEXTURE_VALUES_MAX];
+        int8_t texels[SPL_TEXTURE_VALUES_MAX];
+        spl_waves_init(&waves, sizes[i]);
+        for (uint32_t k = 0; k < n; k++) { /* a colour's mean is 0 */
+            atom[k] = (k & 1 ? -1.0f : 1.0f) * (float)(1 + k / 2 % 5);
+            length += atom[k] * atom[k];
+        }
+        for (uint32_t k = 0; k < n; k++)
+            atom[k] /= sqrtf(length);
+        spl_waves_analyse(&waves, atom, 0.005f, coefficient);
+        assert_true(spl_waves_synthesise(&waves, coefficient, texels, &scale));
+        for (uint32_t k = 0; k < n; k++) {
+            float d1 = scale * texels[k] - atom[k];
+            off += d1 * d1;
+        }
+        assert_true(off < 2 * (float)n * 0.005f * 0.005f / 12 + 1e-4f);
+        memset(coefficient, 0, sizeof coefficient);
+        assert_false(spl_waves_synthesise(&waves, coefficient, texels, &scale));
+    }
 }
 
 static void test_expand(void **state)
@@ -288,7 +348,7 @@ static void test_retexture(void **state)
         assert_memory_equal(histogram, wanted, sizeof wanted);
         uint64_t counted = info->attribute_bits[SPL_ATTRIBUTE_TEXTURE];
         assert_true(counted >= bits && counted <= bits + 32 * (SPL_TEXTURE_TAIL_WORDS + 16));
-        assert_int_equal(info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY], 8 * (16 + 300 * (4 + 3 * 256)));
+        assert_int_equal(info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY], 8 * (16 + spl_atoms_write(&dictionary, NULL)));
         free(words);
         if (!verify)
             spl_dataset_close(to);
@@ -395,13 +455,14 @@ static void test_bad_files(void **state)
         const char *part;
     } rows[] = {
         {SPL_SECTION_ATOMS, 0, 0, "section ATOM has no atoms"},
-        {SPL_SECTION_ATOMS, 0, 101, "section ATOM has a size that is not its atoms'"},
+        {SPL_SECTION_ATOMS, 0, 90, "section ATOM has a size that is not its atoms'"},
+        {SPL_SECTION_ATOMS, 0, 101, "section ATOM ends before its atoms do"},
         {SPL_SECTION_ATOMS, 0, 0xffffffff, "section ATOM has no atoms, or more"},
         {SPL_SECTION_ATOMS, 1, 9, "section ATOM has a size of textures"},
         {SPL_SECTION_ATOMS, 1, 0, "section ATOM has a size of textures"},
         {SPL_SECTION_ATOMS, 2, 1, "section ATOM has a size of textures or a reserved"},
-        {SPL_SECTION_ATOMS, 4, 0x7f800000, "section ATOM has a scale"},
-        {SPL_SECTION_ATOMS, 5, 0xbf800000, "section ATOM has a scale"},
+        {SPL_SECTION_ATOMS, 4, 0xffffffff, "section ATOM has an atom of more coefficients than texels"},
+        {SPL_SECTION_ATOMS, 4, 0, "section ATOM has an atom of nothing"},
         {SPL_SECTION_CHUNK_TEXTURES, 0, 0x1ffffffe, "section TEXP 0: chunk 0 starts beyond"},
         {SPL_SECTION_CHUNK_TEXTURES, 0, 0x40000002, "section TEXP 0: chunk 0 "},
         {SPL_SECTION_CHUNK_TEXTURES, 0, 0x90000000, "section TEXP 0: chunk 0 has no planes"},
@@ -472,8 +533,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_codes),   cmocka_unit_test(test_judge),     cmocka_unit_test(test_expand),
-        cmocka_unit_test(test_tangent), cmocka_unit_test(test_retexture), cmocka_unit_test(test_bad_files),
+        cmocka_unit_test(test_codes),   cmocka_unit_test(test_judge),   cmocka_unit_test(test_atoms),
+        cmocka_unit_test(test_expand),  cmocka_unit_test(test_tangent), cmocka_unit_test(test_retexture),
+        cmocka_unit_test(test_bad_files),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
