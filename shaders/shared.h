@@ -172,9 +172,9 @@ struct spl_draw_chunk {
  * word from the low bits up: direction in the low bits, offset above. The splat ends at offset / 2^SPL_CLIP_OFFSET_BITS of its
  * radius from its centre along that direction of its tangent frame. Directions start at the frame's u, turn to v, and divide
  * the square |u| + |v| = 1 evenly. */
-#define SPL_CLIP_DIRECTION_BITS 6
-#define SPL_CLIP_OFFSET_BITS 4
-#define SPL_CLIP_BITS 10
+#define SPL_CLIP_DIRECTION_BITS 5
+#define SPL_CLIP_OFFSET_BITS 3
+#define SPL_CLIP_BITS 8
 
 #define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
 

@@ -65,6 +65,7 @@ struct spl_pack_options {
     double normal_error;       /* mean, degrees; 0 = 1 */
     bool points_only;          /* neither normals nor radii: fast, for methods that need none (points, fill) */
     bool no_linear;            /* wires, poles and cables are not looked for */
+    bool no_clip_lines;        /* discs are not cut where surfaces end */
     unsigned threads;          /* 0 = all cores */
     const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */

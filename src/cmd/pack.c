@@ -19,7 +19,7 @@ static void usage(FILE *out)
     fprintf(
         out,
         "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
-        "                   [--normal-error DEG] [--points-only] [--no-linear] [--threads N]\n"
+        "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]]\n\n"
         "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
         "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
@@ -43,6 +43,7 @@ static void usage(FILE *out)
         "      --normal-error DEG   mean, degrees (default 1)\n"
         "      --points-only        position, color and class alone: no normals and radii, so no method splat\n"
         "      --no-linear          do not look for wires, poles and cables, which method fill draws as they are\n"
+        "      --no-clip-lines      discs are not cut where surfaces end\n"
         "      --cameras MODEL      poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a "
         "folder\n"
         "                           of poses, or a list of views; in the scan's coordinates\n"
@@ -169,6 +170,7 @@ int spl_cmd_pack(int argc, char **argv)
         opt_device,
         opt_textures,
         opt_quality,
+        opt_no_clip,
         opt_keep_textures
     };
     static const struct option options[] = {
@@ -179,6 +181,7 @@ int spl_cmd_pack(int argc, char **argv)
         {"normal-error", required_argument, NULL, opt_normal},
         {"points-only", no_argument, NULL, opt_points_only},
         {"no-linear", no_argument, NULL, opt_no_linear},
+        {"no-clip-lines", no_argument, NULL, opt_no_clip},
         {"threads", required_argument, NULL, opt_threads},
         {"cameras", required_argument, NULL, opt_cameras},
         {"images", required_argument, NULL, opt_images},
@@ -221,6 +224,9 @@ int spl_cmd_pack(int argc, char **argv)
             break;
         case opt_no_linear:
             o.no_linear = true;
+            break;
+        case opt_no_clip:
+            o.no_clip_lines = true;
             break;
         case opt_threads:
             result = spl_cmd_parse_count("--threads", optarg, 1, 64, &number, &err);

@@ -57,6 +57,9 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
     s->radius = p->radius[i];
     s->uncertainty = p->uncertainty[i];
     s->linear = p->linear && p->linear[i];
+    for (int c = 0; p->clip && c < 3; c++)
+        s->clip.direction[c] = (float)p->clip[i].direction[c] / 127;
+    s->clip.offset = p->clip ? (float)p->clip[i].offset / 255 : 1;
     set_color(s, p->color_class[i]);
 }
 

@@ -161,6 +161,7 @@ void spl_points_finish(struct spl_points *points)
     free(points->radius);
     free(points->uncertainty);
     free(points->linear);
+    free(points->clip);
     free(points->stations);
     *points = (struct spl_points){0};
 }

@@ -184,7 +184,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
         rc = spl_linear_find(&p.points, &p.stage, err);
     if (!rc)
         rc = options->points_only ? spl_bare_points(&p.points, &p.stage, err)
-                                  : spl_surface(&p.points, p.neighbours, &p.stage, err);
+                                  : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, &p.stage, err);
     if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)

@@ -13,6 +13,12 @@
 #define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
+/* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
+struct spl_point_clip {
+    int8_t direction[3];
+    uint8_t offset;
+};
+
 struct spl_points {
     size_t count, capacity;      /* arrays have room for capacity + SPL_POINTS_PAD elements */
     double *axis[3];             /* x, y, z; sorted in Morton order by spl_points_order() */
@@ -21,6 +27,7 @@ struct spl_points {
     float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
     uint8_t *linear;             /* 1 on a wire, a pole or a cable; made by spl_linear_find(); may be NULL: none is */
     float *radius, *uncertainty; /* made by spl_surface() or spl_bare_points() */
+    struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
@@ -35,9 +42,11 @@ int spl_points_gather(struct spl_points *points, const char *const *inputs, size
 /* Sorts all arrays in Morton order and drops points with equal coordinates, keeping the first read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
 
-/* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX); needs sorted points. */
+/* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX), with `clip_lines`
+ * where discs end; needs sorted points. */
 enum { SPL_NEIGHBOURS_MAX = 64 };
-int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err);
+int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines, struct spl_stage *stage,
+                struct spl_error *err);
 
 /* Instead: normals are (0, 0, 1), uncertainties 0, and radii those of a square grid as dense as the points around,
  * which are counted in cells, not searched. What levels of detail are chosen by; no surface to draw. Needs sorted

@@ -188,7 +188,7 @@ static double least_radius(const struct spl_points *p, size_t i, const uint32_t 
 
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
 double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach, struct spl_nearest *near,
-                           double normal[3], double *round)
+                           double normal[3], double *round, bool *edge)
 {
     const struct spl_points *p = v->points;
     const struct spl_moments *moments = &v->moments[i - v->begin];
@@ -198,6 +198,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
     memcpy(normal, spread.normal, sizeof spread.normal);
     *round = roundness(&spread);
+    *edge = *round > 0;
     if (*round > 0) {
         struct spl_moments around = widen(v, i);
         struct spread wide = spread_of(&around);
@@ -230,6 +231,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
+    *edge |= place.open;
     radius *= sqrt(fmax(place.filled, 0.25));
     if (!place.one_sided)
         return fmax(radius, fmin(0.65 * place.gap, 3 * radius));

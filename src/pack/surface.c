@@ -16,6 +16,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/clip.h"
 #include "pack/orient.h"
 #include "pack/radius.h"
 
@@ -55,6 +56,7 @@ struct surface {
     struct scratch *scratch;
     struct block *blocks;
     size_t block_count;
+    uint8_t *edge;   /* of each point, whether its surface may end there; NULL: no clip lines */
     uint32_t *label; /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
     unsigned k, wide;
@@ -63,10 +65,10 @@ struct surface {
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
 static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near,
-                     float *limit)
+                     float *limit, bool *edge)
 {
     double least[3], round, side = 1;
-    double radius = spl_radius_estimate(vicinity, i, *limit, near, least, &round);
+    double radius = spl_radius_estimate(vicinity, i, *limit, near, least, &round, edge);
     p->radius[i] = fmaxf((float)radius, smallest_radius);
     *limit = flat_limit + (float)round * (round_limit - flat_limit);
 
@@ -217,8 +219,12 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         const struct spl_vicinity vicinity = {s->points,  s->neighbours, begin, end,
                                               w->moments, w->neighbours, s->k,  s->wide};
         spl_nearest_init(&near);
-        for (size_t i = begin; i < end; i++)
-            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &near, &w->limit[i - begin]);
+        for (size_t i = begin; i < end; i++) {
+            bool edge = false;
+            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &near, &w->limit[i - begin], &edge);
+            if (s->edge)
+                s->edge[i] = edge;
+        }
         limit_runs(s->points, begin, end, w->limit);
         if (!keep_deferred(s, &s->blocks[b], begin, end, w) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
@@ -341,6 +347,7 @@ static void finish(struct surface *s)
     free(s->blocks);
     free(s->scratch);
     free(s->label);
+    free(s->edge);
     free(s->components);
     spl_neighbours_destroy(s->neighbours);
 }
@@ -353,12 +360,15 @@ static void lone_point(struct spl_points *p)
         p->normal[0][2] = 1;
 }
 
-int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage *stage, struct spl_error *err)
+int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines, struct spl_stage *stage,
+                struct spl_error *err)
 {
     struct surface s = {.points = points, .stage = stage, .k = neighbours};
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
     spl_stage_begin(stage, "normals and radii", points->count);
     int rc = allocate(&s, err);
+    if (!rc && clip_lines && points->count > 1 && !(s.edge = spl_alloc_raw(points->count, 1, err)))
+        rc = SPL_E_NOMEM;
     if (rc)
         goto done;
     if (points->count == 1) {
@@ -383,6 +393,8 @@ int spl_surface(struct spl_points *points, unsigned neighbours, struct spl_stage
             points->uncertainty[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].uncertainty;
         }
     spl_stage_finish(stage);
+    if (s.edge)
+        rc = spl_clip_lines(points, s.neighbours, s.wide, s.edge, stage, err);
 done:
     finish(&s);
     return rc;

@@ -106,7 +106,7 @@ int main(int argc, char **argv)
         rc = spl_linear_find(&points, &stage, &err);
     middle = processor_seconds();
     if (!rc)
-        rc = spl_surface(&points, 12, &stage, &err);
+        rc = spl_surface(&points, 12, false, &stage, &err);
     if (rc) {
         fprintf(stderr, "bench-linear: %s\n", err.message);
         return 1;

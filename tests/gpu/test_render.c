@@ -300,7 +300,7 @@ static void discs_end_at_their_lines(void **state)
             for (int row = 0; row < 120; row++)
                 for (int column = 0; column < 160; column++) {
                     double px = (column + 0.5 - 80) / 40, py = (60 - row - 0.5) / 40, far = px * x + py * y;
-                    double from_line = far - offset, from_rim = sqrt(px * px + py * py) - 1, off = 0.13;
+                    double from_line = far - offset, from_rim = sqrt(px * px + py * py) - 1, off = 0.24;
                     bool covered = coverage[160 * row + column] > 0;
                     if (from_rim > 0.03 || from_line > off)
                         assert_false(covered);

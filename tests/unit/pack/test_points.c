@@ -154,7 +154,7 @@ static void test_neighbours_against_brute_force(void **state)
 static void surface(struct spl_points *p, unsigned threads)
 {
     struct spl_stage stage = quiet_stage(threads);
-    assert_int_equal(spl_surface(p, 12, &stage, NULL), 0);
+    assert_int_equal(spl_surface(p, 12, true, &stage, NULL), 0);
     for (size_t i = 0; i < p->count; i++) {
         double length = 0;
         for (int c = 0; c < 3; c++)
@@ -163,6 +163,69 @@ static void surface(struct spl_points *p, unsigned threads)
         assert_true(p->radius[i] > 0 && isfinite(p->radius[i]));
         assert_true(p->uncertainty[i] >= 0 && isfinite(p->uncertainty[i]));
     }
+}
+
+static bool has_line(const struct spl_points *p, size_t i)
+{
+    return p->clip[i].direction[0] || p->clip[i].direction[1] || p->clip[i].direction[2];
+}
+
+/* A square sheet of a jittered grid: lines of the outermost row alone, outwards, and within a spacing of the border. A closed
+ * surface has none. Any number of threads gives the same ones; who wants none gets none. */
+static void test_lines_at_borders(void **state)
+{
+    (void)state;
+    enum { side = 80, count = side * side };
+    double(*position)[3] = calloc(count, sizeof *position), step = 1.0 / side;
+    uint64_t random = 9;
+    for (size_t i = 0; i < count; i++)
+        for (int c = 0; c < 2; c++) {
+            random = random * 6364136223846793005u + 1442695040888963407u;
+            position[i][c] = ((double)(c ? i / side : i % side) + 0.5 + 0.3 * ((double)(random >> 40) / 0x1p24 - 0.5)) * step;
+        }
+    struct spl_points p = sorted((const double(*)[3])position, count, 2), again, none;
+    surface(&p, 2);
+    size_t border = 0, lines = 0;
+    for (size_t i = 0; i < count; i++) {
+        double x = p.axis[0][i], y = p.axis[1][i], dx = fmin(x, 1 - x), dy = fmin(y, 1 - y), edge = fmin(dx, dy);
+        border += edge < step;
+        if (!has_line(&p, i))
+            continue;
+        int axis = dx < dy ? 0 : 1;
+        double out = (axis ? y : x) < 0.5 ? -1 : 1, toward = out * p.clip[i].direction[axis] / 127;
+        double reach = toward * p.clip[i].offset / 255 * p.radius[i];
+        lines++;
+        assert_true(edge < step);
+        if (fmax(dx, dy) < 3 * step)
+            continue; /* a corner: one line or the other, or between */
+        assert_true(toward > 0.7);
+        assert_true(reach > 0 && reach < edge + step);
+    }
+    assert_true(2 * lines > border);
+    again = sorted((const double(*)[3])position, count, 1);
+    surface(&again, 1);
+    for (size_t i = 0; i < count; i++) {
+        assert_memory_equal(p.clip[i].direction, again.clip[i].direction, 3);
+        assert_int_equal(p.clip[i].offset, again.clip[i].offset);
+    }
+    none = sorted((const double(*)[3])position, count, 1);
+    struct spl_stage stage = quiet_stage(1);
+    assert_int_equal(spl_surface(&none, 12, false, &stage, NULL), 0);
+    assert_null(none.clip);
+    free(position);
+    spl_points_finish(&p);
+    spl_points_finish(&again);
+    spl_points_finish(&none);
+
+    position = shape_points(SHAPE_SPHERE, 20000, 3);
+    p = sorted((const double(*)[3])position, 20000, 2);
+    surface(&p, 2);
+    lines = 0;
+    for (size_t i = 0; i < p.count; i++)
+        lines += has_line(&p, i);
+    assert_true(lines < 20);
+    free(position);
+    spl_points_finish(&p);
 }
 
 static void test_normals_of_a_sphere(void **state)
@@ -409,7 +472,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_order_sorts_and_drops),        cmocka_unit_test(test_first_duplicate_stays),
         cmocka_unit_test(test_order_below_key_resolution),   cmocka_unit_test(test_neighbours_against_brute_force),
-        cmocka_unit_test(test_normals_of_a_sphere),          cmocka_unit_test(test_normals_face_the_station),
+        cmocka_unit_test(test_normals_of_a_sphere),
+        cmocka_unit_test(test_lines_at_borders),          cmocka_unit_test(test_normals_face_the_station),
         cmocka_unit_test(test_given_normals_stay),           cmocka_unit_test(test_radius_of_a_grid),
         cmocka_unit_test(test_random_points_leave_no_holes), cmocka_unit_test(test_no_blobs),
         cmocka_unit_test(test_borders_stay_where_they_are),  cmocka_unit_test(test_leaves_and_noise),

@@ -1,0 +1,106 @@
+/* Clip lines: a disc at the border of a surface would reach over it by half its size. A line in its plane ends it
+ * (sparse-coding paper, 3.5.2).
+ *
+ * A point lies at a border where all neighbours in its plane lie on one side of a line that is no farther from it than
+ * the points are apart. That holds where a surface ends, and at convex creases, where it turns away. The scan does not
+ * say where between its last point and the next one a surface ends: the line lies half of what points are apart beyond
+ * the last of the neighbours. Corners get one of their lines. Points are independent of each other. */
+#include "pack/clip.h"
+
+#include <math.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "geom/tangent.h"
+
+static const double coplanar = 0.25; /* slope within which a neighbour lies in the plane */
+static const double at_border =
+    0.5; /* spacings that the outermost neighbours lie beyond a point at the border, at most */
+static const double beyond_all = 0.5; /* spacings from the outermost neighbour to the line */
+enum { border_points = 8, directions = 32 };
+
+struct lines {
+    struct spl_points *points;
+    const struct spl_neighbours *neighbours;
+    const uint8_t *candidate;
+    struct spl_stage *stage;
+    unsigned wide;
+    double turn[directions][2];
+};
+
+/* The direction, as (u, v) of the tangent frame, and the end in metres of the line of point i; false = none. */
+static bool find_border(const struct lines *l, size_t i, const struct spl_nearest *near, const float u[3],
+                        const float v[3], double direction[2], double *end)
+{
+    const struct spl_points *p = l->points;
+    const float *n = p->normal[i];
+    double x[SPL_NEIGHBOURS_MAX], y[SPL_NEIGHBOURS_MAX], reach = 0, least = INFINITY;
+    unsigned count = 0;
+    for (unsigned a = 0; a < near->count; a++) {
+        double d[3], height = 0;
+        for (int c = 0; c < 3; c++) {
+            d[c] = p->axis[c][near->index[a]] - p->axis[c][i];
+            height += d[c] * n[c];
+        }
+        if (height * height > coplanar * coplanar * near->squared[a])
+            continue;
+        x[count] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
+        y[count++] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
+        reach = fmax(reach, near->squared[a]);
+    }
+    if (count < border_points)
+        return false;
+    for (int k = 0; k < directions; k++) {
+        double most = 0;
+        for (unsigned a = 0; a < count && most < least; a++)
+            most = fmax(most, l->turn[k][0] * x[a] + l->turn[k][1] * y[a]);
+        if (most >= least)
+            continue;
+        least = most;
+        direction[0] = l->turn[k][0];
+        direction[1] = l->turn[k][1];
+    }
+    double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
+    *end = least + beyond_all * spacing;
+    return least <= at_border * spacing;
+}
+
+static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct lines *l = context;
+    struct spl_points *p = l->points;
+    struct spl_nearest near;
+    spl_nearest_init(&near);
+    for (size_t i = begin; i < end; i++) {
+        double direction[2] = {0}, far;
+        float u[3], v[3];
+        if (!l->candidate[i])
+            continue;
+        spl_neighbours_find(l->neighbours, i, l->wide, &near);
+        spl_tangent_frame(p->normal[i], u, v);
+        if (!find_border(l, i, &near, u, v, direction, &far) || !(far < p->radius[i]))
+            continue;
+        for (int c = 0; c < 3; c++)
+            p->clip[i].direction[c] = (int8_t)lround(127 * (direction[0] * u[c] + direction[1] * v[c]));
+        p->clip[i].offset = (uint8_t)(255 * far / p->radius[i]);
+    }
+    spl_stage_add(l->stage, end - begin, worker);
+}
+
+int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neighbours, unsigned wide,
+                   const uint8_t *candidate, struct spl_stage *stage, struct spl_error *err)
+{
+    struct lines lines = {
+        .points = points, .neighbours = neighbours, .candidate = candidate, .stage = stage, .wide = wide};
+    for (int k = 0; k < directions; k++) {
+        lines.turn[k][0] = cos(k * 2 * M_PI / directions);
+        lines.turn[k][1] = sin(k * 2 * M_PI / directions);
+    }
+    points->clip = spl_alloc(points->count, sizeof *points->clip, err);
+    if (!points->clip)
+        return SPL_E_NOMEM;
+    spl_stage_begin(stage, "clip lines", points->count);
+    spl_parallel_for(stage->threads, points->count, 4096, find_lines, &lines);
+    spl_stage_end(stage);
+    return SPL_OK;
+}
