@@ -35,7 +35,8 @@ void main()
         nearest_payload = nearer ? payload[i] : nearest_payload;
     }
     float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(1u << level)));
-    float sum = 0.0, weight = 0.0;
+    precise float sum = 0.0;
+    float weight = 0.0;
     vec3 vector = vec3(0.0);
     for (int i = 0; i < 4; i++) {
         float w = inverse_depth(word[i], SPACING_MASK), share = word[i] != 0u && w >= least ? 1.0 : 0.0;
@@ -43,7 +44,8 @@ void main()
         weight += share;
         vector += share * payload_vector(payload[i]);
     }
-    uint mean = (floatBitsToUint(sum / max(weight, 1.0)) & ~SPACING_MASK) | (nearest & SPACING_MASK);
+    precise float average = sum / max(weight, 1.0);
+    uint mean = (floatBitsToUint(average) & ~SPACING_MASK) | (nearest & SPACING_MASK);
     planes[frame.fill_to + gl_GlobalInvocationID.x] = weight > 0.0 ? mean : 0u;
     planes[frame.fill_to + frame.fill_stride + gl_GlobalInvocationID.x] = payload_of(vector, max(weight, 1.0), nearest_payload);
 }

@@ -34,7 +34,8 @@ uint interpolate(ivec2 at, out uint filled)
         nearest_payload = nearer ? payload[i] : nearest_payload;
     }
     float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level)));
-    float sum = 0.0, weight = 0.0;
+    precise float sum = 0.0;
+    float weight = 0.0;
     vec3 vector = vec3(0.0);
     for (int i = 0; i < 4; i++) {
         float w = inverse_depth(word[i], SPACING_MASK), share = i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
@@ -44,7 +45,8 @@ uint interpolate(ivec2 at, out uint filled)
         vector += share * payload_vector(payload[i]);
     }
     filled = payload_of(vector, max(weight, 1.0), nearest_payload);
-    return weight > 0.0 ? (floatBitsToUint(sum / weight) & ~SPACING_MASK) | (nearest & SPACING_MASK) : 0u;
+    precise float average = sum / weight;
+    return weight > 0.0 ? (floatBitsToUint(average) & ~SPACING_MASK) | (nearest & SPACING_MASK) : 0u;
 }
 
 void main()

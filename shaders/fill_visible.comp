@@ -19,29 +19,17 @@ layout(constant_id = 0) const uint ADAPTIVE = 1;
 
 layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
 
-/* Steepness of the narrowest blocked cone of each sector: cotangent of its half angle; 0 = none. */
-vec4 steep_low = vec4(0.0), steep_high = vec4(0.0);
+/* Steepness of the narrowest blocked cone of each sector: cotangent of its half angle; 0 = none. Sectors are half open, the
+ * first begins at +x. */
+float s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0, s4 = 0.0, s5 = 0.0, s6 = 0.0, s7 = 0.0;
 
 /* How steeply `word`, of a level whose low bits `mask` covers, stands before depth z, `squared` samples^2 away. */
-float steepness(uint word, uint mask, float z, float squared)
+float steepness(uint word, uint mask, float z, float squared, bool inside)
 {
     float w = inverse_depth(word, mask), angle = w * spacing_of(word & SPACING_MASK) * frame.fill_radius;
-    float reach = ADAPTIVE != 0u ? min(angle * frame.fill_reach, frame.fill_kernel) : frame.fill_kernel;
-    float gap = z * w - 1.0 - frame.fill_margin * angle;
-    return word != 0u && squared <= reach * reach ? gap * frame.fx / sqrt(squared) : 0.0;
-}
-
-/* Adds a sample (x, y) away to its sector; sectors are half open, the first begins at +x. */
-void add(float x, float y, float steep)
-{
-    bool below = y < 0.0 || (y == 0.0 && x < 0.0);
-    vec2 d = below ? -vec2(x, y) : vec2(x, y);
-    bool left = d.x <= 0.0;
-    d = left ? vec2(d.y, -d.x) : d;
-    float sector = (left ? 2.0 : 0.0) + (d.y >= d.x ? 1.0 : 0.0);
-    vec4 value = mix(vec4(0.0), vec4(steep), equal(vec4(sector), vec4(0.0, 1.0, 2.0, 3.0)));
-    steep_low = max(steep_low, below ? vec4(0.0) : value);
-    steep_high = max(steep_high, below ? value : vec4(0.0));
+    float reach = ADAPTIVE != 0u ? min(angle * frame.fill_reach, frame.fill_kernel) : word != 0u ? frame.fill_kernel : 0.0;
+    precise float steep = (z * w - 1.0 - frame.fill_margin * angle) * frame.fx / sqrt(squared);
+    return inside && squared <= reach * reach ? steep : 0.0;
 }
 
 /* The largest reach of what lies around: of the nearest sample of the four closest cells of the coarse level. */
@@ -63,26 +51,60 @@ float coarse_reach(ivec2 at)
     return min(angle * frame.fill_radius * frame.fill_reach, frame.fill_kernel);
 }
 
+/* One sample of level 0, which lies in sector S whatever it is. */
+#define NEXT(X, Y, S)                                                                                                 \
+    {                                                                                                                 \
+        ivec2 c = at + ivec2(X, Y);                                                                                    \
+        bool inside = uint(c.x) < frame.width && uint(c.y) < frame.height;                                             \
+        S = steepness(plane_word(sample_index(c)), SPACING_MASK, z, float((X) * (X) + (Y) * (Y)), inside);             \
+    }
+
+/* The nearest sample of a cell, (u, v) away after a turn by quarters that brings the cell to +x, or to +x and +y. */
+#define CELL(X, Y, U, V)                                                                                              \
+    ivec2 c = cell + ivec2(X, Y);                                                                                      \
+    uint word = plane_word(offset + uint(c.y) * size.x + uint(c.x));                                                   \
+    vec2 d = vec2((c << int(level)) - at + ivec2(bitfieldExtract(word, SPL_FILL_SPACING_BITS, int(level)),             \
+                                                 bitfieldExtract(word, SPL_FILL_SPACING_BITS + int(level), int(level)))); \
+    float u = U, v = V, steep = steepness(word, mask, z, dot(d, d), uint(c.x) < size.x && uint(c.y) < size.y);
+#define SIDE(X, Y, U, V, A, B, C, D) /* sectors from a quarter before +x to a quarter behind it */                    \
+    {                                                                                                                 \
+        CELL(X, Y, U, V)                                                                                               \
+        A = max(A, v < -u ? steep : 0.0);                                                                              \
+        B = max(B, v < 0.0 && v >= -u ? steep : 0.0);                                                                  \
+        C = max(C, v >= 0.0 && v < u ? steep : 0.0);                                                                   \
+        D = max(D, v >= u ? steep : 0.0);                                                                              \
+    }
+#define CORNER(X, Y, U, V, A, B)                                                                                      \
+    {                                                                                                                 \
+        CELL(X, Y, U, V)                                                                                               \
+        A = max(A, v < u ? steep : 0.0);                                                                               \
+        B = max(B, v >= u ? steep : 0.0);                                                                              \
+    }
+
 void look_adaptively(ivec2 at, float z)
 {
     float reach = coarse_reach(at);
-    uint offset = 0u;
-    for (uint level = 0u;;) {
+    uint offset = frame.width * frame.height;
+    NEXT(1, 0, s0)
+    NEXT(1, 1, s1)
+    NEXT(0, 1, s2)
+    NEXT(-1, 1, s3)
+    NEXT(-1, 0, s4)
+    NEXT(-1, -1, s5)
+    NEXT(0, -1, s6)
+    NEXT(1, -1, s7)
+    for (uint level = 1u;;) { /* one round too many does no harm: it is the coarse level */
         uvec2 size = level_size(level);
-        uint mask = (1u << (SPL_FILL_SPACING_BITS + 2u * level)) - 1u, low = (1u << level) - 1u;
+        uint mask = (1u << (SPL_FILL_SPACING_BITS + 2u * level)) - 1u;
         ivec2 cell = at >> int(level);
-        ivec2 step = ivec2(-1);
-        for (int i = 0;;) {
-            ivec2 c = cell + step, inside = clamp(c, ivec2(0), ivec2(size) - 1);
-            uint word = plane_word(offset + uint(inside.y) * size.x + uint(inside.x));
-            uint x = (word >> SPL_FILL_SPACING_BITS) & low, y = (word >> (SPL_FILL_SPACING_BITS + level)) & low;
-            vec2 d = vec2((c << int(level)) + ivec2(x, y) - at);
-            float steep = steepness(word, mask, z, max(dot(d, d), 1.0));
-            add(d.x, d.y, c == inside && i != 4 ? steep : 0.0);
-            step = step.x == 1 ? ivec2(-1, step.y + 1) : ivec2(step.x + 1, step.y);
-            if (++i >= 9)
-                break;
-        }
+        SIDE(1, 0, d.x, d.y, s6, s7, s0, s1)
+        SIDE(0, 1, d.y, -d.x, s0, s1, s2, s3)
+        SIDE(-1, 0, -d.x, -d.y, s2, s3, s4, s5)
+        SIDE(0, -1, -d.y, d.x, s4, s5, s6, s7)
+        CORNER(1, 1, d.x, d.y, s0, s1)
+        CORNER(-1, 1, d.y, -d.x, s2, s3)
+        CORNER(-1, -1, -d.x, -d.y, s4, s5)
+        CORNER(1, -1, -d.y, d.x, s6, s7)
         offset += size.x * size.y;
         level++;
         if (level >= frame.fill_levels || float(1u << level) > reach)
@@ -96,12 +118,21 @@ void look_everywhere(ivec2 at, float z)
     for (int y = -reach;;) {
         for (int x = -reach;;) {
             ivec2 c = at + ivec2(x, y);
-            bool inside = c.x >= 0 && c.y >= 0 && c.x < int(frame.width) && c.y < int(frame.height);
-            c = clamp(c, ivec2(0), ivec2(frame.width, frame.height) - 1);
-            uint word = plane_word(sample_index(c));
-            vec2 d = vec2(x, y);
-            float steep = steepness(word, SPACING_MASK, z, max(dot(d, d), 1.0));
-            add(d.x, d.y, inside && (x != 0 || y != 0) ? steep : 0.0);
+            bool inside = uint(c.x) < frame.width && uint(c.y) < frame.height && (x != 0 || y != 0);
+            float steep = steepness(plane_word(sample_index(c)), SPACING_MASK, z, max(float(x * x + y * y), 1.0), inside);
+            if (y >= 0 && x > 0) {
+                s0 = max(s0, y < x ? steep : 0.0);
+                s1 = max(s1, y >= x ? steep : 0.0);
+            } else if (x <= 0 && y > 0) {
+                s2 = max(s2, -x < y ? steep : 0.0);
+                s3 = max(s3, -x >= y ? steep : 0.0);
+            } else if (y <= 0 && x < 0) {
+                s4 = max(s4, -y < -x ? steep : 0.0);
+                s5 = max(s5, -y >= -x ? steep : 0.0);
+            } else {
+                s6 = max(s6, x < -y ? steep : 0.0);
+                s7 = max(s7, x >= -y ? steep : 0.0);
+            }
             if (++x > reach)
                 break;
         }
@@ -130,6 +161,6 @@ void main()
         look_adaptively(at, z);
     else
         look_everywhere(at, z);
-    bool visible = openness(steep_low) + openness(steep_high) >= frame.fill_threshold;
+    bool visible = openness(vec4(s0, s1, s2, s3)) + openness(vec4(s4, s5, s6, s7)) >= frame.fill_threshold;
     planes[frame.fill_from + i] = visible || (own != 0u && frame.fill_keep != 0u) ? own : SPL_FILL_HOLE;
 }

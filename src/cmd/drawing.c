@@ -44,6 +44,18 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
         return spl_cmd_parse_color("--background", text, d->view.background, err);
     case SPL_CMD_MARGIN:
         return spl_cmd_parse_real("--margin", text, 0, 16, &d->view.margin, err);
+    case SPL_CMD_VISIBILITY:
+        rc = parse_name(command, "--visibility", text, spl_visibility_from_name, &choice, err);
+        d->view.visibility = (enum spl_visibility)choice;
+        return rc;
+    case SPL_CMD_KERNEL:
+        return spl_cmd_parse_real("--kernel", text, 0, 129, &d->view.kernel, err);
+    case SPL_CMD_THRESHOLD:
+        return spl_cmd_parse_real("--threshold", text, 0, 1, &d->view.threshold, err);
+    case SPL_CMD_PYRAMID:
+        rc = spl_cmd_parse_count("--pyramid", text, 0, SPL_FILL_LEVELS_MAX, &count, err);
+        d->view.pyramid = (uint32_t)count;
+        return rc;
     case SPL_CMD_ATOMS:
         rc = spl_cmd_parse_count("--atoms", text, 0, SPL_TEXTURE_ATOMS, &count, err);
         d->view.atoms = (uint32_t)count;

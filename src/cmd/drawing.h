@@ -26,7 +26,7 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
 enum spl_cmd_drawing_id {
     SPL_CMD_SIZE = 256, SPL_CMD_METHOD, SPL_CMD_LAYER, SPL_CMD_LOD, SPL_CMD_SUPERSAMPLE, SPL_CMD_BACKGROUND, SPL_CMD_MARGIN,
     SPL_CMD_ATOMS,     SPL_CMD_FORMAT, SPL_CMD_QUALITY, SPL_CMD_DEPTH_SCALE, SPL_CMD_DEVICE, SPL_CMD_REQUIRE_GPU, SPL_CMD_MEMORY_LIMIT,
-    SPL_CMD_NO_VERIFY, SPL_CMD_OWN,
+    SPL_CMD_NO_VERIFY, SPL_CMD_VISIBILITY, SPL_CMD_KERNEL, SPL_CMD_THRESHOLD, SPL_CMD_PYRAMID, SPL_CMD_OWN,
 };
 
 /* Rows of getopt_long's table. */
@@ -37,6 +37,10 @@ enum spl_cmd_drawing_id {
         {"background", required_argument, NULL, SPL_CMD_BACKGROUND},                                                   \
         {"margin", required_argument, NULL, SPL_CMD_MARGIN}, {"format", required_argument, NULL, SPL_CMD_FORMAT},      \
         {"atoms", required_argument, NULL, SPL_CMD_ATOMS},                                                             \
+        {"visibility", required_argument, NULL, SPL_CMD_VISIBILITY},                                                   \
+        {"kernel", required_argument, NULL, SPL_CMD_KERNEL},                                                           \
+        {"threshold", required_argument, NULL, SPL_CMD_THRESHOLD},                                                     \
+        {"pyramid", required_argument, NULL, SPL_CMD_PYRAMID},                                                         \
         {"quality", required_argument, NULL, SPL_CMD_QUALITY},                                                         \
         {"depth-scale", required_argument, NULL, SPL_CMD_DEPTH_SCALE},                                                 \
         {"device", required_argument, NULL, SPL_CMD_DEVICE}, {"require-gpu", no_argument, NULL, SPL_CMD_REQUIRE_GPU},  \

@@ -62,7 +62,7 @@ static void usage(FILE *out)
             "Drawing:\n"
             "  --size WxH               pixels (the path's own, or 1280x720)\n"
             "  --method splat|points|fill, --lod L, --supersample N, --background COLOUR, --margin M,\n"
-            "  --atoms N\n"
+            "  --atoms N; of method fill --visibility V, --kernel N, --threshold T, --pyramid N\n"
             "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"
             "Output:\n"
             "  -o, --output OUT         OUT.mp4, or a folder that gets 000000.jpeg and so on\n"

@@ -31,7 +31,7 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
     double kernel = view->kernel > 0 ? view->kernel * side / 2 : reach_spacings * spacing;
     kernel = fmin(fmax(kernel, 1.5), kernel_most * (side > 1 ? side : 1));
     int rings = 1 + (int)floor(log2(kernel) + 0.25);
-    rings = rings < 1 ? 1 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
+    rings = rings < 2 ? 2 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
     *plan = (struct spl_fill_plan){.kernel = kernel, .rings = (uint32_t)rings};
     plan->levels = view->pyramid ? view->pyramid : plan->rings;
     uint32_t top = plan->levels > plan->rings ? plan->levels : plan->rings;

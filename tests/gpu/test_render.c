@@ -146,7 +146,7 @@ static void random_splats_match(void **state)
 {
     (void)state;
     struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
-    for (int method = 0; method < SPL_METHOD_FILL; method++) {
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         for (uint32_t supersample = 1; supersample <= 4; supersample *= 2) {
             struct spl_view view = looking(origin, 3, 160, 120);
             view.method = method;
@@ -410,6 +410,65 @@ static void a_million_splats_on_one_pixel_do_not_wrap(void **state)
     done(dataset);
 }
 
+static void what_method_fill_takes_matches(void **state)
+{
+    (void)state;
+    struct make_splat *splats = random_splats(4000, origin, 0.02);
+    for (size_t i = 0; i < 4000; i++)
+        splats[i].linear = i % 5 == 0;
+    struct spl_dataset *dataset = make_dataset(splats, 4000);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int i = 0; i < 12; i++) {
+        struct spl_view view = looking(origin, 3, 97, 75);
+        view.method = SPL_METHOD_FILL;
+        view.lod = i % 2;
+        view.visibility = i % SPL_VISIBILITY_COUNT;
+        view.kernel = (double[]){0, 3, 9, 25}[i / 3];
+        view.threshold = (double[]){-1, 0.5, 1}[i % 4 % 3];
+        view.pyramid = (uint32_t[]){0, 2, 1, 5}[i / 3];
+        same_images(dataset, &view, spl_visibility_name(view.visibility));
+    }
+    done(dataset);
+}
+
+/* A pixel of method fill is the same in whatever tile it lies, to the bit. */
+static void tiles_of_method_fill_leave_no_seams(void **state)
+{
+    struct spl_renderer_options options = {.device = *state, .scratch_samples = 160 * 160};
+    struct spl_renderer *small;
+    assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.02);
+    assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
+    for (uint32_t side = 1; side <= 2; side++) {
+        struct spl_view view = looking(origin, 3, 203, 151);
+        struct spl_frame frames[2];
+        view.method = SPL_METHOD_FILL;
+        view.supersample = side;
+        view.kernel = 9.0 / side;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frames[0], NULL), SPL_OK);
+        assert_int_equal(spl_renderer_render(small, dataset, &view, &frames[1], NULL), SPL_OK);
+        assert_int_equal(frames[0].stats.tiles, 1);
+        assert_true(frames[1].stats.tiles > 4);
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+            const struct spl_image *a = &frames[0].images[layer], *b = &frames[1].images[layer];
+            assert_memory_equal(a->pixels, b->pixels, (size_t)a->width * a->height * spl_pixel_bytes(a->type));
+        }
+        spl_frame_finish(&frames[0]);
+        spl_frame_finish(&frames[1]);
+    }
+    struct spl_view view = looking(origin, 3, 203, 151);
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    view.method = SPL_METHOD_FILL;
+    view.kernel = 129;
+    assert_int_equal(spl_renderer_render(small, dataset, &view, &frame, &err), SPL_E_LIMIT);
+    assert_string_equal(err.field, "kernel");
+    spl_renderer_remove(small, dataset);
+    done(dataset);
+    spl_renderer_destroy(small);
+}
+
 static void small_tiles_give_the_same_image(void **state)
 {
     struct spl_renderer_options options = {.device = *state, .scratch_samples = 5000};
@@ -600,6 +659,8 @@ int main(int argc, char **argv)
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_splats_match),
+        cmocka_unit_test(what_method_fill_takes_matches),
+        cmocka_unit_test_prestate(tiles_of_method_fill_leave_no_seams, device),
         cmocka_unit_test(a_wall_that_hides_the_rest_changes_nothing),
         cmocka_unit_test(inside_the_cloud_matches),
         cmocka_unit_test(discs_that_fill_a_large_image_match),

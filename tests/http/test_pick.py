@@ -133,6 +133,12 @@ def a_body_means_what_a_query_means(d):
                   "method=points")
     version = d.ask("/v1/datasets/wall").json()["version"]
     rest = {"x": 32, "y": 24, "method": "points", "lod": 2, "margin": 0.5, "near": 0.1, "far": 50, "v": version}
+    fill = {"method": "fill", "visibility": "none", "kernel": 9, "threshold": 0.3, "pyramid": 4}
+    query = "&".join(f"{name}={value}" for name, value in fill.items())
+    filled = d.ask(f"{PICK}?x=32&y=24&eye=3,0,1&target=0,0,1&fov=60&width=64&height=48&{query}")
+    assert abs(filled.json()["depth"] - 3) < 0.05, filled.body
+    assert d.post({"x": 32, "y": 24, "width": 64, "height": 48, **fill, "camera": {
+        "eye": [3, 0, 1], "target": [0, 0, 1], "fov": 60}}, PICK).json() == filled.json()
     posted = d.post({**rest, "width": 64, "height": 48, "camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "up": [0, 0, 1],
                                                                   "fx": 60}}, PICK)
     assert posted.json() == asked.json() and asked.json()["depth"], (asked.body, posted.body)

@@ -207,11 +207,17 @@ def test_a_body_says_all_that_a_query_does():
     size, rest = {"width": 64, "height": 48, "near": 0.5, "far": 9}, dict(
         method="points", layer="depth", supersample=2, margin=0.5, background="102030", transparent=True, format="png",
         lod=2, depth_scale=500, atoms=2)
+    fill = dict(method="fill", visibility="constant", kernel=7, threshold=0.25, pyramid=3)
     with Daemon(REAL) as d:
         by_query = d.view(eye="3,0.2,1", target="0,0,1", up="0,0,1", fov=50, **size, **{**rest, "transparent": "true"})
         assert by_query.status == 200
         assert d.post({"camera": {**look, **size}, **rest}).body == by_query.body
         assert d.post({"camera": look, **size, **rest}).body == by_query.body
+        by_query = d.view(eye="3,0.2,1", target="0,0,1", up="0,0,1", fov=50, **size, **fill)
+        assert by_query.status == 200 and d.post({"camera": look, **size, **fill}).body == by_query.body
+        for name, other in dict(visibility="adaptive", kernel=3, threshold=1, pyramid=1).items():
+            changed = d.post({"camera": look, **size, **fill, name: other})
+            assert changed.status == 200 and changed.headers["ETag"] != by_query.headers["ETag"], name
         coarse, fine = (d.view(**LOOK, quality=quality, width=64, height=48).body for quality in (10, 95))
         assert len(coarse) < len(fine)
         same = {"camera": {k: v for k, v in look.items() if k != "fov"}, "width": 64, "height": 48, "quality": 10}

@@ -13,13 +13,16 @@
 #include "dataset/texture.h"
 #include "geom/tangent.h"
 #include "render/occupancy.h"
+#include "render/fill.h"
 #include "render/select.h"
+#include "support/reference_fill.h"
 
 struct sample {
     float first;   /* pushed depth, INFINITY = nothing */
     float nearest; /* method points: depth of the winner */
     uint32_t id;
-    uint32_t payload; /* method points: colour */
+    uint32_t word;    /* method fill: depth, spacing, linear */
+    uint32_t payload; /* methods points and fill: colour */
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
@@ -28,7 +31,8 @@ struct sample {
 struct scene {
     const struct spl_dataset *dataset;
     const struct spl_view *view;
-    struct spl_camera camera; /* in samples */
+    struct spl_camera camera; /* in samples, with what method fill draws around the image */
+    uint32_t guard;           /* samples of it */
     struct spl_draw_list list;
     struct sample *samples;
     uint32_t weight_max;
@@ -225,7 +229,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     }
 }
 
-static void point(struct scene *s, const struct disc *d)
+static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
 {
     float x = (float)s->camera.fx * (d->p[0] / d->p[2]) + (float)s->camera.cx;
     float y = (float)s->camera.fy * (d->p[1] / d->p[2]) + (float)s->camera.cy;
@@ -233,10 +237,16 @@ static void point(struct scene *s, const struct disc *d)
         return;
     struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
     uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
-    if (d->p[2] > at->first)
+    float z = d->p[2];
+    memcpy(&at->word, &z, 4);
+    if (s->view->method == SPL_METHOD_FILL) { /* the low bits of the depth say more */
+        at->word = (at->word & ~SPL_FILL_DEPTH_BITS) | low_bits;
+        memcpy(&z, &at->word, 4);
+    }
+    if (z > at->first)
         return;
-    bool nearer = d->p[2] < at->first;
-    at->first = d->p[2];
+    bool nearer = z < at->first;
+    at->first = z;
     at->payload = nearer || payload < at->payload ? payload : at->payload;
     if (nearer || d->id < at->id) {
         at->id = d->id;
@@ -307,8 +317,9 @@ static void for_each_disc(struct scene *s, bool shade)
             d.p[2] += draw->origin_z;
             if (!(d.p[2] >= (float)s->camera.near && d.p[2] <= (float)s->camera.far))
                 continue;
-            if (s->view->method == SPL_METHOD_POINTS)
-                point(s, &d);
+            double median = spl_dataset_get_info(s->dataset)->splat_radius;
+            if (s->view->method != SPL_METHOD_SPLAT)
+                point(s, &d, reference_fill_code(splat.radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0));
             else
                 depth_disc(s, &d, shade);
         }
@@ -317,7 +328,7 @@ static void for_each_disc(struct scene *s, bool shade)
 
 static float depth_of(const struct scene *s, const struct sample *at)
 {
-    if (s->view->method == SPL_METHOD_POINTS)
+    if (s->view->method != SPL_METHOD_SPLAT)
         return at->first;
     return (float)((double)at->first * (1 - (double)at->depth / (double)at->weight / 262144.0));
 }
@@ -326,8 +337,8 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
 {
     double length = 0;
     for (int i = 0; i < 3; i++) {
-        out[i] = s->view->method == SPL_METHOD_POINTS ? at->normal_winner[i]
-                                                      : (double)at->normal[i] / (double)at->weight - 127.5;
+        out[i] = s->view->method != SPL_METHOD_SPLAT ? at->normal_winner[i]
+                                                     : (double)at->normal[i] / (double)at->weight - 127.5;
         length += out[i] * out[i];
     }
     for (int i = 0; i < 3; i++)
@@ -344,8 +355,8 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
     size_t pixel = (size_t)y * width + x;
     for (uint32_t pass = 0; pass < 2; pass++) {
         for (uint32_t i = 0; i < side * side; i++) {
-            const struct sample *at =
-                &s->samples[(size_t)(y * side + i / side) * s->camera.width + x * side + i % side];
+            const struct sample *at = &s->samples[(size_t)(y * side + i / side + s->guard) * s->camera.width +
+                                                  x * side + i % side + s->guard];
             if (at->first == INFINITY)
                 continue;
             if (pass == 1) {
@@ -362,8 +373,8 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
             double n[3];
             normal_of(s, at, n);
             for (int c = 0; c < 3; c++) {
-                color[c] += s->view->method == SPL_METHOD_POINTS ? (at->payload >> 8 * c & 255)
-                                                                 : (at->color[c] + at->weight / 2) / at->weight;
+                color[c] += s->view->method != SPL_METHOD_SPLAT ? (at->payload >> 8 * c & 255)
+                                                                : (at->color[c] + at->weight / 2) / at->weight;
                 normal[c] += n[c];
             }
         }
@@ -381,8 +392,8 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
     if (images[SPL_LAYER_DEPTH].pixels)
         ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
     if (images[SPL_LAYER_RANGE].pixels) {
-        double rx = ((x + 0.5) * side - s->camera.cx) / s->camera.fx,
-               ry = ((y + 0.5) * side - s->camera.cy) / s->camera.fy;
+        double rx = ((x + 0.5) * side + s->guard - s->camera.cx) / s->camera.fx,
+               ry = ((y + 0.5) * side + s->guard - s->camera.cy) / s->camera.fy;
         ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(z * sqrt(1 + rx * rx + ry * ry));
     }
     if (images[SPL_LAYER_NORMAL].pixels) {
@@ -396,6 +407,39 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
         ((uint32_t *)images[SPL_LAYER_ID].pixels)[pixel] = id;
     if (images[SPL_LAYER_COVERAGE].pixels)
         ((float *)images[SPL_LAYER_COVERAGE].pixels)[pixel] = (float)covered / (float)(side * side);
+}
+
+static void fill(struct scene *s, const struct spl_fill_plan *plan)
+{
+    size_t count = (size_t)s->camera.width * s->camera.height;
+    struct fill_sample *samples = spl_alloc(count, sizeof *samples, NULL);
+    spl_assert(samples);
+    for (size_t i = 0; i < count; i++) {
+        const struct sample *at = &s->samples[i];
+        samples[i] = (struct fill_sample){.word = SPL_NOTHING, .id = at->id};
+        if (at->first < INFINITY)
+            memcpy(&samples[i].word, &at->first, 4);
+        for (int c = 0; c < 3; c++) {
+            samples[i].color[c] = at->payload >> 8 * c & 255;
+            samples[i].normal[c] = at->normal_winner[c];
+        }
+    }
+    reference_fill(samples, s->camera.width, s->camera.height, s->camera.fx,
+                   spl_dataset_get_info(s->dataset)->splat_radius, s->view, plan);
+    for (size_t i = 0; i < count; i++) {
+        struct sample *at = &s->samples[i];
+        at->first = INFINITY;
+        if (samples[i].word == SPL_NOTHING)
+            continue;
+        memcpy(&at->first, &samples[i].word, 4);
+        at->id = samples[i].id;
+        at->payload = 0;
+        for (int c = 0; c < 3; c++) {
+            at->payload |= (uint32_t)samples[i].color[c] << 8 * c;
+            at->normal_winner[c] = (float)samples[i].normal[c];
+        }
+    }
+    free(samples);
 }
 
 int reference_render(const struct spl_dataset *dataset, const struct spl_view *view, struct spl_frame *frame,
@@ -415,10 +459,23 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                        .lod = view->lod,
                                        .low_pass = SPL_LOW_PASS,
                                        .resident = always,
-                                       .points = view->method == SPL_METHOD_POINTS,
+                                       .points = view->method != SPL_METHOD_SPLAT,
                                        .textured = always,
                                        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
-    int rc = spl_select(&params, &s.list, err);
+    struct spl_fill_plan plan;
+    int rc = SPL_OK;
+    if (view->method == SPL_METHOD_FILL) {
+        double spacing = 1;
+        rc = view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
+        spl_fill_plan_init(&plan, view, spacing);
+        s.guard = plan.guard;
+        s.camera.width += 2 * plan.guard;
+        s.camera.height += 2 * plan.guard;
+        s.camera.cx += plan.guard;
+        s.camera.cy += plan.guard;
+    }
+    if (!rc)
+        rc = spl_select(&params, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
     if (!rc && !s.samples)
@@ -441,6 +498,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for_each_disc(&s, false);
         if (view->method == SPL_METHOD_SPLAT)
             for_each_disc(&s, true);
+        if (view->method == SPL_METHOD_FILL)
+            fill(&s, &plan);
         for (uint32_t y = 0; y < view->camera.height; y++)
             for (uint32_t x = 0; x < view->camera.width; x++)
                 resolve_pixel(&s, x, y, frame);

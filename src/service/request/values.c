@@ -31,7 +31,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
-                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, lod, margin and v"
+                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
                        : info->places & SPL_CAMERA          ? "give it in the \"camera\" object of a POST"
                                                             : "give it beside \"camera\"");
@@ -145,6 +145,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
     } table[] = {
         [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
         [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points, fill"},
+        [SPL_KIND_VISIBILITY] = {spl_visibility_from_name, "adaptive, constant, none"},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
                                                          ? "jpeg, png, webp, npy, raw"

@@ -14,6 +14,7 @@ enum {
     SPL_KIND_FLAG = SPL_KIND_END,
     SPL_KIND_COLOR,
     SPL_KIND_METHOD,
+    SPL_KIND_VISIBILITY,
     SPL_KIND_LAYER,
     SPL_KIND_LAYERS, /* bit per enum spl_layer */
     SPL_KIND_FORMAT,
@@ -68,7 +69,7 @@ int spl_values_from_body(struct values *values, const char *body, size_t length,
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
 
-/* The parts of it that picks share: method, lod, margin; the version. */
+/* The parts of it that picks share: method, lod, margin, what method fill takes; the version. */
 int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err);
 void spl_values_resolve_version(const struct values *values, struct spl_view_request *out);
 

@@ -1,0 +1,270 @@
+/* The screen-space filter again; written from the comments of the kernels. A level is an array of cells that hold what
+ * the kernels' words do, in members. Inverse depths are cut to as many bits as the words have, so that both see the
+ * same. */
+#include "support/reference_fill.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "dataset/format.h"
+#include "shared.h"
+
+struct cell {
+    float w;       /* inverse depth, 0 = nothing */
+    float spacing; /* radius, multiples of the filter's */
+    uint32_t x, y; /* the sample */
+    uint32_t id;
+    double color[3], normal[3];
+    bool hole;
+};
+
+struct filter {
+    struct cell *nearest[SPL_FILL_LEVELS_MAX + 1], *means[SPL_FILL_LEVELS_MAX + 1];
+    uint32_t width[SPL_FILL_LEVELS_MAX + 1], height[SPL_FILL_LEVELS_MAX + 1];
+    float focal, radius, reach, margin, threshold;
+    const struct spl_view *view;
+    const struct spl_fill_plan *plan;
+};
+
+static uint32_t bits_of(float f)
+{
+    uint32_t u;
+    memcpy(&u, &f, 4);
+    return u;
+}
+
+static float float_of(uint32_t u)
+{
+    float f;
+    memcpy(&f, &u, 4);
+    return f;
+}
+
+static float cut(float w, uint32_t bits)
+{
+    return float_of(bits_of(w) & ~((1u << bits) - 1));
+}
+
+uint32_t reference_fill_code(float radius, double median)
+{
+    float ratio = radius / (float)(median / 16);
+    for (uint32_t code = 0; code < 31; code++) { /* 1, 1.5, 2, 3, …: the one whose float's bits are nearest */
+        float middle = float_of((code << 22) + 0x3f800000u + (1u << 21));
+        if (ratio < middle)
+            return code;
+    }
+    return 31;
+}
+
+/* `to` takes the nearest of its 2 x 2; equals: larger spacing, then later row and column, as the words' low bits say.
+ */
+static void pull(struct filter *f, uint32_t level)
+{
+    for (uint32_t y = 0; y < f->height[level]; y++) {
+        for (uint32_t x = 0; x < f->width[level]; x++) {
+            struct cell *to = &f->nearest[level][y * f->width[level] + x];
+            uint64_t best = 0;
+            for (uint32_t i = 0; i < 4; i++) {
+                uint32_t cx = 2 * x + i % 2, cy = 2 * y + i / 2, low = (1u << level) - 1;
+                if (cx >= f->width[level - 1] || cy >= f->height[level - 1])
+                    continue;
+                const struct cell *from = &f->nearest[level - 1][cy * f->width[level - 1] + cx];
+                uint64_t rank = (uint64_t)bits_of(cut(from->w, 5 + 2 * level)) << 32 |
+                                (uint64_t)((from->y & low) << level | (from->x & low)) << 8 | (from->w > 0);
+                if (from->w > 0 && rank > best) {
+                    best = rank;
+                    *to = *from;
+                    to->w = cut(from->w, 5 + 2 * level);
+                }
+            }
+        }
+    }
+}
+
+static void block(const struct filter *f, const struct cell *c, float z, int dx, int dy, bool constant, float steep[8])
+{
+    float angle = c->w * c->spacing * f->radius, kernel = (float)f->plan->kernel, squared = (float)(dx * dx + dy * dy);
+    float reach = constant ? kernel : fminf(angle * f->reach, kernel);
+    if (c->w <= 0 || squared > reach * reach)
+        return;
+    float value = (z * c->w - 1 - f->margin * angle) * f->focal / sqrtf(squared);
+    double turn = atan2(dy, dx) / (M_PI / 4);
+    int sector = (int)floor(turn + 8 + 1e-9) % 8;
+    steep[sector] = fmaxf(steep[sector], value);
+}
+
+static float coarse_reach(const struct filter *f, int x, int y)
+{
+    int level = (int)f->plan->rings, w = (int)f->width[level], h = (int)f->height[level];
+    float angle = 0;
+    for (int i = 0; i < 4; i++) {
+        int cx = (x >> level) + (i & 1 ? 2 * (x >> (level - 1) & 1) - 1 : 0);
+        int cy = (y >> level) + (i & 2 ? 2 * (y >> (level - 1) & 1) - 1 : 0);
+        cx = cx < 0 ? 0 : cx < w ? cx : w - 1;
+        cy = cy < 0 ? 0 : cy < h ? cy : h - 1;
+        const struct cell *c = &f->nearest[level][cy * w + cx];
+        angle = fmaxf(angle, c->w * c->spacing);
+    }
+    return fminf(angle * f->radius * f->reach, (float)f->plan->kernel);
+}
+
+static bool is_visible(const struct filter *f, int x, int y, float z)
+{
+    float steep[8] = {0}, open = 0;
+    bool constant = f->view->visibility == SPL_VISIBILITY_CONSTANT;
+    if (constant) {
+        int k = (int)f->plan->kernel;
+        for (int cy = y - k; cy <= y + k; cy++)
+            for (int cx = x - k; cx <= x + k; cx++)
+                if (cx >= 0 && cy >= 0 && cx < (int)f->width[0] && cy < (int)f->height[0] && (cx != x || cy != y))
+                    block(f, &f->nearest[0][cy * (int)f->width[0] + cx], z, cx - x, cy - y, true, steep);
+    } else {
+        float reach = coarse_reach(f, x, y);
+        for (int level = 0; level < (int)f->plan->rings; level++) {
+            if (level > 1 && (float)(1 << level) > reach)
+                break;
+            for (int i = 0; i < 9; i++) {
+                int cx = (x >> level) + i % 3 - 1, cy = (y >> level) + i / 3 - 1;
+                if (i == 4 || cx < 0 || cy < 0 || cx >= (int)f->width[level] || cy >= (int)f->height[level])
+                    continue;
+                const struct cell *c = &f->nearest[level][cy * (int)f->width[level] + cx];
+                block(f, c, z, (int)c->x - x, (int)c->y - y, false, steep);
+            }
+        }
+    }
+    for (int i = 0; i < 8; i++) {
+        float s = fminf(steep[i], 1e6f);
+        open += 1 - s / sqrtf(s * s + 1);
+    }
+    return open >= f->threshold;
+}
+
+/* The mean of `count` cells, weighted, of those on the surface of the nearest, which is `samples` wide. */
+static struct cell mean(const struct filter *f, const struct cell *const cells[4], const float weights[4],
+                        float samples)
+{
+    const struct cell *near = NULL;
+    struct cell out = {0};
+    float sum = 0, weight = 0;
+    for (int i = 0; i < 4; i++)
+        if (cells[i] && cells[i]->w > 0 && !cells[i]->hole && (!near || cells[i]->w > near->w))
+            near = cells[i];
+    if (!near)
+        return out;
+    float slope = samples * SPL_FILL_SLOPE * (1 / f->focal);
+    float least = near->w / (1 + (slope + f->margin * f->radius * near->w * near->spacing));
+    for (int i = 0; i < 4; i++) {
+        if (!cells[i] || cells[i]->hole || !(cells[i]->w > 0) || cells[i]->w < least)
+            continue;
+        sum += weights[i] * cells[i]->w;
+        weight += weights[i];
+        for (int c = 0; c < 3; c++) {
+            out.color[c] += weights[i] * cells[i]->color[c];
+            out.normal[c] += weights[i] * cells[i]->normal[c];
+        }
+    }
+    double length = 0;
+    for (int c = 0; c < 3; c++) {
+        out.color[c] = floor(out.color[c] / weight + 0.5);
+        length += out.normal[c] * out.normal[c];
+    }
+    for (int c = 0; c < 3 && length > 0; c++)
+        out.normal[c] /= sqrt(length);
+    out.w = cut(sum / weight, 5);
+    out.spacing = near->spacing;
+    out.id = near->id;
+    return out;
+}
+
+static void gather(struct filter *f, uint32_t level)
+{
+    for (uint32_t y = 0; y < f->height[level]; y++) {
+        for (uint32_t x = 0; x < f->width[level]; x++) {
+            const struct cell *children[4] = {0};
+            for (uint32_t i = 0; i < 4; i++)
+                if (2 * x + i % 2 < f->width[level - 1] && 2 * y + i / 2 < f->height[level - 1])
+                    children[i] = &f->means[level - 1][(2 * y + i / 2) * f->width[level - 1] + 2 * x + i % 2];
+            f->means[level][y * f->width[level] + x] = mean(f, children, (float[]){1, 1, 1, 1}, (float)(1u << level));
+        }
+    }
+}
+
+static struct cell above(const struct filter *f, uint32_t level, int x, int y)
+{
+    int w = (int)f->width[level + 1], h = (int)f->height[level + 1];
+    const struct cell *cells[4];
+    for (int i = 0; i < 4; i++) {
+        int cx = x / 2 + (i & 1 ? 2 * (x & 1) - 1 : 0), cy = y / 2 + (i & 2 ? 2 * (y & 1) - 1 : 0);
+        cx = cx < 0 ? 0 : cx < w ? cx : w - 1;
+        cy = cy < 0 ? 0 : cy < h ? cy : h - 1;
+        cells[i] = &f->means[level + 1][cy * w + cx];
+    }
+    return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level));
+}
+
+static void finish_sample(const struct filter *f, struct fill_sample *s, int x, int y)
+{
+    const struct cell *state = &f->means[0][y * (int)f->width[0] + x];
+    uint32_t plain = s->word == SPL_NOTHING ? SPL_NOTHING : (s->word & ~SPL_FILL_DEPTH_BITS) | 32;
+    struct cell c = above(f, 0, x, y);
+    uint32_t surface = c.w > 0 ? bits_of(1 / c.w) : SPL_NOTHING;
+    bool linear = s->word != SPL_NOTHING && s->word & SPL_FILL_LINEAR;
+    s->word = plain;
+    if (!state->hole || c.w <= 0 || (linear && plain <= surface))
+        return;
+    s->word = surface;
+    s->id = c.id;
+    memcpy(s->color, c.color, sizeof c.color);
+    memcpy(s->normal, c.normal, sizeof c.normal);
+}
+
+void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
+                    const struct spl_view *view, const struct spl_fill_plan *plan)
+{
+    struct filter f = {.view = view, .plan = plan, .focal = (float)focal};
+    f.reach = (float)(3 / 1.128379f * focal);
+    f.margin = (float)(1 / 1.128379f);
+    f.radius = (float)(median / 16);
+    f.threshold = (float)(8 * (view->threshold < 0 ? 0.3125 : view->threshold));
+    for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
+        f.width[level] = (width + (1u << level) - 1) >> level;
+        f.height[level] = (height + (1u << level) - 1) >> level;
+        f.nearest[level] = calloc((size_t)f.width[level] * f.height[level], sizeof **f.nearest);
+        f.means[level] = calloc((size_t)f.width[level] * f.height[level], sizeof **f.means);
+        spl_assert(f.nearest[level] && f.means[level]);
+    }
+    for (uint32_t i = 0; i < width * height; i++) {
+        const struct fill_sample *s = &samples[i];
+        struct cell *c = &f.nearest[0][i];
+        if (s->word == SPL_NOTHING || s->word & SPL_FILL_LINEAR)
+            continue;
+        *c = (struct cell){
+            .w = cut(1 / float_of(s->word & ~SPL_FILL_DEPTH_BITS), 5), .x = i % width, .y = i / width, .id = s->id};
+        c->spacing = float_of(((s->word >> 1 & 31) << 22) + 0x3f800000u);
+        memcpy(c->color, s->color, sizeof c->color);
+        memcpy(c->normal, s->normal, sizeof c->normal);
+    }
+    for (uint32_t level = 1; level <= plan->rings; level++)
+        pull(&f, level);
+    for (uint32_t i = 0; i < width * height; i++) {
+        const struct cell *own = &f.nearest[0][i];
+        f.means[0][i] = *own;
+        bool keeps = own->w > 0 && view->visibility == SPL_VISIBILITY_NONE;
+        f.means[0][i].hole =
+            !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
+    }
+    for (uint32_t level = 1; level <= plan->levels; level++)
+        gather(&f, level);
+    for (uint32_t level = plan->levels; level-- > 1;)
+        for (uint32_t i = 0; i < f.width[level] * f.height[level]; i++)
+            if (!(f.means[level][i].w > 0))
+                f.means[level][i] = above(&f, level, (int)(i % f.width[level]), (int)(i / f.width[level]));
+    for (uint32_t i = 0; i < width * height; i++)
+        finish_sample(&f, &samples[i], (int)(i % width), (int)(i / width));
+    for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
+        free(f.nearest[level]);
+        free(f.means[level]);
+    }
+}
