@@ -46,7 +46,7 @@ struct spl_view {
     double kernel;              /* side of the visibility kernel where it is largest, pixels: 3 to 129; 0 = from the
                                    points' spacing on the image */
     double threshold;           /* share of the eight sectors that must be open where a point is visible, 0..1;
-                                   negative = default 0.3125 */
+                                   negative = default 0.38 */
     uint32_t pyramid;           /* levels of the pyramid that holes are filled from, 1..8; 0 = from the kernel */
     double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */

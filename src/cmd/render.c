@@ -56,7 +56,7 @@ static void usage(FILE *out)
             "  --visibility V           adaptive; constant: the whole kernel everywhere, slow; none: no point is removed\n"
             "  --kernel N               side of the visibility kernel where it is largest, pixels, 3 to 129\n"
             "                           (0: six times the points' spacing where they are sparsest)\n"
-            "  --threshold T            share of the sectors that is open where a point is visible (0.3125)\n"
+            "  --threshold T            share of the sectors that is open where a point is visible (0.38)\n"
             "  --pyramid N              levels that holes are filled from, 1 to 8 (0: as the kernel needs)\n"
             "File:\n"
             "  -o, --output FILE        written in one piece; '-' is stdout and wants --format\n"

@@ -11,11 +11,11 @@
 #include "dataset/format.h"
 #include "render/renderer.h"
 
-/* A sector of a kernel that reaches k spacings holds k^2 pi / 8 points on average. With three it is 3.5, and a random
- * cloud leaves three or more sectors of eight empty, which the threshold takes for open, in one pixel of a thousand. */
+/* A sector of a kernel that reaches k spacings holds k^2 pi / 8 points on average. With three it is 3.5, and of random
+ * points leaves four or more sectors of eight empty, which the threshold takes for open, in one pixel of 10^4. */
 static const double reach_spacings = 3;
-/* Between two open sectors, a hole in a surface, and three, the edge of one. */
-static const double default_threshold = 2.5 / 8;
+/* Just above three open sectors of eight: the edge of a surface leaves four, a hole in one three at most. */
+static const double default_threshold = 0.38;
 /* Two surfaces less than a spacing apart cannot be told from one that is rough. */
 static const double margin_spacings = 1;
 static const double kernel_most = 64;

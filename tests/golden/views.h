@@ -31,6 +31,9 @@ static const struct golden goldens[] = {
     /* the other method; a pixel takes one splat's colour, so a lost tie changes it altogether: no levels, only a share */
     {"overview-points", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_POINTS, SPL_LAYER_COLOR, 0, 1,
      {32, 64, 96, 255}, 0, {0, 0.002}},
+    /* points lie up to eight pixels apart: what is hidden, what is a hole, and what closes it */
+    {"wall-fill", {1.2, 4.5, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_FILL, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002}},
     /* millimetres, so 1 level is 1e-4 of the nearest depth here: rounding to the scale */
     {"overview-depth", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_DEPTH, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}},
