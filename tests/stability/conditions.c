@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "measure.h"
+#include "shared.h"
 #include "themes.h"
 
 static const double step_px = 1.5;
@@ -24,7 +25,7 @@ static void must(int rc, const struct spl_error *err)
 
 bool conditions_wants(const struct conditions *c, const char *condition)
 {
-    return !c->only || !strcmp(c->only, condition);
+    return !c->only || !strncmp(c->only, condition, strlen(c->only));
 }
 
 /* The view from 1.5 pixels further right, as seen at the harmonic mean of the truth's depths. */
@@ -146,10 +147,18 @@ static bool measure(struct conditions *c, const struct world *world, const struc
     return rendered;
 }
 
-void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
-                        const char *condition, const char *value, bool whole_only)
+/* How a view is drawn for a row. */
+struct drawing {
+    const char *name;
+    enum spl_method method;
+    uint32_t atoms;
+};
+
+/* One row a drawing. */
+static void measure_rows(struct conditions *c, const struct world *world, const struct spl_view *view,
+                         const struct drawing *drawings, size_t count, const struct row *name)
 {
-    if (!conditions_wants(c, condition) || (whole_only && !c->suite->whole))
+    if (!conditions_wants(c, name->condition) || (name->whole && !c->suite->whole))
         return;
     struct spl_image truths[2][SPL_LAYER_COUNT];
     struct spl_view crop = crop_view(view);
@@ -157,9 +166,11 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
     struct spl_view views[2] = {*view, step_aside(view, &truths[0][SPL_LAYER_DEPTH])};
     crop = crop_view(&views[1]);
     truth_render(world, &crop.camera, truths[1]);
-    for (int method = 0; method < JUDGED_METHODS; method++) {
-        struct row row = {condition, value, spl_method_name((enum spl_method)method), whole_only, {0}};
-        views[0].method = views[1].method = (enum spl_method)method;
+    for (size_t i = 0; i < count; i++) {
+        struct row row = *name;
+        row.method = drawings[i].name;
+        views[0].method = views[1].method = drawings[i].method;
+        views[0].atoms = views[1].atoms = drawings[i].atoms;
         bool measured = measure(c, world, views, truths, true, &row);
         if (measured && c->update)
             table_put(c->table, &row);
@@ -175,4 +186,22 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
     }
     truth_finish(truths[0]);
     truth_finish(truths[1]);
+}
+
+void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
+                        const char *condition, const char *value, bool whole_only)
+{
+    struct drawing drawings[JUDGED_METHODS];
+    for (int method = 0; method < JUDGED_METHODS; method++)
+        drawings[method] =
+            (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method, view->atoms};
+    measure_rows(c, world, view, drawings, JUDGED_METHODS, &(struct row){condition, value, NULL, whole_only, {0}});
+}
+
+void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
+                                 const char *condition, const char *value, bool whole_only)
+{
+    static const struct drawing drawings[] = {{"coloured", SPL_METHOD_SPLAT, 0},
+                                              {"textured", SPL_METHOD_SPLAT, SPL_TEXTURE_ATOMS}};
+    measure_rows(c, world, view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
 }

@@ -8,7 +8,7 @@
 struct conditions {
     struct suite *suite; /* .renderer writes the table, .other (may be NULL) is held against it */
     struct table *table;
-    const char *only;     /* the one condition that is measured; may be NULL */
+    const char *only;     /* how the conditions that are measured begin; may be NULL */
     const char *pictures; /* a folder for a picture of each row; may be NULL */
     bool update;
 };
@@ -19,11 +19,16 @@ struct conditions {
 void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
                         const char *condition, const char *value, bool whole_only);
 
-/* Is this condition to be measured? */
+/* The same, drawn by splats with their mean colours and with their textures: rows "coloured" and "textured". */
+void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
+                                 const char *condition, const char *value, bool whole_only);
+
+/* Is this condition to be measured? `only` may be the beginning of its name. */
 bool conditions_wants(const struct conditions *c, const char *condition);
 
 void conditions_of_scans(struct conditions *c);  /* density, noise, poses, echoes; thin, stepped, leafy, fine things */
 void conditions_of_views(struct conditions *c);  /* where the eye is, what it takes in, how large the image is */
 void conditions_of_shapes(struct conditions *c); /* degenerate neighbourhoods */
+void conditions_of_photographs(struct conditions *c); /* textures: what photographs show, and how they may be spoilt */
 
 #endif

@@ -107,6 +107,7 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     conditions_of_scans(conditions);
     conditions_of_views(conditions);
     conditions_of_shapes(conditions);
+    conditions_of_photographs(conditions);
     if (!conditions->only && !(conditions->update && suite->whole))
         table_find_stale(conditions->table, &suite->report, suite->whole);
     if (conditions->update)

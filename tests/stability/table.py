@@ -1,6 +1,7 @@
 """The stability table for people: what table.json holds, as Markdown between two marks in tests/bench/RESULTS.md.
 
-usage: table.py --update STABILITY [--whole]   measures anew with that program, then writes both files
+usage: table.py --update STABILITY [NAME] [--whole]   measures anew with that program, then writes both files; NAME: only
+                                               the conditions whose names begin so
        table.py --write                        writes RESULTS.md from table.json as it is
        table.py --check                        exit 1 where RESULTS.md does not hold what table.json does
 """
@@ -19,6 +20,9 @@ SPLAT = [("psnr", "PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("holes", "holes", 100,
          ("flicker", "flicker", 1, 1)]
 POINTS = [("psnr", "points: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
+BEGIN_TEXTURES, END_TEXTURES = "<!-- table.py: textures begin -->\n", "<!-- table.py: textures end -->\n"
+COLOURED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
+TEXTURED = [("psnr", "textures: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
 
 
 def cell(row, figure, factor, decimals):
@@ -30,19 +34,21 @@ def cell(row, figure, factor, decimals):
     return f"{value * factor:.{decimals}f}"
 
 
-def markdown():
+def markdown(kinds):
+    """The rows of these methods, each with its columns."""
     rows = json.loads(TABLE.read_text(encoding="utf-8"))["rows"]
     by_name = {}
     for row in rows:
-        by_name.setdefault((row["condition"], row["value"]), {})[row["method"]] = row
-    headings = ["condition", ""] + [column[1] for column in SPLAT + POINTS]
+        if row["method"] in kinds:
+            by_name.setdefault((row["condition"], row["value"]), {})[row["method"]] = row
+    headings = ["condition", ""] + [column[1] for columns in kinds.values() for column in columns]
     lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
     last = None
     order = list(dict.fromkeys(condition for condition, _ in by_name))
     for (condition, value), methods in sorted(by_name.items(), key=lambda item: order.index(item[0][0])):
         cells = [condition if condition != last else "", value]
-        cells += [cell(methods.get("splat"), f, factor, d) for f, _, factor, d in SPLAT]
-        cells += [cell(methods.get("points"), f, factor, d) for f, _, factor, d in POINTS]
+        for method, columns in kinds.items():
+            cells += [cell(methods.get(method), f, factor, d) for f, _, factor, d in columns]
         lines.append("| " + " | ".join(cells) + " |")
         last = condition
     return "\n".join(lines) + "\n"
@@ -56,10 +62,13 @@ def main(arguments):
     elif arguments not in (["--write"], ["--check"]):
         sys.exit(__doc__)
     text = RESULTS.read_text(encoding="utf-8")
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        sys.exit(f"{RESULTS}: the marks {BEGIN.strip()} and {END.strip()} must be there once each")
-    head, rest = text.split(BEGIN)
-    new = head + BEGIN + markdown() + END + rest.split(END)[1]
+    new = text
+    for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS}),
+                              (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
+        if text.count(begin) != 1 or text.count(end) != 1:
+            sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")
+        head, rest = new.split(begin)
+        new = head + begin + markdown(kinds) + end + rest.split(end)[1]
     if arguments == ["--check"]:
         if new != text:
             print(f"{RESULTS} is not what {TABLE.name} says: run tests/stability/table.py --write")

@@ -8,7 +8,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <splatd/pack.h>
 #include <splatd/synth.h>
 
 #include "support/make_dataset.h"
@@ -30,12 +29,13 @@ static void *must_have(void *p)
     return p;
 }
 
-static void pack(struct world *world, const char *folder, const char *scan)
+static void pack(struct world *world, const char *folder, const char *scan, const struct spl_photo_options *photos)
 {
     struct spl_error err = {0};
     char packed[512];
     snprintf(packed, sizeof packed, "%s/world.spld", folder);
-    const struct spl_pack_options options = {.inputs = (const char *const[]){scan}, .input_count = 1, .output = packed};
+    const struct spl_pack_options options = {
+        .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos};
     must(spl_pack(&options, NULL, &err), world->name, &err);
     must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);
     unlink(packed);
@@ -66,12 +66,18 @@ void world_init(struct world *world, const struct scan *scan)
     must(spl_scene_create(scan->scene, &world->scene, &err), scan->scene, &err);
     make_folder(folder);
     synth(scan, folder, path);
-    pack(world, folder, path);
+    pack(world, folder, path, NULL);
     unlink(path);
     rmdir(folder);
 }
 
 void world_init_points(struct world *world, const char *name, const struct point *points, size_t count)
+{
+    world_init_photos(world, name, points, count, NULL);
+}
+
+void world_init_photos(struct world *world, const char *name, const struct point *points, size_t count,
+                       const struct spl_photo_options *photos)
 {
     char folder[256], path[512];
     *world = (struct world){0};
@@ -89,7 +95,7 @@ void world_init_points(struct world *world, const char *name, const struct point
                   fwrite(points[i].color, sizeof points[i].color, 1, file) == 1 && written;
     if (fclose(file) || !written)
         must(1, path, &(struct spl_error){.message = "cannot be written"});
-    pack(world, folder, path);
+    pack(world, folder, path, photos);
     unlink(path);
     rmdir(folder);
 }

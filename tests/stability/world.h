@@ -4,6 +4,7 @@
 #define STABILITY_WORLD_H
 
 #include <splatd/dataset.h>
+#include <splatd/pack.h>
 #include <splatd/render.h>
 
 #include "synth/scene.h"
@@ -43,6 +44,9 @@ struct suite {
 void world_init(struct world *world, const struct scan *scan);
 /* Packs points as they are. */
 void world_init_points(struct world *world, const char *name, const struct point *points, size_t count);
+/* The same with photographs. */
+void world_init_photos(struct world *world, const char *name, const struct point *points, size_t count,
+                       const struct spl_photo_options *photos);
 void world_finish(struct suite *suite, struct world *world);
 
 /* The points of the scene's scan, which the caller frees. */

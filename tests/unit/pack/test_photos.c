@@ -232,6 +232,43 @@ static void exposures_are_found_among_outliers(void **state)
     spl_candidates_finish(&candidates);
 }
 
+/* On print a scan's points have the paper's colour, photographs the mean of paper and ink: no photograph is brightened
+ * for it. Where photographs meet none, the scan is what evens them out. */
+static void a_scan_of_print_brightens_nothing(void **state)
+{
+    (void)state;
+    struct spl_candidates candidates;
+    struct spl_gain gains[3];
+    enum { splats = 20000 };
+    static uint8_t own[splats][3];
+    for (int apart = 0; apart < 2; apart++) {
+        assert_int_equal(spl_candidates_init(&candidates, splats, 2, NULL), 0);
+        for (uint64_t s = 0; s < splats; s++) {
+            bool print = !apart && s % 2;
+            uint8_t across = (uint8_t)(s * 7 % 120 + (print ? 130 : 0));
+            memset(own[s], print ? s % 8 == 1 ? 40 : 200 : 120, 3);
+            for (uint16_t photo = 0; photo < 2; photo++) {
+                struct spl_candidate c = {.photo = photo,
+                                          .score = (uint16_t)(33000 - (s + photo) % 2),
+                                          .place = {across, (uint8_t)(s % 256)}};
+                memset(c.color, print ? 150 : apart && photo ? 96 : 120, 3);
+                if (!apart || photo == s % 2)
+                    spl_candidates_add(&candidates, s, &c);
+            }
+        }
+        assert_int_equal(spl_gains_find(&candidates, (const uint8_t(*)[3])own, 2, gains, NULL), 0);
+        float left[2][3], right[3];
+        for (int photo = 0; photo < 2; photo++) {
+            spl_gain_get(&gains[photo], (uint8_t[]){30, 128}, left[photo]);
+            spl_gain_get(&gains[photo], (uint8_t[]){220, 128}, right);
+            if (!apart)
+                assert_true(fabsf(right[1] / left[photo][1] - 1) < 0.015f);
+        }
+        assert_true(fabsf(left[1][1] / left[0][1] / (apart ? 1.25f : 1) - 1) < 0.02f);
+        spl_candidates_finish(&candidates);
+    }
+}
+
 static void the_majority_gives_the_colour_and_neighbours_lend(void **state)
 {
     (void)state;
@@ -366,6 +403,7 @@ int main(void)
         cmocka_unit_test(what_hides_a_splat_is_seen),
         cmocka_unit_test(the_best_are_kept_in_any_order),
         cmocka_unit_test(exposures_are_found_among_outliers),
+        cmocka_unit_test(a_scan_of_print_brightens_nothing),
         cmocka_unit_test(glare_is_found_where_it_is),
         cmocka_unit_test(textures_show_the_plane_and_not_the_view),
         cmocka_unit_test(the_majority_gives_the_colour_and_neighbours_lend),
