@@ -17,7 +17,7 @@ static const double stiffness = 0.5; /* between corners of a grid, share of a me
 const uint8_t spl_gain_middle[2] = {128, 128};
 /* Weight of a scan's own colour, which is a point's where a photograph's is a disc's mean: on print it is the paper's,
  * and would brighten the photograph there. What it has to say where photographs meet none is heard all the same. */
-static const double scanned = 0.02;
+static const double scan_weight = 0.02;
 static const double anchor = 1e-3;    /* pull towards 0, share of a mean photograph's pairs */
 static const double log_max = 1.0986; /* of a factor: 3 */
 
@@ -231,7 +231,7 @@ int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)
             double worst = 0;
             for (int c = 0; c < 3; c++)
                 worst = fmax(worst, fabs(residual(&pairs[k], solved, c)));
-            double share = pairs[k].photo[1] == photos ? scanned : 1;
+            double share = pairs[k].photo[1] == photos ? scan_weight : 1;
             pairs[k].weight = (float)(share / (1 + worst * worst / (scales[round] * scales[round])));
         }
         for (int c = 0; c < 3; c++)
