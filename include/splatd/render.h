@@ -125,7 +125,7 @@ void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_
                                 struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline. A dataset without surface is drawn by method fill where
- * splat is asked for, and SPL_E_INPUT (field "layer") refuses its normals. On success the caller owns `frame`
+ * splat is asked for; its normals are the filled depth's, and SPL_E_INPUT (field "layer") refuses them of points. On success the caller owns `frame`
  * (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one.
  */
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,

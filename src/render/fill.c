@@ -38,7 +38,7 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
     double looks = view->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
     plan->align = 1u << top;
     plan->guard = round_up(kernel, plan->align);
-    plan->apron = round_up(looks + (2u << plan->levels), plan->align);
+    plan->apron = round_up(looks + (2u << plan->levels) + 2, plan->align); /* 2: normals look so far */
 }
 
 void spl_fill_set_params(struct spl_tile *tile)
@@ -126,6 +126,8 @@ int spl_fill_record(struct spl_tile *tile, uint32_t group, struct spl_error *err
                          &(struct pass){SPL_KERNEL_FILL_PUSH + 2 * group + (level == 0), level, p.means[level + 1],
                                         p.means[level], p.samples[level]},
                          err);
+    if (!rc && group == SPL_SUMS_NORMAL && !spl_dataset_get_info(tile->resident->dataset)->has_surface)
+        rc = record_pass(tile, &p, &(struct pass){SPL_KERNEL_FILL_NORMAL, 0, 0, 0, p.samples[0]}, err);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;
 }

@@ -396,10 +396,10 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
         return rc;
     struct spl_view bare = *view;
     if (!spl_dataset_get_info(dataset)->has_surface) {
-        if (view->layers >> SPL_LAYER_NORMAL & 1)
+        if (view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
             return spl_fail_field(err, SPL_E_INPUT, "layer",
-                                  "dataset '%s' has no normals, as it was packed with --points-only: ask for another "
-                                  "layer, or pack it without",
+                                  "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
+                                  "fill, which takes them from depth, or pack it without",
                                   spl_dataset_get_info(dataset)->id);
         bare.method = view->method == SPL_METHOD_SPLAT ? SPL_METHOD_FILL : view->method;
         view = &bare;

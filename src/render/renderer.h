@@ -22,7 +22,8 @@ enum spl_kernel_slot {
     SPL_KERNEL_FILL_POINTS = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT, /* the same */
     SPL_KERNEL_FILL_PULL = SPL_KERNEL_FILL_POINTS + 2 * SPL_SUMS_COUNT, /* + first */
     SPL_KERNEL_FILL_VISIBLE = SPL_KERNEL_FILL_PULL + 2,              /* + adaptive */
-    SPL_KERNEL_FILL_GATHER = SPL_KERNEL_FILL_VISIBLE + 2,            /* + 2 SPL_SUMS_* + first */
+    SPL_KERNEL_FILL_NORMAL = SPL_KERNEL_FILL_VISIBLE + 2,
+    SPL_KERNEL_FILL_GATHER,                                          /* + 2 SPL_SUMS_* + first */
     SPL_KERNEL_FILL_PUSH = SPL_KERNEL_FILL_GATHER + 2 * SPL_SUMS_COUNT, /* + 2 SPL_SUMS_* + last */
     SPL_KERNEL_RESOLVE = SPL_KERNEL_FILL_PUSH + 2 * SPL_SUMS_COUNT,  /* + 2 layer + (method splat ? 0 : 1) */
     SPL_KERNEL_COUNT = SPL_KERNEL_RESOLVE + 2 * SPL_LAYER_COUNT

@@ -36,7 +36,12 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
         constants[2] = slot >= SPL_KERNEL_FILL_POINTS;
         return wide ? "points64" : "points";
     }
-    if (slot < SPL_KERNEL_FILL_GATHER) {
+    if (slot == SPL_KERNEL_FILL_NORMAL) {
+        *count = 1;
+        constants[0] = wide;
+        return "fill_normal";
+    }
+    if (slot < SPL_KERNEL_FILL_NORMAL) {
         bool pull = slot < SPL_KERNEL_FILL_VISIBLE;
         *count = 2;
         constants[0] = slot - (pull ? SPL_KERNEL_FILL_PULL : SPL_KERNEL_FILL_VISIBLE);

@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import random
+import struct
 import subprocess
 import sys
 import tempfile
@@ -59,6 +60,12 @@ def main():
         assert image["splat"] == image["fill"] == image["default"] != image["points"]
         refused = run(*view, folder / "normal.png", "--layer", "normal", "--method", "points", code=2)
         expect(refused.stderr, "'bare' has no normals, as it was packed with --points-only")
+
+        run(*view, folder / "normal.npy", "--layer", "normal", "--eye", "5,-3,3", "--target", "5,5,0")
+        normals = (folder / "normal.npy").read_bytes()
+        normals = [n for n in struct.iter_unpack("<3f", normals[len(normals) - 160 * 120 * 12:]) if any(n)]
+        upright = sum(n[2] > 0.97 for n in normals)
+        assert len(normals) > 5000 and upright > 0.97 * len(normals), (len(normals), upright)
 
         before = bare.read_bytes()
         refused = run("pack", cloud, *columns, "--points-only", "--cameras", folder, "-o", bare, code=2)
