@@ -51,7 +51,7 @@ static void usage(FILE *out)
         "      --textures HOW       adaptive (default): as much as the photographs show; none: colours alone; D8W4, "
         "D12W4,\n"
         "                           D16W8: a fixed dictionary of 2^8, 2^12, 2^16 atoms, weights of 4, 4, 8 bits\n"
-        "      --texture-quality DB that a texture is coded to, 20 to 60 (default 40); lower is smaller\n"
+        "      --texture-quality DB that textures are coded to, all together, 20 to 60 (default 40); lower is smaller\n"
         "      --keep-going         photographs that cannot be used are named and left out\n"
         "      --keep-textures FILE as they are before coding too, for 'splatd bench --textures FILE'\n"
         "      --memory MIB         of the photographs' pass (default 2048)\n"

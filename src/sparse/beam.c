@@ -66,10 +66,7 @@ static uint32_t best_matches(const float *match, uint32_t count, uint32_t best[w
     uint32_t found = 0;
     for (uint32_t first = 0; first < count; first += scan_run) {
         uint32_t end = count - first < scan_run ? count : first + scan_run;
-        float largest = 0;
-        for (uint32_t a = first; a < end; a++)
-            largest = fabsf(match[a]) > largest ? fabsf(match[a]) : largest;
-        for (uint32_t a = largest > least ? first : end; a < end; a++) {
+        for (uint32_t a = spl_largest_magnitude(match + first, end - first) > least ? first : end; a < end; a++) {
             float m = fabsf(match[a]);
             if (!(m > least))
                 continue;

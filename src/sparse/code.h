@@ -89,6 +89,9 @@ struct spl_coder *spl_coder_create(const struct spl_dictionary *dictionary, cons
                                    uint64_t memory_bytes, unsigned threads, struct spl_error *err);
 void spl_coder_destroy(struct spl_coder *coder);
 
+/* Changes settings->lambda, which was and stays > 0. Nobody may be coding. */
+void spl_coder_set_lambda(struct spl_coder *coder, float lambda);
+
 /* Codes the `splats` (1..SPL_CHUNK_SPLATS) textures of a chunk. texture[i]: n bytes, or NULL for a splat without, which
  * gets no atom. mean[i] receives the texture's mean colour, rounded: the splat's colour is to be set to it; untouched
  * where there is no texture. `sums` is added to. Pure: the same input gives the same codes on the same kind of

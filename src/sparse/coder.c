@@ -111,6 +111,12 @@ void spl_coder_destroy(struct spl_coder *coder)
     free(coder);
 }
 
+void spl_coder_set_lambda(struct spl_coder *coder, float lambda)
+{
+    spl_assert(coder->settings.lambda > 0 && lambda > 0 && isfinite(lambda));
+    coder->settings.lambda = lambda;
+}
+
 static bool may_take(const struct pursuit *p, uint32_t row)
 {
     return !p->done[row] && p->error[row] > p->enough;

@@ -93,6 +93,18 @@ static int32_t magnitude(float value)
     return bits & INT32_MAX;
 }
 
+float spl_largest_magnitude(const float *values, uint32_t count)
+{
+    int32_t largest = 0;
+    float out;
+    for (uint32_t i = 0; i < count; i++) {
+        int32_t m = magnitude(values[i]);
+        largest = m > largest ? m : largest;
+    }
+    memcpy(&out, &largest, sizeof out);
+    return out;
+}
+
 uint32_t spl_block_best(const struct spl_block *block, uint32_t row, uint32_t begin, uint32_t end)
 {
     const float *match = block->match + (size_t)row * block->atoms->count;

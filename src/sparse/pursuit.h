@@ -44,6 +44,9 @@ void spl_block_begin(struct spl_block *block, const float *y, uint32_t rows);
 void spl_block_move(struct spl_block *block, uint32_t row, uint32_t atom, float change);
 void spl_block_step(struct spl_block *block);
 
+/* The largest magnitude of values[count]; 0 of none. */
+float spl_largest_magnitude(const float *values, uint32_t count);
+
 /* The atom in [begin, end) whose match has the largest magnitude; the first of equals. begin < end. */
 uint32_t spl_block_best(const struct spl_block *block, uint32_t row, uint32_t begin, uint32_t end);
 

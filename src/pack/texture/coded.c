@@ -1,7 +1,9 @@
 /* From textures to a dictionary and codes: what src/sparse does, over what lies in the file of textures.
  *
- * Codes are made in parallel over chunks and kept as the words that the container holds, some ten bytes a splat, since
- * the colours that they change must be known before the first node is written. One error wins. */
+ * With a price of bits, lambda, every splat gets the atoms that pay, so that the error of all together is the smallest
+ * for its bytes; lambda is sought on some chunks so that this error is the wanted one. Codes are made in parallel over
+ * chunks and kept as the words that the container holds, some ten bytes a splat, since the colours that they change
+ * must be known before the first node is written. One error wins. */
 #include "pack/texture/textures.h"
 
 #include <errno.h>
@@ -26,9 +28,13 @@ static const struct {
     [SPL_TEXTURES_D12W4] = {4096, 4, false},
     [SPL_TEXTURES_D16W8] = {65536, 8, false},
 };
-static const double quality_default = 40;   /* dB */
-static const double share_of_target = 0.02; /* of the wanted squared error that a bit must save */
-static const double seconds_most = 600;     /* of training */
+static const double quality_default = 40; /* dB */
+/* What a bit of codes saves where textures are as good as wanted, in shares of their squared error, on Sceaux; the
+ * packer starts there and seeks the lambda that gives the wanted quality. */
+static const double share_of_target = 0.025, share_range = 8;
+static const double db_per_lambda = 1.75; /* lower for e times the lambda, likewise */
+enum { sampled_chunks = 128, lambda_trials = 4 };
+static const double seconds_most = 600; /* of training */
 static const uint64_t memory_default = 2ull << 30;
 
 struct reader {
@@ -98,14 +104,16 @@ struct coding {
     struct spl_coder *coder;
     struct spl_chosen *chosen;
     struct spl_stage *stage;
-    struct spl_code_sums *sums; /* by worker */
+    struct spl_code_sums *sums; /* by worker; of a sample by its chunk */
+    uint32_t stride;            /* > 0: a sample, every so many-th chunk; nothing is kept */
     uint8_t *scratch;           /* by worker: the textures of a chunk */
     atomic_int failed;
     mtx_t mutex;
     struct spl_error *err; /* guarded by: mutex */
 };
 
-static int code_chunk(struct coding *coding, uint32_t chunk, unsigned worker, struct spl_error *err)
+static int code_chunk(struct coding *coding, uint32_t chunk, unsigned worker, struct spl_code_sums *sums,
+                      struct spl_error *err)
 {
     const struct spl_chunk *header = &coding->splats->chunks[chunk];
     const struct spl_textures *textures = coding->textures;
@@ -126,8 +134,8 @@ static int code_chunk(struct coding *coding, uint32_t chunk, unsigned worker, st
                      scratch + (size_t)first * textures->values, err);
     if (!rc)
         rc = spl_coder_code(coding->coder, texture, header->count, coding->chosen->color + header->first_id, &code,
-                            &coding->sums[worker], err);
-    if (rc)
+                            sums, err);
+    if (rc || coding->stride)
         return rc;
     uint32_t count = spl_texture_encode(&code, words);
     if (!count)
@@ -143,9 +151,10 @@ static int code_chunk(struct coding *coding, uint32_t chunk, unsigned worker, st
 static void code_chunks(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct coding *coding = context;
-    for (uint32_t chunk = (uint32_t)begin; chunk < end && !atomic_load(&coding->failed); chunk++) {
+    for (uint32_t i = (uint32_t)begin; i < end && !atomic_load(&coding->failed); i++) {
         struct spl_error why = {0};
-        int rc = code_chunk(coding, chunk, worker, &why);
+        int rc = coding->stride ? code_chunk(coding, i * coding->stride, worker, &coding->sums[i], &why)
+                                : code_chunk(coding, i, worker, &coding->sums[worker], &why);
         if (!rc)
             continue;
         mtx_lock(&coding->mutex);
@@ -153,7 +162,8 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
         mtx_unlock(&coding->mutex);
         atomic_store(&coding->failed, rc);
     }
-    spl_stage_add(coding->stage, end - begin, worker);
+    if (!coding->stride)
+        spl_stage_add(coding->stage, end - begin, worker);
 }
 
 static void add_sums(struct spl_code_sums *sums, const struct spl_code_sums *more)
@@ -167,29 +177,53 @@ static void add_sums(struct spl_code_sums *sums, const struct spl_code_sums *mor
         sums->histogram[i] += more->histogram[i];
 }
 
-static int code_all(struct coding *coding, struct spl_error *err)
+/* Codes all chunks, or a sample, and adds up to `total`. */
+static int code_all(struct coding *coding, struct spl_code_sums *total, struct spl_error *err)
 {
     unsigned threads = coding->stage->threads;
+    uint32_t chunks = coding->splats->chunk_count;
+    uint32_t wanted = coding->stride ? (chunks + coding->stride - 1) / coding->stride : chunks;
+    size_t parts = coding->stride ? wanted : threads;
     struct spl_error first = {0};
-    coding->sums = spl_alloc(threads, sizeof *coding->sums, err);
+    coding->sums = spl_alloc(parts, sizeof *coding->sums, err);
     coding->scratch = spl_alloc_raw((size_t)threads * SPL_CHUNK_SPLATS, coding->textures->values, err);
     coding->err = &first;
     int rc = coding->sums && coding->scratch ? SPL_OK : SPL_E_NOMEM;
     if (!rc && mtx_init(&coding->mutex, mtx_plain) != thrd_success)
         rc = spl_fail(err, SPL_E_NOMEM, "no mutex could be made");
     if (!rc) {
-        spl_stage_begin(coding->stage, "coding textures", coding->splats->chunk_count);
-        spl_parallel_for(threads, coding->splats->chunk_count, 1, code_chunks, coding);
-        spl_stage_end(coding->stage);
+        spl_parallel_for(threads, wanted, 1, code_chunks, coding);
         mtx_destroy(&coding->mutex);
         rc = atomic_load(&coding->failed);
         if (rc)
             spl_fail_field(err, rc, first.field, "%s", first.message);
     }
-    for (unsigned t = 0; coding->sums && t < threads; t++)
-        add_sums(&coding->coded->sums, &coding->sums[t]);
+    for (size_t i = 0; coding->sums && i < parts; i++) /* of a sample in the order of chunks: lambda depends on it */
+        add_sums(total, &coding->sums[i]);
     free(coding->sums);
     free(coding->scratch);
+    return rc;
+}
+
+/* Sets the coder's lambda, at first `lambda`, to one that gives a sample `quality` dB. */
+static int seek_lambda(struct coding *coding, double lambda, double quality, struct spl_error *err)
+{
+    double least = lambda / share_range, most = lambda * share_range;
+    int rc = SPL_OK;
+    coding->stride = coding->splats->chunk_count / sampled_chunks + 1;
+    for (int i = 0; i < lambda_trials && !rc; i++) {
+        struct spl_code_sums sums = {0};
+        rc = code_all(coding, &sums, err);
+        if (rc || !(sums.squared_error > 0))
+            break;
+        double over = -10 * log10(sums.squared_error / (double)sums.values) - quality;
+        double before = lambda;
+        lambda = fmin(fmax(lambda * exp(over / db_per_lambda), least), most);
+        if (fabs(log(lambda / before)) < 0.01)
+            break;
+        spl_coder_set_lambda(coding->coder, (float)lambda);
+    }
+    coding->stride = 0;
     return rc;
 }
 
@@ -208,7 +242,7 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         .method = SPL_TRAIN_BATCHES,
         .dictionary = codings[options->textures].dictionary,
         .atoms = SPL_ATOMS_MAX,
-        .psnr = (float)quality,
+        .psnr = weighs ? 0 : (float)quality,
         .lambda = weighs ? (float)(share_of_target * wanted) : 0,
         .seconds = seconds_most,
         .seed = 1,
@@ -233,8 +267,12 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
     spl_stage_end(stage);
     if (!rc && !(coding.coder = spl_coder_create(&coded->dictionary, &settings, memory, stage->threads, err)))
         rc = err && err->code ? err->code : SPL_E_NOMEM;
+    spl_stage_begin(stage, "coding textures", splats->chunk_count);
+    if (!rc && weighs)
+        rc = seek_lambda(&coding, (double)train.lambda, quality, err);
     if (!rc)
-        rc = code_all(&coding, err);
+        rc = code_all(&coding, &coded->sums, err);
+    spl_stage_end(stage);
     spl_coder_destroy(coding.coder);
     if (rc)
         spl_coded_finish(coded);
