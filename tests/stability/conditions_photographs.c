@@ -160,8 +160,8 @@ static void few_atoms(struct conditions *c, const struct photographs *all)
         struct packing packing;
         bool whole_only;
     } codings[] = {{"256 atoms, 4 bit weights", {&at_text, SPL_TEXTURES_D8W4, QUALITY}, true},
-                   {"coded to 20 dB", {&at_text, SPL_TEXTURES_ADAPTIVE, 20}, false},
-                   {"coded to 15 dB", {&at_text, SPL_TEXTURES_ADAPTIVE, 15}, true}};
+                   {"coded to 25 dB", {&at_text, SPL_TEXTURES_ADAPTIVE, 25}, false},
+                   {"coded to 20 dB", {&at_text, SPL_TEXTURES_ADAPTIVE, 20}, true}};
     for (size_t i = 0; i < sizeof codings / sizeof *codings; i++) {
         struct photographs photographs = {0};
         if (!wants(c, "photographs: few atoms", codings[i].whole_only))
