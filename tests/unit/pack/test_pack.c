@@ -269,7 +269,8 @@ static void test_linear_and_bare_points(void **state)
                                            .output = path_of("out.spld"),
                                            .threads = 2,
                                            .points_only = run & 1,
-                                           .no_linear = run & 2};
+                                           .no_linear = run & 2,
+                                           .no_clip_lines = run & 2};
         struct spl_pack_report report;
         struct spl_error err = {0};
         struct spl_dataset *dataset;
@@ -283,6 +284,7 @@ static void test_linear_and_bare_points(void **state)
         assert_int_equal(linear, report.linear);
         assert_true(info->has_linear == !options.no_linear && info->has_surface == !options.points_only);
         assert_true(!options.points_only == (info->attribute_bits[SPL_ATTRIBUTE_NORMAL] > 0));
+        assert_true((run == 0) == (info->attribute_bits[SPL_ATTRIBUTE_CLIP] > 0)); // the field has borders
         if (options.points_only)
             assert_true(!info->has_uncertainty && info->attribute_bits[SPL_ATTRIBUTE_RADIUS] == 0 &&
                         info->attribute_bits[SPL_ATTRIBUTE_UNCERTAINTY] == 0);
