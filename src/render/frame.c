@@ -1,5 +1,4 @@
-/* A frame: the image is cut into tiles that fit the scratch buffers; each tile selects, uploads, records, waits, and is
- * copied into the images. Supersampling is a larger tile that the resolve pass averages, so it costs no mechanism. */
+/* A frame: the image is cut into tiles; each tile selects, uploads, records, waits, and is copied into the images. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,9 +9,9 @@
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/renderer.h"
+#include "render/tiling.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
-enum { default_margin = 1 };
 
 static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
     [SPL_METHOD_SPLAT] = &spl_method_splat,
@@ -30,9 +29,8 @@ struct frame_job {
     struct spl_renderer *renderer;
     struct spl_resident_dataset *resident;
     const struct spl_view *view;
-    uint64_t deadline_ns;
     struct spl_frame *frame;
-    struct spl_fill_plan fill;   /* method fill */
+    struct spl_tiling tiling;
     struct spl_error page_error; /* why a page could not be loaded, unless it was only the limit */
 };
 
@@ -54,36 +52,6 @@ static bool ask_textures(void *context, uint32_t page)
 {
     struct frame_job *job = context;
     return ask_slot(job, spl_dictionary_slot(job->resident)) && ask_slot(job, spl_textures_slot(job->resident, page));
-}
-
-static void fill_params(struct spl_tile *tile)
-{
-    const struct spl_camera *camera = &tile->camera;
-    const struct spl_view *view = tile->view;
-    const uint8_t *b = view->background;
-    tile->params = (struct spl_frame_params){
-        .fx = (float)camera->fx,
-        .fy = (float)camera->fy,
-        .cx = (float)camera->cx,
-        .cy = (float)camera->cy,
-        .near = (float)camera->near,
-        .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
-        .low_pass = SPL_LOW_PASS,
-        .margin = view->margin < 0 ? default_margin : (float)view->margin,
-        .width = camera->width,
-        .height = camera->height,
-        .supersample = (uint32_t)view->supersample,
-        .inverse_fx = 1 / (float)camera->fx,
-        .inverse_fy = 1 / (float)camera->fy,
-        .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
-        .texture_size = spl_dataset_get_info(tile->resident->dataset)->texture_size,
-        .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
-        .crop_width = tile->width,
-        .crop_height = tile->height,
-    };
-    for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 3; column++)
-            tile->params.rotation[4 * row + column] = (float)camera->rotation[3 * row + column];
 }
 
 static struct spl_select_params selection(struct frame_job *job, const struct spl_camera *camera)
@@ -182,7 +150,7 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     struct spl_renderer *r = job->renderer;
     struct spl_frame_stats *stats = &job->frame->stats;
     uint64_t ticket, clock = spl_now_ns();
-    if (clock >= job->deadline_ns)
+    if (clock >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = select_tile(job, tile, err);
     stats->select_ms += since_ms(&clock);
@@ -210,80 +178,6 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     return SPL_OK;
 }
 
-/* The range [begin, end) of pixels along an axis of `size` pixels, in samples, with what is drawn around it. */
-static void widen(const struct spl_fill_plan *plan, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
-                  int64_t *from, int64_t *to)
-{
-    *from = (int64_t)begin * side - plan->apron;
-    *from = *from < -(int64_t)plan->guard ? -(int64_t)plan->guard : *from - *from % (int64_t)plan->align;
-    *to = (int64_t)end * side + plan->apron;
-    *to = *to > (int64_t)size * side + plan->guard ? (int64_t)size * side + plan->guard : *to;
-}
-
-/* The tile whose corner is (x, y): as wide as the image, as high as the scratch allows, in whole pixels. */
-static void place_tile(const struct frame_job *job, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
-                       struct spl_tile *tile)
-{
-    const struct spl_camera *whole = &job->view->camera;
-    uint32_t side = (uint32_t)job->view->supersample;
-    int64_t from[2] = {(int64_t)x * side, (int64_t)y * side}, to[2] = {from[0] + width * side, from[1] + height * side};
-    *tile = (struct spl_tile){
-        .renderer = job->renderer,
-        .resident = job->resident,
-        .view = job->view,
-        .camera = *whole,
-        .fill = job->fill,
-        .x = x,
-        .y = y,
-        .width = width,
-        .height = height,
-    };
-    if (job->view->method == SPL_METHOD_FILL) {
-        widen(&job->fill, side, whole->width, x, x + width, &from[0], &to[0]);
-        widen(&job->fill, side, whole->height, y, y + height, &from[1], &to[1]);
-    }
-    tile->camera.width = (uint32_t)(to[0] - from[0]);
-    tile->camera.height = (uint32_t)(to[1] - from[1]);
-    tile->samples = (uint64_t)tile->camera.width * tile->camera.height;
-    tile->camera.fx = whole->fx * side;
-    tile->camera.fy = whole->fy * side;
-    tile->camera.cx = whole->cx * side - (double)from[0];
-    tile->camera.cy = whole->cy * side - (double)from[1];
-    fill_params(tile);
-    tile->params.crop_x = (uint32_t)((int64_t)x * side - from[0]);
-    tile->params.crop_y = (uint32_t)((int64_t)y * side - from[1]);
-    if (job->view->method == SPL_METHOD_FILL)
-        spl_fill_set_params(tile);
-}
-
-/* The largest tile in pixels: whole rows where they fit. What is drawn around it must fit too. */
-static int tile_size(struct frame_job *job, uint32_t *width, uint32_t *height, struct spl_error *err)
-{
-    const struct spl_view *view = job->view;
-    uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
-    uint64_t samples = job->renderer->scratch.samples, around = 0, square = (uint64_t)sqrt((double)samples);
-    if (view->method == SPL_METHOD_FILL) {
-        const struct spl_fill_plan *plan = &job->fill;
-        uint64_t guard = 2 * (uint64_t)plan->guard;
-        around = 2 * (uint64_t)plan->apron + plan->align;
-        if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
-            around = guard;
-        if (square < around + side)
-            return spl_fail_field(err, SPL_E_LIMIT, "kernel",
-                                  "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
-                                  2 * plan->kernel / side, (unsigned long long)samples);
-    }
-    uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
-    uint64_t widest = around
-                          ? (samples / 2 / (around + side) > square ? samples / 2 / (around + side) : square) - around
-                          : samples / per_pixel * side;
-    *width = view->camera.width < widest / side ? view->camera.width : (uint32_t)(widest / side);
-    uint64_t rows = (samples / (*width * side + around) - around) / side, most = samples / layers / *width;
-    rows = rows < most ? rows : most;
-    *height = view->camera.height < rows ? view->camera.height : (uint32_t)rows;
-    return SPL_OK;
-}
-
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
 {
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
@@ -304,20 +198,15 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
 /* The plan is the whole image's, or tiles would show where they meet. */
 static int plan_fill(struct frame_job *job, struct spl_error *err)
 {
-    struct spl_camera camera = job->view->camera;
-    double side = job->view->supersample, spacing = 1;
-    camera.width *= (uint32_t)side;
-    camera.height *= (uint32_t)side;
-    camera.fx *= side;
-    camera.fy *= side;
-    camera.cx *= side;
-    camera.cy *= side;
+    struct spl_camera camera;
+    double spacing = 1;
+    spl_tiling_get_camera(job->view, &camera);
     struct spl_select_params params = selection(job, &camera);
     uint64_t clock = spl_now_ns();
     spl_residency_begin_frame(&job->renderer->residency);
     int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
     job->frame->stats.select_ms += since_ms(&clock);
-    spl_fill_plan_init(&job->fill, job->view, spacing);
+    spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
     return rc;
 }
 
@@ -326,7 +215,7 @@ static int render_view(struct spl_renderer *renderer, const struct spl_dataset *
                        struct spl_frame *frame, struct spl_error *err)
 {
     uint64_t start = spl_now_ns(), loaded = renderer->residency.pages_loaded;
-    struct frame_job job = {.renderer = renderer, .view = view, .frame = frame, .deadline_ns = view->deadline_ns};
+    struct frame_job job = {.renderer = renderer, .view = view, .frame = frame};
     int rc = 0;
     job.resident = spl_residency_get(&renderer->residency, dataset);
     if (!job.resident)
@@ -334,19 +223,16 @@ static int render_view(struct spl_renderer *renderer, const struct spl_dataset *
     frame->stats.complete = true;
     if (view->method == SPL_METHOD_FILL)
         rc = plan_fill(&job, err);
-    uint32_t width = 0, rows = 0;
     if (!rc)
-        rc = tile_size(&job, &width, &rows, err);
+        rc = spl_tiling_init(&job.tiling, view, renderer->scratch.samples, err);
     if (!rc)
         rc = make_images(frame, view, err);
-    for (uint32_t y = 0; y < view->camera.height && !rc; y += rows) {
-        uint32_t height = view->camera.height - y < rows ? view->camera.height - y : rows;
-        for (uint32_t x = 0; x < view->camera.width && !rc; x += width) {
-            struct spl_tile tile;
-            place_tile(&job, x, y, view->camera.width - x < width ? view->camera.width - x : width, height, &tile);
+    for (uint32_t y = 0; y < view->camera.height && !rc; y += job.tiling.height)
+        for (uint32_t x = 0; x < view->camera.width && !rc; x += job.tiling.width) {
+            struct spl_tile tile = {.renderer = renderer, .resident = job.resident, .view = view};
+            spl_tiling_place(&job.tiling, x, y, &tile);
             rc = render_tile(&job, &tile, err);
         }
-    }
     frame->stats.pages_loaded = renderer->residency.pages_loaded - loaded;
     frame->stats.total_ms = since_ms(&start);
     if (rc)

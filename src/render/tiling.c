@@ -1,0 +1,120 @@
+/* Tiles of whole pixels, as wide as the image where they fit. A tile is the image's camera shifted: the same sample has
+ * the same place in the world in every tile, and cells of the fill pyramid begin at multiples of their size in the
+ * image, so a pixel has the same bytes however the image is cut. Supersampling is a larger tile that the resolve pass
+ * averages. */
+#include "render/tiling.h"
+
+#include <math.h>
+
+#include "render/renderer.h"
+
+enum { default_margin = 1 };
+
+void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camera)
+{
+    uint32_t side = (uint32_t)view->supersample;
+    *camera = view->camera;
+    camera->width *= side;
+    camera->height *= side;
+    camera->fx *= side;
+    camera->fy *= side;
+    camera->cx *= side;
+    camera->cy *= side;
+}
+
+int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint64_t samples, struct spl_error *err)
+{
+    uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
+    uint64_t around = 0, square = (uint64_t)sqrt((double)samples);
+    if (view->method == SPL_METHOD_FILL) {
+        const struct spl_fill_plan *plan = &tiling->fill;
+        uint64_t guard = 2 * (uint64_t)plan->guard;
+        around = 2 * (uint64_t)plan->apron + plan->align;
+        if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
+            around = guard;
+        if (square < around + side)
+            return spl_fail_field(err, SPL_E_LIMIT, "kernel",
+                                  "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
+                                  2 * plan->kernel / side, (unsigned long long)samples);
+    }
+    uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
+    uint64_t widest = around
+                          ? (samples / 2 / (around + side) > square ? samples / 2 / (around + side) : square) - around
+                          : samples / per_pixel * side;
+    tiling->width = view->camera.width < widest / side ? view->camera.width : (uint32_t)(widest / side);
+    uint64_t rows = (samples / (tiling->width * side + around) - around) / side,
+             most = samples / layers / tiling->width;
+    rows = rows < most ? rows : most;
+    tiling->height = view->camera.height < rows ? view->camera.height : (uint32_t)rows;
+    return SPL_OK;
+}
+
+/* The range [begin, end) of pixels along an axis of `size` pixels, in samples, with what is drawn around it. */
+static void widen(const struct spl_fill_plan *plan, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
+                  int64_t *from, int64_t *to)
+{
+    int64_t align = plan->align;
+    *from = (int64_t)begin * side - plan->apron;
+    *from -= (*from % align + align) % align;
+    *from = *from < -(int64_t)plan->guard ? -(int64_t)plan->guard : *from;
+    *to = (int64_t)end * side + plan->apron;
+    *to = *to > (int64_t)size * side + plan->guard ? (int64_t)size * side + plan->guard : *to;
+}
+
+static void set_params(struct spl_tile *tile)
+{
+    const struct spl_camera *camera = &tile->camera;
+    const struct spl_view *view = tile->view;
+    const uint8_t *b = view->background;
+    tile->params = (struct spl_frame_params){
+        .fx = (float)camera->fx,
+        .fy = (float)camera->fy,
+        .cx = (float)camera->cx,
+        .cy = (float)camera->cy,
+        .near = (float)camera->near,
+        .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
+        .low_pass = SPL_LOW_PASS,
+        .margin = view->margin < 0 ? default_margin : (float)view->margin,
+        .width = camera->width,
+        .height = camera->height,
+        .supersample = (uint32_t)view->supersample,
+        .inverse_fx = 1 / (float)camera->fx,
+        .inverse_fy = 1 / (float)camera->fy,
+        .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
+        .texture_size = spl_dataset_get_info(tile->resident->dataset)->texture_size,
+        .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
+        .crop_width = tile->width,
+        .crop_height = tile->height,
+    };
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            tile->params.rotation[4 * row + column] = (float)camera->rotation[3 * row + column];
+}
+
+void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, struct spl_tile *tile)
+{
+    const struct spl_camera *whole = &tile->view->camera;
+    uint32_t side = (uint32_t)tile->view->supersample;
+    tile->x = x;
+    tile->y = y;
+    tile->width = whole->width - x < tiling->width ? whole->width - x : tiling->width;
+    tile->height = whole->height - y < tiling->height ? whole->height - y : tiling->height;
+    tile->fill = tiling->fill;
+    int64_t from[2] = {(int64_t)x * side, (int64_t)y * side};
+    int64_t to[2] = {from[0] + tile->width * side, from[1] + tile->height * side};
+    if (tile->view->method == SPL_METHOD_FILL) {
+        widen(&tiling->fill, side, whole->width, x, x + tile->width, &from[0], &to[0]);
+        widen(&tiling->fill, side, whole->height, y, y + tile->height, &from[1], &to[1]);
+    }
+    spl_tiling_get_camera(tile->view, &tile->camera);
+    tile->camera.width = (uint32_t)(to[0] - from[0]);
+    tile->camera.height = (uint32_t)(to[1] - from[1]);
+    tile->camera.cx -= (double)from[0];
+    tile->camera.cy -= (double)from[1];
+    tile->samples = (uint64_t)tile->camera.width * tile->camera.height;
+    set_params(tile);
+    tile->params.crop_x = (uint32_t)((int64_t)x * side - from[0]);
+    tile->params.crop_y = (uint32_t)((int64_t)y * side - from[1]);
+    if (tile->view->method == SPL_METHOD_FILL)
+        spl_fill_set_params(tile);
+}
