@@ -54,7 +54,7 @@ void draw(spl_draw_chunk chunk, splat s)
         return;
     uint at = sample_index(ivec2(center)), bits = floatBitsToUint(p.z);
     if (FILL != 0u)
-        bits = (bits & ~SPL_FILL_DEPTH_BITS) | spacing_code(load_radius(chunk, s.index)) << 1 |
+        bits = (bits & ~SPL_FILL_DEPTH_BITS) | spacing_code(min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min)) << 1 |
                (is_linear(chunk, s.index) ? SPL_FILL_LINEAR : 0u);
 #ifdef SPL_ATOMICS_64
     if (bits <= imageLoad(depth_texels, int(2u * at + 1u)).x)

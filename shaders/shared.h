@@ -116,6 +116,8 @@
 #define SPL_FILL_LINEAR 1u
 #define SPL_FILL_SPACING_BITS 5
 #define SPL_FILL_DEPTH_BITS 63u
+/* A point whose radius is more than so many times the least of its chunk strays: it counts as this. */
+#define SPL_FILL_STRAY 3.0f
 #define SPL_FILL_HOLE 0x80000000u
 #define SPL_FILL_LEVELS_MAX 8
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */

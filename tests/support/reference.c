@@ -319,7 +319,9 @@ static void for_each_disc(struct scene *s, bool shade)
                 continue;
             double median = spl_dataset_get_info(s->dataset)->splat_radius;
             if (s->view->method != SPL_METHOD_SPLAT)
-                point(s, &d, reference_fill_code(splat.radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0));
+                point(s, &d,
+                      reference_fill_code(fminf(splat.radius, SPL_FILL_STRAY * draw->radius_min), median) << 1 |
+                          (splat.linear ? SPL_FILL_LINEAR : 0));
             else
                 depth_disc(s, &d, shade);
         }
