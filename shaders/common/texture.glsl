@@ -58,7 +58,7 @@ void load_atom(inout code_place place, out uint atom, out float weight)
         uint mask = funnel(low, high, shift & 31u) & low_bits(uint(clamp(int(place.splats) - 32 * w, 0, 32)));
         uint below = uint(clamp(int(place.before) - 32 * w, 0, 32));
         before += bitCount(mask & low_bits(below));
-        own += bitCount(mask & low_bits(uint(clamp(int(place.before) + 1 - 32 * w, 0, 32))));
+        own |= place.before >> 5 == uint(w) ? mask >> (place.before & 31u) : 0u;
         splats += bitCount(mask);
         low = high;
     }
@@ -68,7 +68,7 @@ void load_atom(inout code_place place, out uint atom, out float weight)
     uint code = funnel(texture_word(at >> 5), texture_word((at >> 5) + 1u), at & 31u);
     float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 6)) - 56.0) / 4.0);
     float gap = 0.25 * float(bitfieldExtract(header, SPL_TEXTURE_GAP, 2) * (bitfieldExtract(header, SPL_TEXTURE_GAP, 2) + 1u));
-    place = code_place(codes + splats * width, before, splats, place.has && own != before);
+    place = code_place(codes + splats * width, before, splats, place.has && (own & 1u) != 0u);
     atom = place.has ? code & ((1u << index_bits) - 1u) : 0u;
     float signed_code = float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5;
     weight = place.has ? step * (signed_code + gap * sign(signed_code)) : 0.0;
