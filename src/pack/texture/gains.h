@@ -25,6 +25,10 @@ int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)
 /* A photograph that contradicts the others: it was taken elsewhere, or the model is mirrored or scaled. */
 bool spl_gain_contradicts(const struct spl_gain *gain);
 
+/* A photograph that agrees with the others no better than by chance can happen. One may; where most do, it is the
+ * model. */
+bool spl_gain_doubtful(const struct spl_gain *gain);
+
 /* The factors at a place in the photograph, and what they make of a colour. */
 void spl_gain_get(const struct spl_gain *gain, const uint8_t place[2], float factor[3]);
 void spl_gain_apply(const struct spl_gain *gain, const uint8_t place[2], const uint8_t in[3], float out[3]);

@@ -206,12 +206,12 @@ static void drop(struct pass *pass, uint16_t photo)
     }
 }
 
-/* Gains, without the photographs that contradict the others. Where most do, there is no telling which. */
+/* Gains, without the photographs that contradict the others. Where most are doubtful, there is no telling which. */
 static int even_out(struct pass *pass, struct spl_error *err)
 {
     uint32_t photos = pass->report->photographs;
     for (bool first = true;; first = false) {
-        uint32_t contradicting = 0, compared = 0, worst = 0;
+        uint32_t contradicting = 0, doubtful = 0, compared = 0, worst = 0;
         int rc = spl_gains_find(&pass->candidates, (const uint8_t(*)[3])pass->own, photos, pass->gains, err);
         if (rc)
             return rc;
@@ -219,20 +219,21 @@ static int even_out(struct pass *pass, struct spl_error *err)
             if (pass->dropped[i] || !pass->gains[i].shared)
                 continue;
             compared++;
+            doubtful += spl_gain_doubtful(&pass->gains[i]);
             if (!spl_gain_contradicts(&pass->gains[i]))
                 continue;
             worst = !contradicting || pass->gains[i].agreement < pass->gains[worst].agreement ? i : worst;
             contradicting++;
         }
+        if (first && doubtful > 1 && doubtful > compared / 2)
+            return spl_fail_field(err, SPL_E_INPUT, "cameras",
+                                  "%s: %u of %u photographs contradict each other on what they show: is the model "
+                                  "mirrored, scaled, or of another scan?",
+                                  pass->options->cameras, doubtful, compared);
         if (!contradicting)
             return SPL_OK;
         const struct spl_gain *gain = &pass->gains[worst];
         struct spl_error why = {0};
-        if (first && contradicting > compared / 2)
-            return spl_fail_field(err, SPL_E_INPUT, "cameras",
-                                  "%s: %u of %u photographs contradict each other on what they show: is the model "
-                                  "mirrored, scaled, or of another scan?",
-                                  pass->options->cameras, contradicting, compared);
         spl_fail(&why, SPL_E_INPUT,
                  "%s: contradicts the others on %llu splats (correlation %.2f): its pose is not where it was taken",
                  pass->list->views[worst].photograph, (unsigned long long)gain->shared, gain->agreement);
