@@ -27,7 +27,7 @@ static void show_photograph(void *context, const char *photograph)
 
 static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
 {
-    struct spl_image_info info;
+    struct spl_image_info info = {0};
     int rc = spl_image_get_info(path, &info, err);
     *width = info.width;
     *height = info.height;

@@ -1,8 +1,8 @@
 /* Clip lines of a chunk: where the discs of splats at a silhouette or a crease end. They are few, so that a mask says
  * which splats have one and only these have a code. The line lies in the tangent frame of the normal as it decodes,
  * which is why lines are written when the normals' codes are there. Offsets are rounded up: a disc too wide by a step
- * overhangs, one too narrow leaves a gap. A forged mask may name more splats than there are codes: those have no line.
- * Pure functions; any thread. */
+ * overhangs, one too narrow leaves a gap. A forged mask may name more splats than there are codes: those have no line
+ * here, and any line in the kernels, which do not know the number. Pure functions; any thread. */
 #include "dataset/chunk_clip.h"
 
 #include <math.h>

@@ -37,6 +37,8 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
         return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
     if (8 * (bytes - sizeof *header) < 12 * (uint64_t)header->count)
         return wrong(dataset, err, "ATOM", "ends before its atoms do");
+    if (dataset->chunk_textures_section->bytes != info->chunks * sizeof(uint32_t))
+        return wrong(dataset, err, "CTEX", "has not one word for each chunk");
     int rc = spl_dictionary_init(&dataset->dictionary, header->count, header->size, err);
     if (rc)
         return rc;
@@ -44,8 +46,6 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
         spl_atoms_read((const uint8_t *)dataset->atoms + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
     if (what)
         return wrong(dataset, err, "ATOM", what);
-    if (dataset->chunk_textures_section->bytes != info->chunks * sizeof(uint32_t))
-        return wrong(dataset, err, "CTEX", "has not one word for each chunk");
     info->atoms = header->count;
     info->texture_size = header->size;
     info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);

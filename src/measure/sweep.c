@@ -21,7 +21,7 @@
 #include "measure/tolerance.h"
 #include "measure/truth.h"
 
-enum { LOSSES_MAX = 3, COMPARE_SAMPLES = 1 << 20 }; /* of one frame */
+enum { LOSSES_MAX = 3, COMPARE_SAMPLES = 1 << 21 }; /* of one frame */
 #define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S)       /* of rendering: a calibrator takes about 0.1 s */
 
 struct job {
@@ -246,6 +246,8 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_t
     view.background[3] = 0;
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH | 1u << SPL_LAYER_NORMAL | 1u << SPL_LAYER_ID |
                   1u << SPL_LAYER_COVERAGE;
+    if (view.method == SPL_METHOD_POINTS && !spl_dataset_get_info(o->dataset)->has_surface)
+        view.layers &= ~(1u << SPL_LAYER_NORMAL);
     struct spl_frame frame;
     double ms;
     int rc = render(job, &view, &frame, &ms, err);

@@ -12,6 +12,8 @@
 #include "render/tiling.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
+/* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
+static const double constant_looks = 65000, constant_work = 3e9;
 
 static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
     [SPL_METHOD_SPLAT] = &spl_method_splat,
@@ -195,6 +197,26 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
     return SPL_OK;
 }
 
+/* The constant operator looks at every sample of the kernel: what a software driver cannot do before the device's
+ * deadline, or in the rounds that it allows an invocation, is refused before it costs the device. */
+static int check_work(const struct frame_job *job, const struct spl_camera *camera, struct spl_error *err)
+{
+    const struct spl_fill_plan *plan = &job->tiling.fill;
+    double side = 2 * floor(plan->kernel) + 1;
+    double samples = ((double)camera->width + 2 * plan->guard) * ((double)camera->height + 2 * plan->guard);
+    samples = fmin(samples, (double)job->renderer->scratch.samples);
+    if (job->view->visibility != SPL_VISIBILITY_CONSTANT)
+        return SPL_OK;
+    if (side * side > constant_looks ||
+        (spl_gpu_get_device(job->renderer->gpu)->software && side * side * samples > constant_work))
+        return spl_fail_field(
+            err, SPL_E_LIMIT, "kernel",
+            "visibility constant with a kernel of %g x %g samples takes too long in this image; ask for a "
+            "smaller kernel, or for visibility adaptive",
+            side, side);
+    return SPL_OK;
+}
+
 /* The plan is the whole image's, or tiles would show where they meet. */
 static int plan_fill(struct frame_job *job, struct spl_error *err)
 {
@@ -206,8 +228,10 @@ static int plan_fill(struct frame_job *job, struct spl_error *err)
     spl_residency_begin_frame(&job->renderer->residency);
     int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
     job->frame->stats.select_ms += since_ms(&clock);
+    if (job->page_error.code)
+        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
-    return rc;
+    return rc ? rc : check_work(job, &camera, err);
 }
 
 /* A view with at least one sample a pixel. */

@@ -1,5 +1,5 @@
-/* Pages on the device; see residency.h. A software device draws from host-visible memory, so its pages are filled by one
- * read of the file; a GPU's go through a staging buffer. */
+/* Pages on the device; see residency.h. A software device draws from host-visible memory, so its pages are filled by
+ * one read of the file; a GPU's go through a staging buffer. */
 #include "render/residency.h"
 
 #include <stdlib.h>
@@ -90,7 +90,8 @@ static bool evict_one(struct spl_residency *residency)
         struct spl_resident_dataset *resident = &residency->datasets[i];
         for (uint32_t p = 0; p < resident->slot_count; p++) {
             struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->last_frame < residency->frame && (!oldest || page->last_frame < oldest->last_frame))
+            if (page->buffer && page->last_frame < residency->frame &&
+                (!oldest || page->last_frame < oldest->last_frame))
                 oldest = page;
         }
     }
@@ -114,8 +115,8 @@ int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buff
     }
 }
 
-/* What the file has of a slot; of a page the device takes a word more: a zero-width field at its very end still loads its
- * word. */
+/* What the file has of a slot; of a page the device takes a word more, 0: a zero-width field at its very end still
+ * loads its word, and a forged mask may use it. */
 static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t slot)
 {
     size_t bytes;
@@ -129,8 +130,10 @@ static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t slo
 
 static int read_slot(const struct spl_resident_dataset *resident, uint32_t slot, void *out, struct spl_error *err)
 {
-    if (slot < resident->page_count)
+    if (slot < resident->page_count) {
+        memset((char *)out + bytes_of(resident, slot) - 4, 0, 4);
         return spl_dataset_read_page(resident->dataset, slot, out, err);
+    }
     if (slot < spl_dictionary_slot(resident))
         return spl_dataset_read_textures(resident->dataset, slot - resident->page_count, out, err);
     spl_dictionary_expand(spl_dataset_get_dictionary(resident->dataset), out);
@@ -145,9 +148,8 @@ static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_
         spl_gpu_buffer_destroy(residency->gpu, residency->staging);
         residency->staging = NULL;
     }
-    int rc = residency->staging
-                 ? SPL_OK
-                 : spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
+    int rc = residency->staging ? SPL_OK
+                                : spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
     if (rc)
         return rc;
     uint64_t ticket;
@@ -186,8 +188,8 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     if (slot->buffer)
         return SPL_OK;
     bool software = spl_gpu_get_device(residency->gpu)->software;
-    int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE,
-                                       bytes_of(resident, page), &slot->buffer, err);
+    int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes_of(resident, page),
+                                       &slot->buffer, err);
     if (rc)
         return rc;
     if (software)

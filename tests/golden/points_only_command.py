@@ -67,6 +67,12 @@ def main():
         upright = sum(n[2] > 0.97 for n in normals)
         assert len(normals) > 5000 and upright > 0.97 * len(normals), (len(normals), upright)
 
+        run("bench", bare, "-o", folder / "measured", "--lod", "8", "--supersample", "1", "--frames", "2", "--repeats", "1",
+            "--size", "64x48")
+        slow = run(*view, folder / "slow.png", "--method", "fill", "--visibility", "constant", "--kernel", "129", "--size",
+                   "1280x720", code=2)
+        expect(slow.stderr, "smaller kernel")
+
         before = bare.read_bytes()
         refused = run("pack", cloud, *columns, "--points-only", "--cameras", folder, "-o", bare, code=2)
         expect(refused.stderr, "pack without --points-only")

@@ -1,7 +1,10 @@
 """Picking: what lies under a pixel agrees with the layers and the camera of the image, sub-pixels included."""
 import json
 import math
+import pathlib
 import struct
+import subprocess
+import tempfile
 
 from harness import FAKE, REAL, VIEW, Daemon, eventually, run
 
@@ -165,6 +168,25 @@ def test_on_a_real_device():
                       every_parameter_of_a_pick,
                       a_body_means_what_a_query_means):
             check(d)
+
+
+def test_bare_points():
+    """Method points has no normals of them: a pick says null, a view says why; a budget takes what has them."""
+    with tempfile.TemporaryDirectory() as folder:
+        cloud, bare = pathlib.Path(folder, "cloud.xyz"), pathlib.Path(folder, "bare.spld")
+        cloud.write_text("".join(f"0 {0.02 * (i % 100) - 1} {0.02 * (i // 100)}\n" for i in range(10000)))
+        subprocess.run([REAL, "pack", cloud, "--points-only", "-o", bare], check=True, stderr=subprocess.DEVNULL)
+        with Daemon(REAL, datasets=(bare,)) as d:
+            at = "/v1/datasets/bare"
+            camera = "eye=3,0,1&target=0,0,1&fov=30&width=64&height=48"
+            points = d.ask(f"{at}/pick?{camera}&x=32&y=24&method=points").json()
+            assert points["normal"] is None, points
+            fill = d.ask(f"{at}/pick?{camera}&x=32&y=24").json()
+            assert abs(fill["depth"] - 3) < 0.05, fill
+            assert d.ask(f"{at}/view?{camera}&layer=normal&method=points").json()["field"] == "layer"
+            assert d.ask(f"{at}/view?{camera}&layer=normal&budget=1ms").status == 200
+            tags = {d.ask(f"{at}/view?{camera}&{extra}").headers["ETag"] for extra in ("", "kernel=9", "visibility=none")}
+            assert len(tags) == 3, tags
 
 
 run(globals())

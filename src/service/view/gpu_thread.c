@@ -239,6 +239,15 @@ static void inject(struct gpu *gpu)
     spl_renderer_inject_loss(gpu->renderer);
 }
 
+/* A pick asks for all layers, and method points has no normals of bare points: the reply then says null. */
+static void leave_out_normals(struct spl_job *job)
+{
+    struct spl_view *view = &job->request.view;
+    if (job->request.picks && view->method == SPL_METHOD_POINTS && job->dataset &&
+        !spl_dataset_get_info(job->dataset)->has_surface)
+        view->layers &= ~(1u << SPL_LAYER_NORMAL);
+}
+
 /* Sets the view to what its demand is best met with. A job that lacks the time is refused before it is planned. */
 static int plan(struct spl_job *job)
 {
@@ -266,6 +275,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     inject(gpu);
     uint64_t began = spl_now_ns();
     job->request.view.deadline_ns = job->deadline_ns;
+    leave_out_normals(job);
     int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;

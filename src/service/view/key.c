@@ -93,7 +93,7 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
     add_number(&form, view->margin < 0 ? 1 : view->margin);
-    bool fills = view->method == SPL_METHOD_FILL;
+    bool fills = view->method != SPL_METHOD_POINTS; /* where there are bare points, splat is drawn as fill */
     add(&form, fills ? (uint64_t)view->visibility << 32 | view->pyramid : 0);
     add_number(&form, fills ? view->kernel : 0);
     add_number(&form, fills ? view->threshold < 0 ? -1 : view->threshold : 0);

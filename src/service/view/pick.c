@@ -45,7 +45,8 @@ static void fill(json_t *json, const struct spl_view_request *request, const str
     const uint8_t *rgba = images[SPL_LAYER_COLOR].pixels;
     bool hit = isfinite(depth), named = hit && id != UINT32_MAX;
     json_object_set_new(json, "position", hit ? position(&request->pick, (double)depth) : json_null());
-    json_object_set_new(json, "normal", hit ? normal(images[SPL_LAYER_NORMAL].pixels) : json_null());
+    json_object_set_new(json, "normal",
+                        hit && images[SPL_LAYER_NORMAL].pixels ? normal(images[SPL_LAYER_NORMAL].pixels) : json_null());
     json_object_set_new(json, "color", hit ? json_pack("[i, i, i]", rgba[0], rgba[1], rgba[2]) : json_null());
     json_object_set_new(json, "class", named ? classification(dataset, id) : json_null());
     json_object_set_new(json, "depth", hit ? json_real((double)depth) : json_null());

@@ -138,6 +138,10 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         read_profile(plan);
     struct spl_demand demand = request->demand;
     demand.keep_atoms &= plan->info->atoms > 0;
+    if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
+        demand.keep_method = true; /* of bare points method points has no normals; splat is drawn as fill */
+        demand.kept.method = SPL_METHOD_SPLAT;
+    }
     pthread_mutex_lock(&plan->mutex);
     demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
     pthread_mutex_unlock(&plan->mutex);
@@ -157,6 +161,9 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
 void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
 {
     const struct spl_view *view = &request->view;
+    bool fills = view->method == SPL_METHOD_FILL || (!plan->info->has_surface && view->method == SPL_METHOD_SPLAT);
+    if (fills && (view->visibility != SPL_VISIBILITY_ADAPTIVE || view->kernel > 0 || view->pyramid))
+        return; /* what it took says nothing of the settings that were measured */
     struct spl_setting setting = {view->method, view->lod, view->supersample,
                                   plan->info->atoms ? view->atoms : SPL_TEXTURE_ATOMS};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
