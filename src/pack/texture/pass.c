@@ -206,7 +206,8 @@ static void drop(struct pass *pass, uint16_t photo)
     }
 }
 
-/* Gains, without the photographs that contradict the others. Where most are doubtful, there is no telling which. */
+/* Gains, without the photographs that contradict the others. Where most do, or most of the rest are doubtful, there is
+ * no telling which. */
 static int even_out(struct pass *pass, struct spl_error *err)
 {
     uint32_t photos = pass->report->photographs;
@@ -225,7 +226,8 @@ static int even_out(struct pass *pass, struct spl_error *err)
             worst = !contradicting || pass->gains[i].agreement < pass->gains[worst].agreement ? i : worst;
             contradicting++;
         }
-        if (first && doubtful > 1 && doubtful > compared / 2)
+        bool settled = !contradicting || (first && contradicting > compared / 2);
+        if (settled && doubtful > 1 && doubtful > compared / 2)
             return spl_fail_field(err, SPL_E_INPUT, "cameras",
                                   "%s: %u of %u photographs contradict each other on what they show: is the model "
                                   "mirrored, scaled, or of another scan?",
