@@ -49,7 +49,7 @@ struct spl_photo_report {
     uint64_t textured;         /* splats whose texture was coded */
     uint32_t texture_size;     /* texels a side, 8, 16 or 32; 0 = no textures */
     uint32_t atoms;            /* of the dictionary */
-    double resampling_psnr;    /* of textures before coding, against the photograph's pixels on their discs, dB */
+    double resampling_psnr;    /* of textures before coding, against the pixels on their discs, dB; NaN = none */
     double texture_psnr;       /* of what is coded, against the textures, dB */
     uint64_t histogram[9];     /* textured splats by their number of atoms */
     double seconds;

@@ -3,6 +3,7 @@
 #include "cmd/cmd.h"
 
 #include <getopt.h>
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -88,10 +89,13 @@ static void catch_signals(const char *output)
 
 static void print_textures(const struct spl_photo_report *r, const uint64_t *bits, double splats)
 {
-    fprintf(stderr,
-            "%llu textures of %u x %u: resampled at %.2f dB, coded at %.2f dB with %u atoms; %.2f bytes a splat\n",
-            (unsigned long long)r->textured, r->texture_size, r->texture_size, r->resampling_psnr, r->texture_psnr,
-            r->atoms, (double)(bits[SPL_ATTRIBUTE_TEXTURE] + bits[SPL_ATTRIBUTE_DICTIONARY]) / 8 / splats);
+    fprintf(stderr, "%llu textures of %u x %u: ", (unsigned long long)r->textured, r->texture_size, r->texture_size);
+    if (isnan(r->resampling_psnr))
+        fprintf(stderr, "resampled without a pixel to compare with, ");
+    else
+        fprintf(stderr, "resampled at %.2f dB, ", r->resampling_psnr);
+    fprintf(stderr, "coded at %.2f dB with %u atoms; %.2f bytes a splat\n", r->texture_psnr, r->atoms,
+            (double)(bits[SPL_ATTRIBUTE_TEXTURE] + bits[SPL_ATTRIBUTE_DICTIONARY]) / 8 / splats);
     fprintf(stderr, "atoms a splat:");
     for (int i = 0; i <= 8; i++)
         fprintf(stderr, " %d: %.1f %%%s", i, 100 * (double)r->histogram[i] / (double)(r->textured ? r->textured : 1),

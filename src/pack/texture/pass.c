@@ -250,7 +250,7 @@ static int even_out(struct pass *pass, struct spl_error *err)
 static const double resampling_slack = 2; /* dB */
 
 /* Leaves are what is looked at closely; those of the photograph that most splats chose stand for all. The smallest
- * size whose resampling loses hardly more than coding will. */
+ * size whose resampling loses hardly more than coding will; the largest where there is no pixel to tell by. */
 static int choose_size(struct pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
 {
     double quality = pass->options->texture_quality > 0 ? pass->options->texture_quality : 40;
@@ -269,7 +269,7 @@ static int choose_size(struct pass *pass, const struct spl_dataset *dataset, str
     for (uint32_t k = 0; k < 3; k++) {
         double mean = error[k].squared / fmax((double)error[k].values, 1);
         pass->report->texture_size = 8u << k;
-        pass->report->resampling_psnr = mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
+        pass->report->resampling_psnr = !error[k].values ? NAN : mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
         if (pass->report->resampling_psnr > quality - resampling_slack)
             break;
     }
@@ -327,9 +327,9 @@ static json_t *describe(const struct pass *pass, const struct spl_coded *coded)
     json_t *histogram = json_array();
     for (int i = 0; i <= SPL_ATOMS_MAX; i++)
         json_array_append_new(histogram, json_integer((json_int_t)r->histogram[i]));
-    return json_pack("{s:s, s:i, s:i, s:f, s:f, s:I, s:o, s:O}", "coding", names[pass->options->textures], "size",
-                     (int)r->texture_size, "atoms", (int)r->atoms, "resampling_psnr", r->resampling_psnr, "psnr",
-                     r->texture_psnr, "splats", (json_int_t)r->textured, "histogram", histogram, "training",
+    return json_pack("{s:s, s:i, s:i, s:o*, s:f, s:I, s:o, s:O}", "coding", names[pass->options->textures], "size",
+                     (int)r->texture_size, "atoms", (int)r->atoms, "resampling_psnr", json_real(r->resampling_psnr),
+                     "psnr", r->texture_psnr, "splats", (json_int_t)r->textured, "histogram", histogram, "training",
                      coded->epochs);
 }
 

@@ -158,15 +158,14 @@ void spl_texture_compare(const struct spl_photo *photo, const struct spl_tone *t
                          uint32_t size, const uint8_t *texture, struct spl_resample_error *error)
 {
     const struct spl_camera *camera = &photo->view->camera;
+    const struct spl_distortion *distortion = &photo->view->distortion;
     struct frame f = find_frame(camera, s);
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    if (photo->view->distortion.kind != SPL_DISTORTION_NONE)
-        return; /* places of pixels on the plane would need the lens's inverse */
     for (int i = 0; i < 4; i++) {
         double c[3], pixel[2], a = i % 2 ? 1 : -1, b = i / 2 ? 1 : -1;
         for (int k = 0; k < 3; k++)
             c[k] = f.origin[k] + a * f.u[k] + b * f.v[k];
-        if (!spl_distortion_place(camera, &photo->view->distortion, c, pixel))
+        if (!spl_distortion_place(camera, distortion, c, pixel))
             return;
         for (int k = 0; k < 2; k++) {
             low[k] = fmax(fmin(low[k], pixel[k]), 0);
@@ -179,6 +178,12 @@ void spl_texture_compare(const struct spl_photo *photo, const struct spl_tone *t
     for (double y = floor(low[1]) + 0.5; y < high[1]; y++)
         for (double x = floor(low[0]) + 0.5; x < high[0]; x++) {
             double ray[3] = {(x - camera->cx) / camera->fx, (y - camera->cy) / camera->fy, 1}, a = 0, b = 0;
+            double r = hypot(ray[0], ray[1]);
+            if (distortion->kind != SPL_DISTORTION_NONE && r > 1e-9) {
+                double straight = spl_distortion_invert(distortion, r) / r;
+                ray[0] *= straight;
+                ray[1] *= straight; /* without the tangential terms: take() is exact about (a, b) */
+            }
             double t = (n[0] * f.origin[0] + n[1] * f.origin[1] + n[2] * f.origin[2]) /
                        (n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2]);
             float rgb[3];

@@ -395,6 +395,48 @@ static void textures_show_the_plane_and_not_the_view(void **state)
     spl_photo_close(&photo);
 }
 
+/* Through a lens that bends them, pixels are compared with the places of the plane that they show. */
+static void resampling_is_measured_through_a_lens(void **state)
+{
+    (void)state;
+    struct spl_named_view view = make_view();
+    view.camera.fx = view.camera.fy = 200;
+    view.camera.width = view.camera.height = 200;
+    view.camera.cx = view.camera.cy = 100;
+    const struct spl_distortion lenses[] = {
+        {0},
+        {.kind = SPL_DISTORTION_RADIAL, .k = {-0.25}},
+        {.kind = SPL_DISTORTION_RADIAL, .k = {0.1, 0.02}, .p = {0.004, -0.003}},
+        {.kind = SPL_DISTORTION_FISHEYE, .k = {0.02}},
+    };
+    const struct spl_world_splat splat = {.position = {0.5, 0, 0.4}, .splat = {.normal = {0, -1, 0}, .radius = 0.12f}};
+    const struct spl_gain gain = flat_gain(1, 1, 1);
+    const struct spl_candidate seen = {.color = {100, 100, 100}};
+    const struct spl_tone tone = spl_tone_find(&gain, &seen, seen.color);
+    static uint8_t texture[SPL_TEXTURE_VALUES_MAX];
+    uint64_t straight = 0;
+    for (size_t l = 0; l < sizeof lenses / sizeof *lenses; l++) {
+        view.distortion = lenses[l];
+        assert_int_equal(spl_distortion_init(&view.distortion, NULL), 0);
+        struct spl_image image = make_image(200, 200, 0, 0);
+        uint8_t *pixels = image.pixels;
+        for (int i = 0; i < 200 * 200; i++) /* finer than 8 texels across the disc, not than 32 */
+            memset(pixels + 4 * i, (int)(128 + 60 * sin(i % 200 * 1.2) + 50 * cos(i / 200 * 1.1)), 3);
+        struct spl_photo photo;
+        assert_int_equal(spl_photo_init(&photo, &view, &image, NULL), 0);
+        struct spl_resample_error error[3] = {0};
+        for (uint32_t k = 0; k < 3; k++) {
+            assert_true(spl_texture_resample(&photo, &tone, &splat, 8u << k, texture));
+            spl_texture_compare(&photo, &tone, &splat, 8u << k, texture, &error[k]);
+            assert_true(isfinite(error[k].squared) && error[k].values == error[0].values);
+        }
+        straight = l ? straight : error[0].values;
+        assert_true(error[0].values > straight / 2 && error[0].values < 2 * straight && straight > 3 * 300);
+        assert_true(error[0].squared > 4 * error[2].squared);
+        spl_photo_close(&photo);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -406,6 +448,7 @@ int main(void)
         cmocka_unit_test(a_scan_of_print_brightens_nothing),
         cmocka_unit_test(glare_is_found_where_it_is),
         cmocka_unit_test(textures_show_the_plane_and_not_the_view),
+        cmocka_unit_test(resampling_is_measured_through_a_lens),
         cmocka_unit_test(the_majority_gives_the_colour_and_neighbours_lend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
