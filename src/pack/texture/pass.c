@@ -356,8 +356,11 @@ static int write_textured(struct pass *pass, const struct spl_dataset *dataset, 
             pass->uses[pass->chosen.photo[id]]++;
     if (rc || (rc = choose_size(pass, dataset, err)) ||
         (rc = spl_textures_init(&textures, output, pass->splats.count, pass->report->texture_size, err)) ||
-        (rc = take_textures(pass, dataset, &textures, err)) || (rc = keep_textures(pass, &textures, err)) ||
-        (rc = spl_coded_init(&coded, &textures, &pass->splats, pass->options, &pass->chosen, pass->stage, err)))
+        (rc = take_textures(pass, dataset, &textures, err)) || (rc = keep_textures(pass, &textures, err)))
+        goto done;
+    spl_candidates_finish(&pass->candidates); /* training may hold as much as they did */
+    rc = spl_coded_init(&coded, &textures, &pass->splats, pass->options, &pass->chosen, pass->stage, err);
+    if (rc)
         goto done;
     report_codes(pass->report, &coded);
     if (!(description = describe(pass, &coded))) {
