@@ -21,7 +21,8 @@ static void usage(FILE *out)
         out,
         "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines] [--threads N]\n"
-        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]]\n\n"
+        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]\n"
+        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
         "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
         "once.\n\n"
@@ -42,7 +43,7 @@ static void usage(FILE *out)
         "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
         "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
         "      --normal-error DEG   mean, degrees (default 1)\n"
-        "      --points-only        position, color and class alone: no normals and radii, so no method splat\n"
+        "      --points-only        position, color and class alone: no normals and radii; method splat draws as fill\n"
         "      --no-linear          do not look for wires, poles and cables, which method fill draws as they are\n"
         "      --no-clip-lines      discs are not cut where surfaces end\n"
         "      --cameras MODEL      poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a "
@@ -157,6 +158,23 @@ static void name_refused(void *context, const struct spl_error *why)
     fprintf(stderr, "splatd: left out: %s\n", why->message);
 }
 
+/* What contradicts itself among the options; NULL: nothing. */
+static const char *find_contradiction(const struct spl_pack_options *o, const struct spl_photo_options *photos,
+                                      bool textures)
+{
+    if (!photos->cameras && (photos->images || photos->refused || photos->memory_bytes || photos->device ||
+                             photos->keep_textures || photos->texture_quality > 0 || textures))
+        return "photographs need their poses: --cameras MODEL";
+    if (photos->keep_textures && photos->textures == SPL_TEXTURES_NONE)
+        return "--keep-textures with --textures none keeps nothing: leave one of them out";
+    if (photos->texture_quality > 0 && photos->textures == SPL_TEXTURES_NONE)
+        return "--texture-quality with --textures none codes nothing: leave one of them out";
+    if (o->points_only && (o->neighbours || o->normal_error > 0 || o->no_clip_lines))
+        return "--points-only makes no normals, radii and clip lines: leave out --neighbours, --normal-error and "
+               "--no-clip-lines, or it";
+    return NULL;
+}
+
 int spl_cmd_pack(int argc, char **argv)
 {
     enum {
@@ -204,6 +222,7 @@ int spl_cmd_pack(int argc, char **argv)
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
     uint64_t number = 0;
+    bool textures = false;
     int result = 0;
     for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
         switch (c) {
@@ -251,6 +270,7 @@ int spl_cmd_pack(int argc, char **argv)
             break;
         case opt_textures:
             result = parse_textures(optarg, &photos.textures, &err);
+            textures = true;
             break;
         case opt_quality:
             result = spl_cmd_parse_real("--texture-quality", optarg, 20, 60, &photos.texture_quality, &err);
@@ -279,16 +299,12 @@ int spl_cmd_pack(int argc, char **argv)
         fprintf(stderr, "splatd: pack needs a dataset to write: -o NAME.spld\n");
         return 2;
     }
-    if (photos.cameras) {
-        o.photos = &photos;
-    } else if (photos.images || photos.refused || photos.memory_bytes || photos.device || photos.keep_textures) {
-        fprintf(stderr, "splatd: photographs need their poses: --cameras MODEL\n");
+    const char *contradiction = find_contradiction(&o, &photos, textures);
+    if (contradiction) {
+        fprintf(stderr, "splatd: %s\n", contradiction);
         return 2;
     }
-    if (photos.keep_textures && photos.textures == SPL_TEXTURES_NONE) {
-        fprintf(stderr, "splatd: --keep-textures with --textures none keeps nothing: leave one of them out\n");
-        return 2;
-    }
+    o.photos = photos.cameras ? &photos : NULL;
     o.inputs = (const char *const *)&argv[optind];
     o.input_count = (size_t)(argc - optind);
     catch_signals(o.output);

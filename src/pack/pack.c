@@ -1,9 +1,9 @@
 /* spl_pack(): the stages in a row, and what the file says about itself.
  *
- * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 59 while neighbours are found, 63
- * while clip lines are, and the inner levels' 12 on top of 54 while encoding. The output's temporary file is made first, so
- * that an unwritable place is known before hours of work, and is gone unless the last rename succeeded. Runs on the caller's
- * thread; parallel loops end before it goes on. */
+ * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 59 while neighbours are
+ * found, 63 while clip lines are, and the inner levels' 12 on top of 54 while encoding. The output's temporary file is
+ * made first, so that an unwritable place is known before hours of work, and is gone unless the last rename succeeded.
+ * Runs on the caller's thread; parallel loops end before it goes on. */
 #include <splatd/pack.h>
 
 #include <math.h>
@@ -202,6 +202,44 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     return rc;
 }
 
+/* Two names of one file, which need not be there yet. */
+static bool is_same(const char *a, const char *b)
+{
+    const char *const paths[2] = {a, b}, *names[2];
+    struct stat files[2], folders[2];
+    bool there[2];
+    for (int i = 0; i < 2; i++) {
+        char folder[4096];
+        const char *slash = strrchr(paths[i], '/');
+        names[i] = slash ? slash + 1 : paths[i];
+        snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash + 1 - paths[i]) : 1, slash ? paths[i] : ".");
+        there[i] = stat(paths[i], &files[i]) == 0;
+        if (stat(folder, &folders[i]))
+            return false;
+    }
+    if (there[0] && there[1])
+        return files[0].st_dev == files[1].st_dev && files[0].st_ino == files[1].st_ino;
+    return !strcmp(names[0], names[1]) && folders[0].st_dev == folders[1].st_dev &&
+           folders[0].st_ino == folders[1].st_ino;
+}
+
+/* The file of textures replaces nothing that is read, nor the dataset. */
+static int check_kept(const struct spl_pack_options *o, const struct spl_view_list *photographs, struct spl_error *err)
+{
+    const char *kept = o->photos->keep_textures;
+    if (!kept)
+        return SPL_OK;
+    bool input = is_same(kept, o->photos->cameras);
+    for (size_t i = 0; i < o->input_count && !input; i++)
+        input = is_same(kept, o->inputs[i]);
+    for (size_t i = 0; i < photographs->count && !input; i++)
+        input = is_same(kept, photographs->views[i].photograph);
+    if (!input && !(o->output && is_same(kept, o->output)))
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_USAGE, "keep-textures", "--keep-textures %s is an %s too; choose another name",
+                          kept, input ? "input" : "output");
+}
+
 /* The dataset without its name, so that nothing of it is left when the process dies. */
 static int pack_photos(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
@@ -213,6 +251,8 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_pack_r
     struct spl_dataset *dataset = NULL;
     char *path = NULL;
     int rc = spl_photos_load(options->photos, &photographs, &photos, err);
+    if (!rc)
+        rc = check_kept(options, &photographs, err);
     if (!rc && asprintf(&path, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
         path = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);

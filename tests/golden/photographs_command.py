@@ -227,6 +227,11 @@ with tempfile.TemporaryDirectory() as folder:
     model = ("--cameras", "views.json")
     for arguments, words in ((("--images", "."), "--cameras"), (("--keep-going",), "--cameras"),
                              (("--cameras", "nowhere"), "nowhere"), ((*model, "--textures", "D9"), "D9"),
+                             (("--texture-quality", "40"), "--cameras"), (("--textures", "none"), "--cameras"),
+                             ((*model, "--textures", "none", "--texture-quality", "40"), "codes nothing"),
+                             ((*model, "--keep-textures", "./wall.xyz"), "is an input too"),
+                             ((*model, "--keep-textures", "images/right.png"), "is an input too"),
+                             ((*model, "--keep-textures", "./wall.spld"), "is an output too"),
                              ((*model, "--memory", "1"), "memory"), ((*model, "--device", "nosuch"), "nosuch")):
         done = subprocess.run([SPLATD, "pack", "wall.xyz", "-o", "wall.spld", *arguments], stderr=subprocess.PIPE,
                               text=True)

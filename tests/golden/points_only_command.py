@@ -77,6 +77,9 @@ def main():
         refused = run("pack", cloud, *columns, "--points-only", "--cameras", folder, "-o", bare, code=2)
         expect(refused.stderr, "pack without --points-only")
         expect(run("pack", cloud, *columns, "--points-onyl", "-o", bare, code=2).stderr, "splatd pack --help")
+        for without in (("--neighbours", "9"), ("--normal-error", "2"), ("--no-clip-lines",)):
+            refused = run("pack", cloud, *columns, "--points-only", *without, "-o", bare, code=2)
+            expect(refused.stderr, "--points-only makes no normals")
         assert bare.read_bytes() == before
 
 
