@@ -136,6 +136,18 @@ with tempfile.TemporaryDirectory() as folder:
     said = pack(code=2)
     assert "contradict" in said, said
 
+    # photographs that share nothing but the scan: its colours contradict them, its intensity says nothing of them
+    beside = {name: camera((x, -1.2, 0), (x, 0, 0)) for name, x in (("left", -1.2), ("right", 1.2))}
+    for i, name in enumerate(beside):
+        write_png(f"images/{name}.png", 64, 48, lambda x, y: speckle(i)(x // 4, y // 4))
+    put_views(beside)
+    greys = [30 + (i * 48271 % 2**31 * 69621 % 2**31) % 200 for i in range(len(points))]
+    for red in (0, 9):
+        pathlib.Path("wall.xyz").write_text("".join(f"{p} {g + red} {g} {g}\n" for p, g in zip(points, greys)))
+        said = pack("--columns", "x,y,z,r,g,b", code=2 if red else 0)
+        assert ("contradict" if red else "2 photographs") in said, said
+    pathlib.Path("wall.xyz").write_text("\n".join(points) + "\n")
+
     # textures: what is finer than the splats shows in a close view, and only with atoms
     def rings(x, y):
         return int(128 + 90 * math.sin(0.8 * math.hypot(x - 64, y - 48)))

@@ -117,7 +117,8 @@ struct pass {
     struct spl_candidates candidates;
     struct spl_chosen chosen;
     struct spl_gain *gains;
-    uint8_t (*own)[3]; /* NULL: the scan has no colours */
+    uint8_t (*own)[3];    /* NULL: the scan has no colours */
+    uint8_t (*judged)[3]; /* own, beside which photographs are judged; NULL: all of it is grey, as infrared is */
     struct spl_renderer *renderer;
     bool *dropped;  /* by photograph */
     uint64_t *uses; /* the same: splats that chose it */
@@ -162,6 +163,9 @@ static int allocate(struct pass *pass, const struct spl_dataset *dataset, struct
         return SPL_E_NOMEM;
     if (colored)
         spl_parallel_for(pass->stage->threads, pass->splats.chunk_count, 16, get_own, pass);
+    for (uint64_t id = 0; colored && id < pass->splats.count && !pass->judged; id++)
+        if (pass->own[id][0] != pass->own[id][1] || pass->own[id][1] != pass->own[id][2])
+            pass->judged = pass->own;
     return SPL_OK;
 }
 
@@ -213,7 +217,7 @@ static int even_out(struct pass *pass, struct spl_error *err)
     uint32_t photos = pass->report->photographs;
     for (bool first = true;; first = false) {
         uint32_t contradicting = 0, doubtful = 0, compared = 0, worst = 0;
-        int rc = spl_gains_find(&pass->candidates, (const uint8_t(*)[3])pass->own, photos, pass->gains, err);
+        int rc = spl_gains_find(&pass->candidates, (const uint8_t(*)[3])pass->judged, photos, pass->gains, err);
         if (rc)
             return rc;
         for (uint32_t i = 0; i < photos; i++) {
