@@ -45,10 +45,9 @@ struct spl_view {
     enum spl_visibility visibility; /* method fill, as the next three */
     double kernel;              /* side of the visibility kernel where it is largest, pixels: 3 to 129; 0 = from the
                                    points' spacing on the image */
-    double threshold;           /* share of the eight sectors that must be open where a point is visible, 0..1;
-                                   negative = default 0.38 */
+    double threshold;           /* share of the eight sectors that must be open where a point is visible, 0..1 */
     uint32_t pyramid;           /* levels of the pyramid that holes are filled from, 1..8; 0 = from the kernel */
-    double margin;              /* blend margin, multiple of the splat radius; negative = default 1 */
+    double margin;              /* blend margin, multiple of the splat radius, 0..16 */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
@@ -125,9 +124,9 @@ void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_
                                 struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline. A dataset without surface is drawn by method fill where
- * splat is asked for; its normals are the filled depth's, and SPL_E_INPUT (field "layer") refuses them of points. On success the caller owns `frame`
- * (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one.
- */
+ * splat is asked for; its normals are the filled depth's, and SPL_E_INPUT (field "layer") refuses them of points. On
+ * success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
+ * destroy it and make a new one. */
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err);
 

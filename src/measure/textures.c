@@ -19,7 +19,7 @@
 enum {
     coded_chunks = 64,
     compared_atoms = 1024,
-    adaptive_atoms = 2048,
+    adaptive_atoms = 4096, /* as pack trains */
     compared_textures = 50000,
     large_atoms = 16384,    /* above, a round over this many textures */
     large_trained = 196608, /* takes minutes, so there is */

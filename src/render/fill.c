@@ -14,8 +14,6 @@
 /* A sector of a kernel that reaches k spacings holds k^2 pi / 8 points on average. With three it is 3.5, and of random
  * points leaves four or more sectors of eight empty, which the threshold takes for open, in one pixel of 10^4. */
 static const double reach_spacings = 3;
-/* Just above three open sectors of eight: the edge of a surface leaves four, a hole in one three at most. */
-static const double default_threshold = 0.38;
 /* Two surfaces less than a spacing apart cannot be told from one that is rough. */
 static const double margin_spacings = 1;
 static const double kernel_most = 64;
@@ -51,7 +49,7 @@ void spl_fill_set_params(struct spl_tile *tile)
     p->fill_reach = (float)(reach_spacings / SPL_RADIUS_SPACING * fmax(tile->camera.fx, tile->camera.fy));
     p->fill_kernel = (float)plan->kernel;
     p->fill_margin = (float)(margin_spacings / SPL_RADIUS_SPACING);
-    p->fill_threshold = (float)(8 * (view->threshold < 0 ? default_threshold : view->threshold));
+    p->fill_threshold = (float)(8 * view->threshold);
     p->fill_levels = plan->rings;
     p->fill_keep = view->visibility == SPL_VISIBILITY_NONE;
 }
@@ -97,31 +95,38 @@ static int record_pass(struct spl_tile *tile, const struct planes *planes, const
     params.fill_from = pass->from;
     params.fill_to = pass->to;
     params.fill_stride = planes->stride;
-    return spl_tile_dispatch_samples(tile, pass->slot, &params, pass->items, err);
+    return spl_tile_dispatch_items(tile, pass->slot, &params, pass->items, err);
 }
 
-int spl_fill_record(struct spl_tile *tile, uint32_t group, struct spl_error *err)
+/* Which samples are visible: depths alone, so the same for every group of layers. */
+static int record_visibility(struct spl_tile *tile, const struct planes *p, struct spl_error *err)
 {
-    const struct spl_fill_plan *plan = &tile->fill;
-    struct planes p;
+    uint32_t rings = tile->fill.rings, adaptive = tile->view->visibility != SPL_VISIBILITY_CONSTANT;
     int rc = SPL_OK;
+    for (uint32_t level = 1; level <= rings && !rc; level++)
+        rc = record_pass(tile, p,
+                         &(struct pass){SPL_KERNEL_FILL_PULL + (level == 1), level, p->nearest[level - 1],
+                                        p->nearest[level], p->samples[level]},
+                         err);
+    return rc ? rc
+              : record_pass(tile, p,
+                            &(struct pass){SPL_KERNEL_FILL_VISIBLE + adaptive, 0, p->states, p->nearest[rings],
+                                           p->samples[0]},
+                            err);
+}
+
+int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
+{
+    uint32_t levels = tile->fill.levels;
+    struct planes p;
     lay_out(tile, &p);
-    for (uint32_t level = 1; level <= plan->rings && !rc; level++)
-        rc = record_pass(tile, &p,
-                         &(struct pass){SPL_KERNEL_FILL_PULL + (level == 1), level, p.nearest[level - 1],
-                                        p.nearest[level], p.samples[level]},
-                         err);
-    if (!rc)
-        rc = record_pass(tile, &p,
-                         &(struct pass){SPL_KERNEL_FILL_VISIBLE + (tile->view->visibility != SPL_VISIBILITY_CONSTANT),
-                                        0, p.states, p.nearest[plan->rings], p.samples[0]},
-                         err);
-    for (uint32_t level = 1; level <= plan->levels && !rc; level++)
+    int rc = first ? record_visibility(tile, &p, err) : SPL_OK;
+    for (uint32_t level = 1; level <= levels && !rc; level++)
         rc = record_pass(tile, &p,
                          &(struct pass){SPL_KERNEL_FILL_GATHER + 2 * group + (level == 1), level, p.means[level - 1],
                                         p.means[level], p.samples[level]},
                          err);
-    for (uint32_t level = plan->levels; level-- > 0 && !rc;)
+    for (uint32_t level = levels; level-- > 0 && !rc;)
         rc = record_pass(tile, &p,
                          &(struct pass){SPL_KERNEL_FILL_PUSH + 2 * group + (level == 0), level, p.means[level + 1],
                                         p.means[level], p.samples[level]},

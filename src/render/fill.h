@@ -29,7 +29,8 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
 void spl_fill_set_params(struct spl_tile *tile);
 
 /* Records the filter over the depth and payloads of `group`, as method points leaves them with depth words of method
- * fill; leaves them the same way, with plain depths. Normals of datasets without any are the filled depth's. Clobbers the sums buffer. */
-int spl_fill_record(struct spl_tile *tile, uint32_t group, struct spl_error *err);
+ * fill; leaves them the same way, with plain depths. Normals of datasets without any are the filled depth's. Clobbers
+ * the sums buffer; what the `first` group leaves there, the visible samples, serves the tile's other groups. */
+int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err);
 
 #endif

@@ -6,8 +6,7 @@
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
     int rc = spl_points_record(tile, group, SPL_KERNEL_FILL_POINTS, err);
-    (void)first; /* as method points: every group starts anew */
-    return rc ? rc : spl_fill_record(tile, group, err);
+    return rc ? rc : spl_fill_record(tile, group, first, err);
 }
 
 const struct spl_method_ops spl_method_fill = {.name = "fill", .record = record};

@@ -96,7 +96,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides. Clobbers the id buffer. */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err);
 /* Records the kernel of `slot`, one invocation for each of `items`, and a barrier. */
-int spl_tile_dispatch_samples(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
+int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
                               uint32_t items, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);

@@ -135,25 +135,30 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
     return SPL_OK;
 }
 
-/* One dispatch over `count` items, of which the kernel sees the first at first_entry. */
-static int dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, size_t first, size_t count,
-                          struct spl_error *err)
+int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
+                              uint32_t items, struct spl_error *err)
 {
     struct spl_gpu_kernel *kernel;
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    struct spl_frame_params params = tile->params;
-    params.first_entry = (uint32_t)first;
-    params.entries = (uint32_t)count;
     bind_scratch(tile, bindings);
     bindings[SPL_BIND_BOUNDS].buffer = tile->renderer->scratch.bounds;
     int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
     if (!rc)
-        rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
+        rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
     if (!rc)
-        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
-                         (uint32_t)((count + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
+        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
     spl_gpu_barrier(tile->renderer->gpu);
     return rc;
+}
+
+/* Items of which the kernel sees the first at first_entry. */
+static int dispatch_range(struct spl_tile *tile, enum spl_kernel_slot slot, size_t first, size_t count,
+                          struct spl_error *err)
+{
+    struct spl_frame_params params = tile->params;
+    params.first_entry = (uint32_t)first;
+    params.entries = (uint32_t)count;
+    return spl_tile_dispatch_items(tile, slot, &params, (uint32_t)count, err);
 }
 
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err)
@@ -162,24 +167,9 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struc
     size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
     size_t tiles = (size_t)((tile->camera.width + side - 1) / side) * ((tile->camera.height + side - 1) / side);
     size_t end = tile->renderer->list.chunk_count;
-    int rc = dispatch_items(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
+    int rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
     for (size_t first = first_chunk; first < end && !rc; first += most)
-        rc = dispatch_items(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
-    return rc;
-}
-
-int spl_tile_dispatch_samples(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
-                              uint32_t items, struct spl_error *err)
-{
-    struct spl_gpu_kernel *kernel;
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    bind_scratch(tile, bindings);
-    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
-    if (!rc)
-        rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
-    if (!rc)
-        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
-    spl_gpu_barrier(tile->renderer->gpu);
+        rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
     return rc;
 }
 

@@ -8,8 +8,6 @@
 
 #include "render/renderer.h"
 
-enum { default_margin = 1 };
-
 void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camera)
 {
     uint32_t side = (uint32_t)view->supersample;
@@ -74,7 +72,7 @@ static void set_params(struct spl_tile *tile)
         .near = (float)camera->near,
         .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
         .low_pass = SPL_LOW_PASS,
-        .margin = view->margin < 0 ? default_margin : (float)view->margin,
+        .margin = (float)view->margin,
         .width = camera->width,
         .height = camera->height,
         .supersample = (uint32_t)view->supersample,

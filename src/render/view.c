@@ -62,8 +62,8 @@ void spl_view_init(struct spl_view *view)
         .supersample = 1,
         .background = {0, 0, 0, 255},
         .atoms = SPL_TEXTURE_ATOMS,
-        .margin = -1,
-        .threshold = -1,
+        .margin = 1,
+        .threshold = 0.38, /* above three open sectors of eight, a hole's most; the edge of a surface leaves four */
         .deadline_ns = UINT64_MAX,
     };
 }
@@ -98,13 +98,13 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     if (view->kernel != 0 && !(view->kernel >= 3 && view->kernel <= 129))
         return spl_fail_field(err, SPL_E_USAGE, "kernel", "kernel %g is neither 0 nor within 3 and 129 pixels",
                               view->kernel);
-    if (!(view->threshold <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "threshold", "threshold %g is not a number up to 1", view->threshold);
+    if (!(view->threshold >= 0 && view->threshold <= 1))
+        return spl_fail_field(err, SPL_E_USAGE, "threshold", "threshold %g is not within 0 and 1", view->threshold);
     if (view->pyramid > SPL_FILL_LEVELS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "pyramid", "pyramid %u is not within 0 and %d", view->pyramid,
                               SPL_FILL_LEVELS_MAX);
-    if (!(view->margin <= 16))
-        return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not a number up to 16", view->margin);
+    if (!(view->margin >= 0 && view->margin <= 16))
+        return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not within 0 and 16", view->margin);
     return SPL_OK;
 }
 

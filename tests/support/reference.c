@@ -455,7 +455,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.fy *= view->supersample;
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
-    s.margin = view->margin < 0 ? 1 : (float)view->margin;
+    s.margin = (float)view->margin;
     struct spl_select_params params = {.dataset = dataset,
                                        .camera = &s.camera,
                                        .lod = view->lod,

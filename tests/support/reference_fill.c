@@ -227,7 +227,7 @@ void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height
     f.reach = (float)(3 / 1.128379f * focal);
     f.margin = (float)(1 / 1.128379f);
     f.radius = (float)(median / 16);
-    f.threshold = (float)(8 * (view->threshold < 0 ? 0.38 : view->threshold));
+    f.threshold = (float)(8 * view->threshold);
     for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
         f.width[level] = (width + (1u << level) - 1) >> level;
         f.height[level] = (height + (1u << level) - 1) >> level;

@@ -26,9 +26,9 @@ static int resolve(const struct values *values, const struct spl_camera_defaults
     int rc;
     if ((rc = spl_camera_from_values(values->v, defaults, limits, camera, err)) ||
         (rc = resolve_point(values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
-        (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)) ||
-        (rc = spl_values_resolve_splats(values, &out->view, err)))
+        (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)))
         return rc;
+    spl_values_resolve_splats(values, &out->view);
     spl_values_resolve_version(values, out);
     out->view.layers = (1u << SPL_LAYER_COUNT) - 1;
     out->view.atoms = 0; // its colour is the splat's

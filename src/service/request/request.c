@@ -67,30 +67,24 @@ static int resolve_layers(const struct values *values, struct spl_view_request *
     return 0;
 }
 
-int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err)
+void spl_values_resolve_splats(const struct values *values, struct spl_view *view)
 {
-    double margin = get(values, PARAM_margin, view->margin);
-    if (given(values, PARAM_margin) && margin < 0) // negative means "default" further down
-        return spl_fail_field(err, SPL_E_INPUT, "margin", "margin %g is negative", margin);
-    double threshold = get(values, PARAM_threshold, view->threshold);
-    if (given(values, PARAM_threshold) && threshold < 0)
-        return spl_fail_field(err, SPL_E_INPUT, "threshold", "threshold %g is negative", threshold);
     view->visibility = (enum spl_visibility)get(values, PARAM_visibility, view->visibility);
     view->kernel = get(values, PARAM_kernel, view->kernel);
-    view->threshold = threshold;
+    view->threshold = get(values, PARAM_threshold, view->threshold);
     view->pyramid = (uint32_t)fmin(get(values, PARAM_pyramid, view->pyramid), UINT32_MAX);
     view->method = (enum spl_method)get(values, PARAM_method, view->method);
     view->lod = get(values, PARAM_lod, view->lod);
-    view->margin = margin;
-    return 0;
+    view->margin = get(values, PARAM_margin, view->margin);
 }
 
 static int resolve_drawing(const struct values *values, struct spl_view_request *out, struct spl_error *err)
 {
     struct spl_view *view = &out->view;
-    int rc = spl_values_resolve_splats(values, view, err);
-    if (rc || (rc = resolve_layers(values, out, err)))
+    int rc = resolve_layers(values, out, err);
+    if (rc)
         return rc;
+    spl_values_resolve_splats(values, view);
     view->supersample = get(values, PARAM_supersample, 1);
     view->atoms = (uint32_t)fmin(get(values, PARAM_atoms, view->atoms), UINT32_MAX);
     if (given(values, PARAM_background))

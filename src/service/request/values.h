@@ -70,7 +70,7 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
 
 /* The parts of it that picks share: method, lod, margin, what method fill takes; the version. */
-int spl_values_resolve_splats(const struct values *values, struct spl_view *view, struct spl_error *err);
+void spl_values_resolve_splats(const struct values *values, struct spl_view *view);
 void spl_values_resolve_version(const struct values *values, struct spl_view_request *out);
 
 #endif

@@ -92,11 +92,11 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     add(&form, (uint64_t)view->method << 32 | view->layers);
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
-    add_number(&form, view->margin < 0 ? 1 : view->margin);
+    add_number(&form, view->margin);
     bool fills = view->method != SPL_METHOD_POINTS; /* where there are bare points, splat is drawn as fill */
     add(&form, fills ? (uint64_t)view->visibility << 32 | view->pyramid : 0);
     add_number(&form, fills ? view->kernel : 0);
-    add_number(&form, fills ? view->threshold < 0 ? -1 : view->threshold : 0);
+    add_number(&form, fills ? view->threshold : 0);
     add(&form, view->layers & 1u << SPL_LAYER_COLOR ? (uint64_t)view->atoms << 32 | background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {

@@ -45,6 +45,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"layers=depth,normal", "layers=normal,depth&background=ff0000&quality=3"},
         {"layers=color,depth", "layers=depth,color&depth_scale=1000&quality=90"},
         {"", "depth_scale=5000"},
+        {"method=fill", "method=fill&threshold=0.38&margin=1&pyramid=0&kernel=0&visibility=adaptive"},
         {"layer=depth", "layer=depth&background=ff0000&quality=50&format=png"},
         {"layer=depth&format=npy", "layer=depth&format=npy&depth_scale=5000"},
         {"format=png", "format=png&quality=10"},
