@@ -3,16 +3,21 @@
 // A view of a dataset that people can move in, for any page on any origin:
 //   <script type="module" src="https://splats.example/clients/splat-view.js"></script>
 //
-// src       the service; by default where this file came from dataset   its id; label  what screen readers call the
-// view token     where the service wants one; whoever sees the page sees it, so let it allow no more than view eye,
-// target, up, fov, layer, method, lod, supersample, atoms, budget   as parameters of a view; changing one moves the view
+// src      the service; by default where this file came from
+// dataset  its id
+// label    what screen readers call the view
+// token    where the service wants one; whoever sees the page sees it, so let it allow no more than view
+// eye, target, up, fov, layer, method, visibility, kernel, threshold, pyramid, lod, supersample, atoms, budget
+//          as parameters of a view; changing one moves the view
 //
 // Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last
 // one. It is a frame of /embed/{id}, so no CORS is needed. Size it with CSS; by default it is 16:9 and as wide as it
 // may be.
 
 const HOME = new URL(import.meta.url).origin;
-const SETTINGS = ["eye", "target", "up", "fov", "layer", "method", "lod", "supersample", "atoms", "budget"];
+const CAMERA = ["eye", "target", "up", "fov"];
+const FILL = ["visibility", "kernel", "threshold", "pyramid"]; // of method fill
+const SETTINGS = [...CAMERA, "layer", "method", ...FILL, "lod", "supersample", "atoms", "budget"];
 
 class SplatView extends HTMLElement {
   static observedAttributes = ["src", "dataset", "label", ...SETTINGS];

@@ -1,5 +1,6 @@
 // The dataset's chart of accuracy against time, as the service draws it, with the frame on screen as a point on it.
 
+import {FILL} from "./link.js";
 import {ask, askJson} from "./service.js";
 
 export class Chart {
@@ -61,7 +62,8 @@ export class Chart {
         p.method === used.method &&
         p.lod === Number(used.lod) &&
         p.supersample === Number(used.supersample) &&
-        p.atoms === Number(used.atoms ?? 8),
+        p.atoms === Number(used.atoms ?? 8) &&
+        !FILL.some((name) => name in used), // measured are their defaults
     );
     const psnr = known?.psnr ?? null,
       ms = frame.stages.frame;

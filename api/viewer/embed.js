@@ -16,13 +16,13 @@ attach(stage);
 let asked = false;
 
 async function open() {
-  const {eye, target, up, fov, layer = "color", method, lod, supersample, atoms, budget} = parse(location.hash);
+  const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = parse(location.hash);
   const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
   try {
     const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
     document.title = id;
     stage.element.ariaLabel = `View of ${id}`;
-    stage.settings = budget ? {layer, budget} : {layer, method, lod, supersample, atoms};
+    stage.settings = budget ? {layer, budget} : {layer, ...setting};
     stage.report(null);
     stage.open(dataset, Object.fromEntries(given));
   } catch (problem) {

@@ -1,8 +1,11 @@
 // What is on screen as text: the URL's fragment, and a command that fetches the same picture.
 
 const VECTORS = ["eye", "target", "up"],
-  NUMBERS = ["fov", "lod", "supersample", "atoms"],
-  TEXTS = ["dataset", "layer", "method", "budget"];
+  TEXTS = ["dataset", "layer", "method", "budget", "visibility"];
+export const NUMBERS = ["fov", "lod", "supersample", "atoms", "kernel", "threshold", "pyramid"];
+
+/** The parameters that method fill has for itself. */
+export const FILL = ["visibility", "kernel", "threshold", "pyramid"];
 
 /** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. */
 export function parse(fragment) {

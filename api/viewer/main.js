@@ -2,7 +2,7 @@
 
 import {Chart} from "./chart.js";
 import {attach} from "./input.js";
-import {copy, curl, parse} from "./link.js";
+import {FILL, copy, curl, parse} from "./link.js";
 import {notices} from "./notice.js";
 import {Points, coordinates, metres} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
@@ -12,7 +12,7 @@ import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
 
 const $ = (id) => document.getElementById(id);
-const SETTINGS = ["layer", "method", "lod", "supersample", "atoms", "budget"];
+const SETTINGS = ["layer", "method", ...FILL, "lod", "supersample", "atoms", "budget"];
 
 const stage = new Stage($("stage"));
 const points = new Points(stage, document.querySelector(".marks"));
@@ -40,13 +40,18 @@ function choose(select, value) {
 
 let textures = null; // of the dataset
 
-/** What the controls say, as parameters of a view; a budget chooses the others. */
-function readSettings() {
-  const settings = Object.fromEntries(SETTINGS.map((name) => [name, $(name).value]));
-  for (const name of ["method", "lod", "supersample", "atoms"]) $(name).disabled = settings.budget !== "";
-  const textured = Boolean(textures?.methods.includes(settings.method));
-  $("atoms").hidden = $("atoms").labels[0].hidden = !textured;
-  if (!textured || settings.atoms === "") delete settings.atoms; // all of them
+/** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
+ * refuses stands what `before` has. */
+function readSettings(before) {
+  const read = (name) => (before && !$(name).checkValidity() ? before[name] : $(name).value) ?? "";
+  const settings = Object.fromEntries(SETTINGS.map((name) => [name, read(name)]));
+  for (const name of SETTINGS) $(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
+  const offer = (name, offered) => {
+    $(name).hidden = $(name).labels[0].hidden = !offered;
+    if (!offered || settings[name] === "") delete settings[name]; // the service chooses
+  };
+  offer("atoms", Boolean(textures?.methods.includes(settings.method)));
+  for (const name of FILL) offer(name, settings.method === "fill");
   stage.coarse = $("moving").value;
   return settings;
 }
@@ -91,6 +96,10 @@ async function open() {
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
     choose($("atoms"), wanted.atoms ?? "");
+    choose($("visibility"), wanted.visibility === "adaptive" ? "" : (wanted.visibility ?? ""));
+    $("kernel").value = wanted.kernel || ""; // 0 is automatic, too
+    $("threshold").value = wanted.threshold ?? "";
+    $("pyramid").value = wanted.pyramid || "";
     choose($("budget"), wanted.budget ?? "");
     textures = dataset.textures;
     stage.settings = readSettings();
@@ -187,7 +196,10 @@ editTour(tour, say);
 renderTours(tour, say);
 
 for (const name of [...SETTINGS, "moving"])
-  $(name).addEventListener("change", () => $(name).checkValidity() && stage.dataset && stage.set(readSettings()));
+  $(name).addEventListener("change", () => {
+    if (!$(name).checkValidity()) say($(name).validationMessage);
+    else if (stage.dataset) stage.set(readSettings(stage.settings));
+  });
 for (const radio of document.querySelectorAll("[name=drag]"))
   radio.addEventListener("change", () => (stage.drag = radio.value));
 stage.drag = document.querySelector("[name=drag]:checked").value; // browsers keep it over a reload

@@ -38,7 +38,7 @@ export class Stage extends EventTarget {
     this.canvas = element.querySelector("canvas");
     this.dataset = null; // as /v1/datasets/{id} describes it
     this.camera = null;
-    this.settings = {}; // method, lod, supersample, atoms, budget, layer: as parameters of a view
+    this.settings = {}; // method and its own, lod, supersample, atoms, budget, layer: as parameters of a view
     this.coarse = "auto";
     this.pixels = 2 ** 23;
     this.shown = null; // {camera, size, full, …headers} of the frame on screen

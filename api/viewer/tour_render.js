@@ -1,5 +1,6 @@
 // Has the service make a tour: begins it, says how far it is, offers what came out.
 
+import {NUMBERS} from "./link.js";
 import {Problem, ask, askJson, download} from "./service.js";
 
 const POLL_MS = 700;
@@ -48,15 +49,15 @@ export function renderTours(tour, say) {
   };
 
   $("render").addEventListener("click", async () => {
-    const {layer, method, lod, supersample, atoms} = tour.stage.settings; // one setting for all frames: no budget
+    const {budget: _, ...setting} = tour.stage.settings; // one setting for all frames
     const [width, height] = [$("tour-width"), $("tour-height")];
     if (![width, height].every((input) => input.reportValidity())) return;
     const settings = {
-      layer,
-      method,
-      lod: Number(lod),
-      supersample: Number(supersample),
-      ...(atoms === undefined ? {} : {atoms: Number(atoms)}),
+      ...Object.fromEntries(
+        Object.entries(setting)
+          .filter(([, value]) => value !== "")
+          .map(([name, value]) => [name, NUMBERS.includes(name) ? Number(value) : value]),
+      ),
       format: "jpeg",
       width: Number(width.value),
       height: Number(height.value),

@@ -357,7 +357,7 @@ def test_dark_and_light():
 
 
 def test_everything_has_a_name_and_takes_the_focus():
-    with page(size=(1000, 900)) as tab:
+    with page(f"{SITE}/{FACING}&method=fill", size=(1000, 900)) as tab:
         tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
         tab.press_on("#add")
         tab.press_on("#add")
@@ -445,10 +445,21 @@ def test_the_service_renders_tours():
             assert not d.ask("/v1/tours").json()["tours"]
             tab.choose("#tour-width", "320")
             tab.choose("#tour-height", "180")
+            tab.choose("#method", "fill")
+            for name, value in (("visibility", "none"), ("kernel", "9")):
+                tab.choose(f"#{name}", value)
+            tab.run(
+                """(usual => window.fetch = (path, how) => { if (how?.body) window.asked = JSON.parse(how.body);
+                return usual(path, how); })(fetch)"""
+            )
             tab.press_on("#render")
             tab.until("!document.querySelector('#result').hidden")
             [made] = d.ask("/v1/tours").json()["tours"]
             assert (made["width"], made["height"]) == (320, 180)
+            assert tab.run("asked.settings") == {
+                "layer": "color", "method": "fill", "visibility": "none", "kernel": 9, "lod": 1, "supersample": 1,
+                "format": "jpeg", "width": 320, "height": 180,
+            }
             frames = int(re.fullmatch(r"(\d+) frames are ready", tab.text("#far")).group(1))
             assert 9 <= frames <= 10 and tab.run("document.querySelector('#progress').hidden")
             tab.press_on("#result")
@@ -530,6 +541,49 @@ def test_atoms_are_offered_where_there_are_textures():
             assert tab.run(DIGEST)[0] == mean[0], "the address has them"
         with page(f"http://127.0.0.1:{other.port}/embed/wall-textured{close}&atoms=0") as tab:
             assert any("atoms=0" in name for name, *_ in tab.run(VIEWS))
+
+
+FILL = ("visibility", "kernel", "threshold", "pyramid")
+
+
+def test_fill_has_its_own_controls():
+    offered = f"""{json.dumps(FILL)}.map(id => [document.getElementById(id), document.querySelector(`[for=${{id}}]`)]).flat()
+        .filter(e => e.offsetHeight).length"""
+    with page() as tab:
+        digest = settled(tab)
+        assert tab.run(offered) == 0
+        tab.choose("#method", "fill")
+        digest = automatic = settled(tab, digest)
+        assert tab.run(offered) == 8 and link(tab)["method"] == "fill" and not set(FILL) & set(link(tab))
+        tab.choose("#kernel", "3")  # smaller than the holes
+        digest = settled(tab, digest)
+        tab.choose("#kernel", "2")  # the browser's own check keeps it from being asked, also when something else changes
+        assert "3" in tab.text("#said")
+        wanted = {"kernel": "3", "threshold": "0.25", "pyramid": "5", "visibility": "none"}
+        for name in ("threshold", "pyramid", "visibility"):
+            tab.choose(f"#{name}", wanted[name])
+        next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
+        tab.choose("#kernel", "3")
+        next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
+        digest, url = settled(tab), tab.run("location.href")
+        assert digest != automatic
+        tab.choose("#budget", "500ms")
+        next_link(tab, lambda now: "budget" in now and not set(FILL) & set(now))
+        assert tab.run(f"{json.dumps(FILL)}.every(id => document.getElementById(id).disabled)")
+        tab.choose("#budget", "")
+        next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
+        tab.choose("#method", "points")
+        next_link(tab, lambda now: now["method"] == "points" and not set(FILL) & set(now))
+        assert tab.run(offered) == 0
+    with page(url) as tab:
+        assert settled(tab) == digest and tab.run(offered) == 8
+        assert {name: tab.run(f"document.getElementById('{name}').value") for name in FILL} == wanted
+        for name in FILL:
+            tab.choose(f"#{name}", "")
+        assert settled(tab, digest) == automatic
+    with page(url.replace("/#", "/embed/wall#")) as tab:
+        view = urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])
+        assert {name: view[name][0] for name in FILL} == wanted
 
 
 def refuse(tab, status, problem, retry):
