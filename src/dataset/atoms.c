@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "sparse/atom.h"
 
 enum { length_bits = 12, ones_max = 20, plain_bits = 16, forget = 32 };
@@ -96,37 +98,67 @@ static uint32_t get(struct stream *s, uint32_t width)
     return value;
 }
 
+/* What is wrong with the next atom, or NULL. */
+static const char *read_atom(struct stream *s, struct place *places, uint32_t n, int16_t *coefficient)
+{
+    uint32_t length = get(s, length_bits), sum = 0;
+    if (length > n)
+        return "has an atom of more coefficients than texels";
+    memset(coefficient, 0, n * sizeof *coefficient);
+    for (uint32_t k = 0; k < length && !s->ended; k++) {
+        uint32_t bits = low_bits(&places[k]), ones = 0;
+        while (ones < ones_max && get(s, 1))
+            ones++;
+        uint32_t value = ones < ones_max ? ones << bits | get(s, bits) : get(s, plain_bits);
+        uint32_t magnitude = (value + 1) / 2;
+        if (magnitude > INT16_MAX)
+            return "has a coefficient that is too large";
+        if (magnitude && k < 3)
+            return "has an atom with a mean colour";
+        coefficient[k] = (int16_t)(value & 1 ? (int)magnitude : -(int)magnitude);
+        learn(&places[k], magnitude);
+        sum += magnitude;
+    }
+    for (uint32_t k = length; k < n; k++)
+        learn(&places[k], 0);
+    return s->ended ? "ends before its atoms do" : sum ? NULL : "has an atom of nothing";
+}
+
+struct synthesis {
+    struct spl_dictionary *dictionary;
+    struct spl_waves waves;
+};
+
+static void synthesise(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct synthesis *s = context;
+    const struct spl_dictionary *d = s->dictionary;
+    size_t n = s->waves.n;
+    (void)worker;
+    for (size_t a = begin; a < end; a++) {
+        bool some = spl_waves_synthesise(&s->waves, d->coefficients + a * n, d->texels + a * n, &d->scale[a]);
+        spl_assert(some); /* waves are orthogonal: a coefficient of 1 is never less than nothing */
+    }
+}
+
 const char *spl_atoms_read(const uint8_t *bytes, size_t count, struct spl_dictionary *dictionary)
 {
     struct place places[SPL_TEXTURE_VALUES_MAX];
-    struct spl_waves waves;
     struct stream s = {.bytes = bytes, .bits = 8 * count};
+    struct synthesis synthesis = {.dictionary = dictionary};
     uint32_t n = spl_texture_values(dictionary->size);
-    spl_waves_init(&waves, dictionary->size);
     start(places);
     for (uint32_t a = 0; a < dictionary->count; a++) {
-        int16_t *coefficient = dictionary->coefficients + (size_t)a * n;
-        uint32_t length = get(&s, length_bits);
-        if (length > n)
-            return "has an atom of more coefficients than texels";
-        memset(coefficient, 0, n * sizeof *coefficient);
-        for (uint32_t k = 0; k < length && !s.ended; k++) {
-            uint32_t bits = low_bits(&places[k]), ones = 0;
-            while (ones < ones_max && get(&s, 1))
-                ones++;
-            uint32_t value = ones < ones_max ? ones << bits | get(&s, bits) : get(&s, plain_bits);
-            uint32_t magnitude = (value + 1) / 2;
-            if (magnitude > INT16_MAX)
-                return "has a coefficient that is too large";
-            coefficient[k] = (int16_t)(value & 1 ? (int)magnitude : -(int)magnitude);
-            learn(&places[k], magnitude);
-        }
-        for (uint32_t k = length; k < n; k++)
-            learn(&places[k], 0);
-        if (s.ended)
-            return "ends before its atoms do";
-        if (!spl_waves_synthesise(&waves, coefficient, dictionary->texels + (size_t)a * n, &dictionary->scale[a]))
-            return "has an atom of nothing";
+        const char *what = read_atom(&s, places, n, dictionary->coefficients + (size_t)a * n);
+        if (what)
+            return what;
     }
-    return (s.at + 31) / 32 * 4 == count ? NULL : "has a size that is not its atoms'";
+    if ((s.at + 31) / 32 * 4 != count)
+        return "has a size that is not its atoms'";
+    while (s.at < s.bits)
+        if (get(&s, 1))
+            return "has bits behind its last atom";
+    spl_waves_init(&synthesis.waves, dictionary->size);
+    spl_parallel_for(0, dictionary->count, 64, synthesise, &synthesis);
+    return NULL;
 }

@@ -19,7 +19,8 @@ void spl_waves_init(struct spl_waves *waves, uint32_t size)
     waves->n = spl_texture_values(size);
     for (uint32_t u = 0; u < size; u++)
         for (uint32_t x = 0; x < size; x++)
-            waves->cosine[u][x] = sqrt((u ? 2.0 : 1.0) / size) * cos(pi * u * (2 * x + 1) / (2.0 * size));
+            waves->cosine[u * size + x] = waves->transposed[x * size + u] =
+                sqrt((u ? 2.0 : 1.0) / size) * cos(pi * u * (2 * x + 1) / (2.0 * size));
     for (uint32_t sum = 0; sum <= 2 * (size - 1); sum++)
         for (uint32_t c = 0; c < 3; c++)
             for (uint32_t v = 0; v <= sum && v < size; v++)
@@ -27,25 +28,31 @@ void spl_waves_init(struct spl_waves *waves, uint32_t size)
                     waves->order[at++] = (uint16_t)(c * texels + v * size + sum - v);
 }
 
+/* out = a b, all of size × size. Zeros of a and rows of zeros of b are passed over: a forged file may hold as many
+ * atoms of a wave or two as a device can bind. */
+static void multiply(uint32_t size, const double *a, const double *b, double *out)
+{
+    memset(out, 0, (size_t)size * size * sizeof *out);
+    for (uint32_t k = 0; k < size; k++, b += size) {
+        uint32_t zeros = 0;
+        while (zeros < size && !(fabs(b[zeros]) > 0))
+            zeros++;
+        for (uint32_t i = 0; i < size && zeros < size; i++) {
+            double factor = a[i * size + k], *row = out + i * size;
+            if (!(fabs(factor) > 0))
+                continue;
+            for (uint32_t x = 0; x < size; x++)
+                row[x] += factor * b[x];
+        }
+    }
+}
+
 /* to = the transform of one channel, or its inverse. */
 static void transform(const struct spl_waves *w, const double *from, double *to, bool inverse)
 {
     double half[SPL_TEXTURE_SIZE_MAX * SPL_TEXTURE_SIZE_MAX];
-    uint32_t size = w->size;
-    for (uint32_t y = 0; y < size; y++)
-        for (uint32_t i = 0; i < size; i++) {
-            double sum = 0;
-            for (uint32_t k = 0; k < size; k++)
-                sum += from[y * size + k] * (inverse ? w->cosine[k][i] : w->cosine[i][k]);
-            half[y * size + i] = sum;
-        }
-    for (uint32_t i = 0; i < size; i++)
-        for (uint32_t x = 0; x < size; x++) {
-            double sum = 0;
-            for (uint32_t k = 0; k < size; k++)
-                sum += half[k * size + x] * (inverse ? w->cosine[k][i] : w->cosine[i][k]);
-            to[i * size + x] = sum;
-        }
+    multiply(w->size, from, inverse ? w->cosine : w->transposed, half);
+    multiply(w->size, inverse ? w->transposed : w->cosine, half, to);
 }
 
 void spl_waves_analyse(const struct spl_waves *w, const float *atom, float step, int16_t *out)

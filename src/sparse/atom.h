@@ -8,8 +8,9 @@
 /* The waves of a size; a coefficient stands at its place in `order`, coarse waves first. */
 struct spl_waves {
     uint32_t size, n;
-    double cosine[SPL_TEXTURE_SIZE_MAX][SPL_TEXTURE_SIZE_MAX]; /* [wave][texel], norm 1 */
-    uint16_t order[SPL_TEXTURE_VALUES_MAX];                    /* channel · size² + vertical · size + horizontal */
+    double cosine[SPL_TEXTURE_SIZE_MAX * SPL_TEXTURE_SIZE_MAX];     /* [wave][texel], norm 1 */
+    double transposed[SPL_TEXTURE_SIZE_MAX * SPL_TEXTURE_SIZE_MAX]; /* [texel][wave] */
+    uint16_t order[SPL_TEXTURE_VALUES_MAX]; /* channel · size² + vertical · size + horizontal */
 };
 
 /* size: 1..SPL_TEXTURE_SIZE_MAX */
@@ -19,8 +20,8 @@ void spl_waves_init(struct spl_waves *waves, uint32_t size);
  */
 void spl_waves_analyse(const struct spl_waves *waves, const float *atom, float step, int16_t *out);
 
-/* The atom of norm 1 that coefficient[n] add up to, as texels[n] and their scale; false where they add up to nothing.
- * The same on every machine up to one level of a texel. */
+/* The atom of norm 1 that coefficient[n] add up to (waves of coefficient 0 cost nothing), as texels[n] and their scale;
+ * false where they add up to nothing. The same on every machine up to one level of a texel. */
 bool spl_waves_synthesise(const struct spl_waves *waves, const int16_t *coefficient, int8_t *texels, float *scale);
 
 /* Allocates arrays for `count` atoms. On failure nothing is held. SPL_E_NOMEM. */

@@ -151,6 +151,10 @@ static void test_atoms(void **state)
         }
         memset(damaged, 0xff, bytes);
         assert_non_null(spl_atoms_read(damaged, bytes, &back));
+        d.coefficients[2 * n + 1] = -1;
+        assert_int_equal(spl_atoms_write(&d, NULL), bytes); /* a place of zeros so far: still one bit or two */
+        spl_atoms_write(&d, stream);
+        assert_string_equal(spl_atoms_read(stream, bytes, &back), "has an atom with a mean colour");
         free(stream);
         free(damaged);
         spl_dictionary_finish(&d);
@@ -177,6 +181,39 @@ static void test_atoms(void **state)
         memset(coefficient, 0, sizeof coefficient);
         assert_false(spl_waves_synthesise(&waves, coefficient, texels, &scale));
     }
+}
+
+/* What a stream must hold though no atom needs it: nothing behind the last one. And as many atoms as a device can bind,
+ * of one wave each, are few bytes. */
+static void test_forged_atoms(void **state)
+{
+    enum { count = 24000, size = 32 };
+    struct spl_dictionary d, back;
+    uint32_t n = spl_texture_values(size);
+    (void)state;
+    assert_int_equal(spl_dictionary_init(&d, count, size, NULL), SPL_OK);
+    assert_int_equal(spl_dictionary_init(&back, count, size, NULL), SPL_OK);
+    memset(d.coefficients, 0, (size_t)count * n * sizeof *d.coefficients);
+    for (uint32_t a = 0; a < count; a++)
+        d.coefficients[(size_t)a * n + 3] = a % 2 ? 1 : -1;
+    size_t bytes = spl_atoms_write(&d, NULL);
+    uint8_t *stream = malloc(bytes);
+    spl_atoms_write(&d, stream);
+    assert_true(bytes < 60000);
+    assert_null(spl_atoms_read(stream, bytes, &back));
+    int most = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        int a = back.texels[i], b = back.texels[n + i];
+        assert_int_equal(a, -b);
+        most = abs(a) > most ? abs(a) : most;
+    }
+    assert_int_equal(most, 127);
+    assert_true(!(stream[bytes - 1] & 0x80));
+    stream[bytes - 1] |= 0x80;
+    assert_string_equal(spl_atoms_read(stream, bytes, &back), "has bits behind its last atom");
+    free(stream);
+    spl_dictionary_finish(&d);
+    spl_dictionary_finish(&back);
 }
 
 static void test_expand(void **state)
@@ -533,9 +570,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_codes),   cmocka_unit_test(test_judge),   cmocka_unit_test(test_atoms),
-        cmocka_unit_test(test_expand),  cmocka_unit_test(test_tangent), cmocka_unit_test(test_retexture),
-        cmocka_unit_test(test_bad_files),
+        cmocka_unit_test(test_codes),        cmocka_unit_test(test_judge),     cmocka_unit_test(test_atoms),
+        cmocka_unit_test(test_forged_atoms), cmocka_unit_test(test_expand),    cmocka_unit_test(test_tangent),
+        cmocka_unit_test(test_retexture),    cmocka_unit_test(test_bad_files),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
