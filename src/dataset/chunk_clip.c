@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "dataset/bits.h"
 #include "geom/tangent.h"
 
 enum { directions = 1 << SPL_CLIP_DIRECTION_BITS, offsets = 1 << SPL_CLIP_OFFSET_BITS };
@@ -23,7 +24,7 @@ uint32_t spl_clip_words(const struct spl_chunk *chunk)
     return count ? SPL_LINEAR_WORDS + (count * SPL_CLIP_BITS + 31) / 32 : 0;
 }
 
-/* Code of the line that ends `splat` at `end` radii in the direction `line`, UINT32_MAX where the disc ends before it.
+/* Code of the line that ends a disc at `end` radii in the direction `line`, UINT32_MAX where the disc ends before it.
  */
 static uint32_t code_of(const float normal[3], const float line[3], float end)
 {
@@ -44,21 +45,20 @@ static uint32_t code_of(const float normal[3], const float line[3], float end)
 uint32_t spl_clip_encode(const struct spl_clip *clips, const float (*normals)[3], struct spl_chunk *chunk,
                          uint32_t *words)
 {
-    uint32_t count = 0, *codes = words + SPL_LINEAR_WORDS;
+    struct spl_bit_writer codes = {.words = words + SPL_LINEAR_WORDS};
+    uint32_t count = 0;
     for (uint32_t i = 0; i < chunk->count; i++) {
         const float *line = clips[i].direction;
         uint32_t code =
             line[0] == 0 && line[1] == 0 && line[2] == 0 ? UINT32_MAX : code_of(normals[i], line, clips[i].offset);
         if (code == UINT32_MAX)
             continue;
-        uint32_t bit = count * SPL_CLIP_BITS, word = bit / 32, shift = bit % 32;
         if (!count++)
             memset(words, 0, SPL_LINEAR_WORDS * sizeof *words);
         words[i / 32] |= 1u << i % 32;
-        codes[word] = (shift ? codes[word] : 0) | code << shift;
-        if (shift + SPL_CLIP_BITS > 32)
-            codes[word + 1] = code >> (32 - shift);
+        spl_bits_put(&codes, code, SPL_CLIP_BITS);
     }
+    spl_bits_pad(&codes);
     chunk->extra_bits |= count << SPL_EXTRA_CLIP;
     return spl_clip_words(chunk);
 }
@@ -75,10 +75,7 @@ void spl_clip_decode(const struct spl_chunk *chunk, const uint32_t *words, uint3
     before += (uint32_t)__builtin_popcount(words[i / 32] & ((1u << i % 32) - 1));
     if (before >= count)
         return;
-    uint32_t bit = before * SPL_CLIP_BITS, word = SPL_LINEAR_WORDS + bit / 32, shift = bit % 32;
-    uint32_t code = words[word] >> shift;
-    if (shift + SPL_CLIP_BITS > 32)
-        code |= words[word + 1] << (32 - shift);
+    uint32_t code = spl_bits_get(words + SPL_LINEAR_WORDS, before * SPL_CLIP_BITS, SPL_CLIP_BITS);
     /* Around the square |x| + |y| = 1. */
     float turn = (float)(code & (directions - 1)) * (4.0f / directions);
     float x = fabsf(turn - 2) - 1, y = fabsf((turn < 1 ? turn + 3 : turn - 1) - 2) - 1;

@@ -1,18 +1,14 @@
 /* Where a chunk's streams lie, and the decoding of one splat. shaders/common/splat.glsl is this file line by line:
  * 32-bit integers and floats only, no fused operations, at most two words read a field. Nothing here checks the chunk:
- * open has (src/dataset/check.c). Every splat decodes on its own, without a look at its neighbours. Pure functions; any
+ * open has (structure.c). Every splat decodes on its own, without a look at its neighbours. Pure functions; any
  * thread. */
 #include "dataset/chunk.h"
 
 #include <math.h>
 
+#include "dataset/bits.h"
 #include "dataset/chunk_clip.h"
 #include "geom/octahedral.h"
-
-static uint32_t part(uint32_t word, unsigned shift, unsigned bits)
-{
-    return word >> shift & ((1u << bits) - 1);
-}
 
 static uint32_t stream_words(const struct spl_chunk *chunk, uint32_t width)
 {
@@ -21,25 +17,27 @@ static uint32_t stream_words(const struct spl_chunk *chunk, uint32_t width)
 
 static uint32_t class_width(const struct spl_chunk *chunk)
 {
-    return part(chunk->extra_bits, SPL_EXTRA_CLASS, 4);
+    return spl_bits_part(chunk->extra_bits, SPL_EXTRA_CLASS, 4);
 }
 
 static uint32_t uncertainty_width(const struct spl_chunk *chunk)
 {
-    return part(chunk->extra_bits, SPL_EXTRA_UNCERTAINTY, 4);
+    return spl_bits_part(chunk->extra_bits, SPL_EXTRA_UNCERTAINTY, 4);
 }
 
 uint32_t spl_chunk_geometry_width(const struct spl_chunk *chunk)
 {
     uint32_t bits = chunk->geometry_bits;
-    return part(bits, SPL_GEOMETRY_X, 5) + part(bits, SPL_GEOMETRY_Y, 5) + part(bits, SPL_GEOMETRY_Z, 5) +
-           part(bits, SPL_GEOMETRY_U, 4) + part(bits, SPL_GEOMETRY_V, 4) + part(bits, SPL_GEOMETRY_RADIUS, 4);
+    return spl_bits_part(bits, SPL_GEOMETRY_X, 5) + spl_bits_part(bits, SPL_GEOMETRY_Y, 5) +
+           spl_bits_part(bits, SPL_GEOMETRY_Z, 5) + spl_bits_part(bits, SPL_GEOMETRY_U, 4) +
+           spl_bits_part(bits, SPL_GEOMETRY_V, 4) + spl_bits_part(bits, SPL_GEOMETRY_RADIUS, 4);
 }
 
 uint32_t spl_chunk_color_width(const struct spl_chunk *chunk)
 {
     uint32_t bits = chunk->color_bits;
-    return part(bits, SPL_COLOR_Y, 4) + part(bits, SPL_COLOR_U, 4) + part(bits, SPL_COLOR_V, 4);
+    return spl_bits_part(bits, SPL_COLOR_Y, 4) + spl_bits_part(bits, SPL_COLOR_U, 4) +
+           spl_bits_part(bits, SPL_COLOR_V, 4);
 }
 
 static uint32_t linear_words(const struct spl_chunk *chunk)
@@ -91,8 +89,8 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
 {
     uint32_t geometry = chunk->geometry_bits;
     uint64_t count = chunk->count;
-    uint64_t normal = count * (part(geometry, SPL_GEOMETRY_U, 4) + part(geometry, SPL_GEOMETRY_V, 4));
-    uint64_t radius = count * part(geometry, SPL_GEOMETRY_RADIUS, 4);
+    uint64_t normal = count * (spl_bits_part(geometry, SPL_GEOMETRY_U, 4) + spl_bits_part(geometry, SPL_GEOMETRY_V, 4));
+    uint64_t radius = count * spl_bits_part(geometry, SPL_GEOMETRY_RADIUS, 4);
     uint64_t position = count * spl_chunk_geometry_width(chunk) - normal - radius;
     uint64_t color = count * spl_chunk_color_width(chunk);
     uint64_t classification = count * class_width(chunk);
@@ -111,17 +109,10 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
                                  color - classification - uncertainty - linear - clip;
 }
 
-/* The next `width` bits (0..24) at *bit of the stream at `words`. */
 static uint32_t take(const uint32_t *words, uint32_t *bit, uint32_t width)
 {
-    uint32_t word = *bit >> 5, shift = *bit & 31;
     *bit += width;
-    if (width == 0)
-        return 0;
-    uint32_t value = words[word] >> shift;
-    if (shift + width > 32)
-        value |= words[word + 1] << (32 - shift);
-    return value & ((1u << width) - 1);
+    return spl_bits_get(words, *bit - width, width);
 }
 
 static uint8_t clamp_byte(int32_t value)
@@ -134,17 +125,20 @@ void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
     uint32_t bits = chunk->geometry_bits;
     const uint32_t *words = page + chunk->geometry_word;
     uint32_t bit = i * spl_chunk_geometry_width(chunk);
-    splat->position[0] = chunk->origin[0] + chunk->step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_X, 5));
-    splat->position[1] = chunk->origin[1] + chunk->step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_Y, 5));
-    splat->position[2] = chunk->origin[2] + chunk->step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_Z, 5));
-    float u = chunk->normal_u + chunk->normal_step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_U, 4));
-    float v = chunk->normal_v + chunk->normal_step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_V, 4));
+    splat->position[0] =
+        chunk->origin[0] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_X, 5));
+    splat->position[1] =
+        chunk->origin[1] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Y, 5));
+    splat->position[2] =
+        chunk->origin[2] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Z, 5));
+    float u = chunk->normal_u + chunk->normal_step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_U, 4));
+    float v = chunk->normal_v + chunk->normal_step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_V, 4));
     splat->radius =
-        chunk->radius_min + chunk->radius_step * (float)take(words, &bit, part(bits, SPL_GEOMETRY_RADIUS, 4));
+        chunk->radius_min + chunk->radius_step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_RADIUS, 4));
     float local[3];
     spl_octahedral_decode(u, v, local);
-    spl_octahedral_turn_back(local, part(bits, SPL_GEOMETRY_AXIS, 2), part(bits, SPL_GEOMETRY_AXIS + 2, 1),
-                             splat->normal);
+    spl_octahedral_turn_back(local, spl_bits_part(bits, SPL_GEOMETRY_AXIS, 2),
+                             spl_bits_part(bits, SPL_GEOMETRY_AXIS + 2, 1), splat->normal);
 
     splat->linear = is_linear(chunk, page, i);
     spl_clip_decode(chunk, page + spl_chunk_clip_word(chunk), i, splat->normal, &splat->clip);
@@ -152,16 +146,18 @@ void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
     bits = chunk->color_bits;
     words = page + spl_chunk_color_word(chunk);
     bit = i * spl_chunk_color_width(chunk);
-    int32_t y = (int32_t)(part(bits, SPL_COLOR_BASE_Y, 8) + take(words, &bit, part(bits, SPL_COLOR_Y, 4)));
-    int32_t cu = (int16_t)(chunk->color_base & 0xffff) + (int32_t)take(words, &bit, part(bits, SPL_COLOR_U, 4));
-    int32_t cv = (int16_t)(chunk->color_base >> 16) + (int32_t)take(words, &bit, part(bits, SPL_COLOR_V, 4));
+    int32_t y =
+        (int32_t)(spl_bits_part(bits, SPL_COLOR_BASE_Y, 8) + take(words, &bit, spl_bits_part(bits, SPL_COLOR_Y, 4)));
+    int32_t cu =
+        (int16_t)(chunk->color_base & 0xffff) + (int32_t)take(words, &bit, spl_bits_part(bits, SPL_COLOR_U, 4));
+    int32_t cv = (int16_t)(chunk->color_base >> 16) + (int32_t)take(words, &bit, spl_bits_part(bits, SPL_COLOR_V, 4));
     int32_t g = y - ((cu + cv) >> 2);
     splat->color[0] = clamp_byte(cv + g);
     splat->color[1] = clamp_byte(g);
     splat->color[2] = clamp_byte(cu + g);
 
     bit = i * class_width(chunk);
-    splat->classification = (uint8_t)(part(chunk->extra_bits, SPL_EXTRA_CLASS_BASE, 8) +
+    splat->classification = (uint8_t)(spl_bits_part(chunk->extra_bits, SPL_EXTRA_CLASS_BASE, 8) +
                                       take(page + spl_chunk_class_word(chunk), &bit, class_width(chunk)));
     uint32_t width = uncertainty_width(chunk);
     bit = i * width;

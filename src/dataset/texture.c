@@ -6,36 +6,11 @@
 
 #include <string.h>
 
+#include "dataset/bits.h"
+
 _Static_assert(SPL_TEXTURE_ATOMS == SPL_ATOMS_MAX, "as many atoms drawn as coded");
 
 enum { code_bits_max = 24 };
-
-static uint32_t part(uint32_t word, unsigned shift, unsigned bits)
-{
-    return word >> shift & ((1u << bits) - 1);
-}
-
-/* The `width` (0..24) bits from bit `at` on. */
-static uint32_t get(const uint32_t *words, uint32_t at, uint32_t width)
-{
-    uint32_t shift = at & 31;
-    if (!width)
-        return 0;
-    uint32_t value = words[at / 32] >> shift;
-    if (shift + width > 32)
-        value |= words[at / 32 + 1] << (32 - shift);
-    return part(value, 0, width);
-}
-
-/* Appends `width` (0..24) bits; words from *at's on are cleared as they are reached. */
-static void put(uint32_t *words, uint32_t *at, uint32_t width, uint32_t value)
-{
-    for (uint32_t i = 0; i < width; i++, ++*at) {
-        if (!(*at & 31))
-            words[*at / 32] = 0;
-        words[*at / 32] |= (value >> i & 1) << (*at & 31);
-    }
-}
 
 static uint32_t header_of(const struct spl_code_plane *plane)
 {
@@ -48,10 +23,10 @@ static uint32_t header_of(const struct spl_code_plane *plane)
 
 static struct spl_code_plane plane_of(uint32_t header)
 {
-    struct spl_code_plane plane = {.index_bits = (uint8_t)part(header, SPL_TEXTURE_INDEX_BITS, 5),
-                                   .weight_bits = (uint8_t)(part(header, SPL_TEXTURE_WEIGHT_BITS, 3) + 1),
-                                   .step_code = (uint8_t)part(header, SPL_TEXTURE_STEP, 6),
-                                   .gap_code = (uint8_t)part(header, SPL_TEXTURE_GAP, 2)};
+    struct spl_code_plane plane = {.index_bits = (uint8_t)spl_bits_part(header, SPL_TEXTURE_INDEX_BITS, 5),
+                                   .weight_bits = (uint8_t)(spl_bits_part(header, SPL_TEXTURE_WEIGHT_BITS, 3) + 1),
+                                   .step_code = (uint8_t)spl_bits_part(header, SPL_TEXTURE_STEP, 6),
+                                   .gap_code = (uint8_t)spl_bits_part(header, SPL_TEXTURE_GAP, 2)};
     plane.step = spl_code_step(plane.step_code);
     plane.gap = spl_code_gap(plane.gap_code);
     return plane;
@@ -59,28 +34,31 @@ static struct spl_code_plane plane_of(uint32_t header)
 
 uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words)
 {
-    uint32_t at = 0;
+    struct spl_bit_writer w = {.words = words};
     spl_assert(code->splats >= 1 && code->splats <= SPL_CHUNK_SPLATS && code->planes <= SPL_ATOMS_MAX);
     for (uint32_t t = 0; t < code->planes; t++) {
         const struct spl_code_plane *plane = &code->plane[t];
         int half = 1 << plane->weight_bits >> 1;
-        put(words, &at, SPL_TEXTURE_HEADER_BITS, header_of(plane));
-        uint32_t mask_at = at;
+        uint32_t masked = 0;
+        spl_bits_put(&w, header_of(plane), SPL_TEXTURE_HEADER_BITS);
         for (uint32_t i = 0; i < SPL_CHUNK_SPLATS; i++)
-            if (!t || (i < code->splats && code->splat[i].count >= t))
-                put(words, &at, 1, i < code->splats && code->splat[i].count > t);
-        spl_assert(at > mask_at);
+            if (!t || (i < code->splats && code->splat[i].count >= t)) {
+                spl_bits_put(&w, i < code->splats && code->splat[i].count > t, 1);
+                masked++;
+            }
+        spl_assert(masked);
         for (uint32_t i = 0; i < code->splats; i++) {
             const struct spl_splat_code *splat = &code->splat[i];
             if (splat->count <= t)
                 continue;
             spl_assert(splat->count <= code->planes && splat->atom[t] >> plane->index_bits == 0 &&
                        splat->weight[t] >= -half && splat->weight[t] < half);
-            put(words, &at, plane->index_bits, splat->atom[t]);
-            put(words, &at, plane->weight_bits, (uint32_t)splat->weight[t]);
+            spl_bits_put(&w, splat->atom[t], plane->index_bits);
+            spl_bits_put(&w, spl_bits_part((uint32_t)splat->weight[t], 0, plane->weight_bits), plane->weight_bits);
         }
     }
-    return (at + 31) / 32;
+    spl_bits_pad(&w);
+    return w.used;
 }
 
 /* Splats that have a plane, of the mask of `length` bits at bit `at`. */
@@ -88,8 +66,8 @@ static uint32_t count_mask(const uint32_t *words, uint32_t at, uint32_t length)
 {
     uint32_t count = 0;
     for (uint32_t i = 0; i < length; i += code_bits_max)
-        count +=
-            (uint32_t)__builtin_popcount(get(words, at + i, length - i < code_bits_max ? length - i : code_bits_max));
+        count += (uint32_t)__builtin_popcount(
+            spl_bits_get(words, at + i, length - i < code_bits_max ? length - i : code_bits_max));
     return count;
 }
 
@@ -102,7 +80,7 @@ const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t plan
     for (uint32_t t = 0; t < planes; t++) {
         if (at + SPL_TEXTURE_HEADER_BITS + before > end)
             return "has masks that reach beyond the end of the section";
-        struct spl_code_plane plane = plane_of(get(words, at, SPL_TEXTURE_HEADER_BITS));
+        struct spl_code_plane plane = plane_of(spl_bits_get(words, at, SPL_TEXTURE_HEADER_BITS));
         if (plane.index_bits > 16)
             return "has indices of a width that no texture has";
         at += SPL_TEXTURE_HEADER_BITS;
@@ -116,7 +94,7 @@ const char *spl_texture_judge(const uint32_t *words, size_t count, uint32_t plan
         if (at + (uint64_t)have * width > end)
             return "has codes that reach beyond the end of the section";
         for (uint32_t i = 0; i < have; i++, at += width)
-            if (get(words, at, plane.index_bits) >= atoms)
+            if (spl_bits_get(words, at, plane.index_bits) >= atoms)
                 return "names an atom that the dictionary does not have";
         before = have;
     }
@@ -131,10 +109,10 @@ void spl_texture_decode(const uint32_t *words, uint32_t planes, uint32_t splats,
     code->planes = planes;
     for (uint32_t t = 0; t < planes; t++) {
         struct spl_code_plane *plane = &code->plane[t];
-        *plane = plane_of(get(words, at, SPL_TEXTURE_HEADER_BITS));
+        *plane = plane_of(spl_bits_get(words, at, SPL_TEXTURE_HEADER_BITS));
         at += SPL_TEXTURE_HEADER_BITS;
         for (uint32_t i = 0; i < splats; i++)
-            if (code->splat[i].count == t && get(words, at++, 1))
+            if (code->splat[i].count == t && spl_bits_get(words, at++, 1))
                 code->splat[i].count++;
         at += t ? 0 : SPL_CHUNK_SPLATS - splats;
         for (uint32_t i = 0; i < splats; i++) {
@@ -142,9 +120,9 @@ void spl_texture_decode(const uint32_t *words, uint32_t planes, uint32_t splats,
             if (splat->count <= t)
                 continue;
             uint32_t half = 1u << plane->weight_bits >> 1;
-            splat->atom[t] = (uint16_t)get(words, at, plane->index_bits);
+            splat->atom[t] = (uint16_t)spl_bits_get(words, at, plane->index_bits);
             at += plane->index_bits;
-            splat->weight[t] = (int16_t)((int)(get(words, at, plane->weight_bits) ^ half) - (int)half);
+            splat->weight[t] = (int16_t)((int)(spl_bits_get(words, at, plane->weight_bits) ^ half) - (int)half);
             at += plane->weight_bits;
         }
     }
@@ -154,7 +132,7 @@ void spl_texture_count(const uint32_t *words, uint32_t planes, uint32_t splats, 
 {
     uint32_t at = 0, length = SPL_CHUNK_SPLATS, before = splats;
     for (uint32_t t = 0; t < planes; t++) {
-        struct spl_code_plane plane = plane_of(get(words, at, SPL_TEXTURE_HEADER_BITS));
+        struct spl_code_plane plane = plane_of(spl_bits_get(words, at, SPL_TEXTURE_HEADER_BITS));
         at += SPL_TEXTURE_HEADER_BITS;
         uint32_t have = count_mask(words, at, length);
         at += length + have * (uint32_t)(plane.index_bits + plane.weight_bits);

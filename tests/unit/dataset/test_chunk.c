@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "dataset/bits.h"
 #include "dataset/chunk_clip.h"
 #include "geom/octahedral.h"
 #include "geom/tangent.h"
@@ -431,6 +432,31 @@ static void test_uncertainty_levels(void **state)
     }
 }
 
+/* Fields of every width at every place of a word come back, and a pad begins the next word. */
+static void test_bits(void **state)
+{
+    (void)state;
+    enum { count = 3000 };
+    static uint32_t words[count + 1];
+    uint32_t value[count], width[count], at = 0;
+    struct spl_bit_writer writer = {.words = words};
+    random_state = 5;
+    for (int i = 0; i < count; i++) {
+        width[i] = (uint32_t)(uniform() * 25);
+        value[i] = spl_bits_part((uint32_t)(uniform() * 0x1p32), 3, width[i]);
+        spl_bits_put(&writer, value[i], width[i]);
+        if (i % 100 == 99)
+            spl_bits_pad(&writer);
+    }
+    for (int i = 0; i < count; i++) {
+        assert_int_equal(spl_bits_get(words, at, width[i]), value[i]);
+        at += width[i];
+        if (i % 100 == 99)
+            at = (at + 31) / 32 * 32;
+    }
+    assert_int_equal(writer.used, at / 32);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -446,6 +472,7 @@ int main(void)
         cmocka_unit_test(test_octahedral),
         cmocka_unit_test(test_color_is_lossless),
         cmocka_unit_test(test_uncertainty_levels),
+        cmocka_unit_test(test_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
