@@ -292,6 +292,27 @@ def test_quotas():
         assert "32 tours are still to be made" in begin(d, body(), 503)["detail"]
 
 
+def test_a_tour_has_failed_when_its_last_frame_is_written():
+    preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_SLOW_DISK"]]))
+    with Folder() as folder, Folder() as elsewhere:
+        gate = elsewhere / "gate"
+        gate.touch()  # for the dataset
+        with Daemon(FAKE, "--tours", str(folder), "--tour-disk", "60K", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
+                    SLOW_DISK_NAME="000000.raw") as d:
+            gate.unlink()
+            tour = begin(d, body(6, settings={**SMALL, "format": "raw"}))  # four frames of 12 KiB fit
+            try:
+                eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] == 3)
+                for _ in range(20):  # the fifth frame has been refused by now, or is about to be
+                    now = d.ask(tour["uri"]).json()
+                    assert (now["state"], now["error"], now["frames_done"]) == ("rendering", None, 3), now
+            finally:
+                gate.touch()
+            tour = ended(d, tour["uri"], "failed")
+            assert "61440 bytes" in tour["error"] and tour["frames_done"] == 4, tour
+            assert d.ask(tour["frame"].replace("{n}", "0")).status == 200
+
+
 def test_cancelling_ends_streams_and_removes_files():
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:
         tour = begin(d, body(5000))

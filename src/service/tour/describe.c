@@ -55,7 +55,7 @@ json_t *spl_tour_describe(const struct spl_tour *tour)
     set(json, "dataset", json_string(tour->dataset));
     set(json, "version", json_string(tour->version));
     set(json, "state", json_string(spl_tour_state_names[tour->state]));
-    set(json, "error", tour->failure.code ? json_string(tour->failure.message) : json_null());
+    set(json, "error", tour->state == SPL_TOUR_FAILED ? json_string(tour->failure.message) : json_null());
     set(json, "frames", json_integer((json_int_t)spec->frames));
     set(json, "frames_done", json_integer((json_int_t)tour->frames_done));
     set(json, "progress", json_real((double)tour->frames_done / (double)spec->frames));

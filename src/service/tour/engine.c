@@ -3,8 +3,8 @@
  * Frames go to the pipeline's lane behind people's views, SPL_TOUR_IN_FLIGHT of them at a time, so that a view waits
  * for one tour frame at most; the oldest tour that has frames to be made goes first. A frame that fails for a reason
  * that passes (a lost device, a deadline) is made again; anything else ends the tour and says why: a full disk, a
- * quota, a dataset that is no longer the same. Invariant: spl_tours.bytes is the sum of the tours' bytes. Loop's
- * thread. */
+ * quota, a dataset that is no longer the same. Invariants: spl_tours.bytes is the sum of the tours' bytes; the frames
+ * of a tour that has ended do not change. Loop's thread. */
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,13 +67,20 @@ static void hide_folder(const struct spl_tours *tours, char *message)
     }
 }
 
+/* A tour that has failed ends when its last frame on the way to the disk is there, or not. */
+static void end_if_failed(struct spl_tour *tour)
+{
+    if (tour->failure.code && !tour->writing && !tour->removed && !spl_tour_has_ended(tour))
+        end(tour, SPL_TOUR_FAILED);
+}
+
 void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why)
 {
-    if (spl_tour_has_ended(tour) || tour->removed)
+    if (tour->failure.code || spl_tour_has_ended(tour) || tour->removed)
         return;
     tour->failure = *why;
     hide_folder(tour->tours, tour->failure.message);
-    end(tour, SPL_TOUR_FAILED);
+    end_if_failed(tour);
 }
 
 /* The next step of a tour all of whose frames are done. */
@@ -124,8 +131,9 @@ static void take_job(struct spl_job *job)
     tour->in_flight--;
     if (job->err.code) {
         reopen(tour, job->frame_number, &job->err);
-    } else if (!tour->removed && !spl_tour_has_ended(tour) && !is_over_quota(tour, job->encoded.length)) {
+    } else if (!tour->removed && !tour->failure.code && !is_over_quota(tour, job->encoded.length)) {
         tours->writing++;
+        tour->writing++;
         tours->writing_bytes += job->encoded.length;
         spl_count(&tours->service->counters, tour_frames);
         spl_tour_work_frame(tour, job->frame_number, &job->encoded);
@@ -139,15 +147,17 @@ void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, c
 {
     tour->tours->writing--;
     tour->tours->writing_bytes -= bytes;
+    tour->writing--;
     if (err->code) {
         reopen(tour, frame, err);
-        return;
+    } else {
+        tour->failures = 0;
+        tour->frames[frame] = SPL_FRAME_DONE;
+        tour->frames_done++;
+        account(tour, 0, bytes);
+        changed(tour);
     }
-    tour->failures = 0;
-    tour->frames[frame] = SPL_FRAME_DONE;
-    tour->frames_done++;
-    account(tour, 0, bytes);
-    changed(tour);
+    end_if_failed(tour);
     advance(tour);
 }
 
@@ -226,7 +236,7 @@ void spl_tours_pump(struct spl_tours *tours)
         if (!tour->state_bytes)
             continue; // frames without a tour.json would be nobody's after a crash
         advance(tour);
-        while (tour->state == SPL_TOUR_RENDERING && tour->first_open < tour->spec.frames) {
+        while (tour->state == SPL_TOUR_RENDERING && !tour->failure.code && tour->first_open < tour->spec.frames) {
             if (tours->in_flight == SPL_TOUR_IN_FLIGHT || tours->in_flight + tours->writing >= writing_max)
                 return;
             if (tour->frames[tour->first_open] == SPL_FRAME_OPEN) {

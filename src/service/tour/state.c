@@ -51,7 +51,7 @@ json_t *spl_tour_to_json(const struct spl_tour *tour)
 {
     const struct spl_tour_spec *spec = &tour->spec;
     const struct spl_camera *camera = &spec->view.view.camera;
-    json_t *failure = tour->failure.code
+    json_t *failure = tour->state == SPL_TOUR_FAILED
                           ? json_pack("{s:i, s:s}", "code", tour->failure.code, "message", tour->failure.message)
                           : json_null();
     return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:O}", "format_version",

@@ -32,9 +32,9 @@ struct spl_tour {
     json_t *body;              /* as it was accepted; null once it has ended */
     struct spl_tour_spec spec; /* cameras NULL once it has ended */
     enum spl_tour_state state;
-    struct spl_error failure;
-    unsigned char *frames; /* enum spl_frame_state each */
-    size_t frames_done, first_open, in_flight, failures;
+    struct spl_error failure; /* set before it has ended where frames are still being written */
+    unsigned char *frames;    /* enum spl_frame_state each */
+    size_t frames_done, first_open, in_flight, writing, failures;
     uint64_t bytes, state_bytes;     /* of its files, of tour.json */
     int64_t created_s, ended_s;      /* wall clock; ended 0 = not yet */
     uint64_t ended_ns, age_s;        /* monotonic time and age when it ended, or was taken up as ended */
@@ -87,7 +87,8 @@ void spl_tours_remove(struct spl_tour *tour);
 /* Frees a removed tour once nothing holds it; call after works, in_flight or readers went down. */
 void spl_tour_let_go(struct spl_tour *tour);
 
-void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why); /* ends it, its frames stay */
+/* Ends it, once no frame of it is being written; its frames stay. */
+void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why);
 bool spl_tour_has_ended(const struct spl_tour *tour);
 struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service);
 
