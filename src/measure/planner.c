@@ -21,14 +21,17 @@ static const double learned_most = 6.9; /* ln 1000 */
 enum { first_frames = 6 };
 static const double first_gain = 0.5;
 
-/* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order. */
+/* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order; both as on the
+ * courtyard scene ("Without a profile" in tests/bench/RESULTS.md). */
 enum { all = SPL_TEXTURE_ATOMS };
 static const struct spl_candidate common[] = {
-    {{SPL_METHOD_POINTS, 4, 1, all}, 4, 10, 15, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25, all}, 4, 15, 17, NAN, 0},
-    {{SPL_METHOD_POINTS, 1, 0.25, all}, 4, 20, 20, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25, all}, 5, 30, 21, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 0.25, all}, 5, 42, 22, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 0.5, all}, 6, 72, 23, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 0.5, all}, 8, 90, 24, NAN, 0},   {{SPL_METHOD_SPLAT, 2, 1, all}, 8, 180, 25, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 1, all}, 10, 250, 26, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 2, all}, 20, 900, 27, NAN, 0},
+    {{SPL_METHOD_POINTS, 4, 1, all}, 4, 10, 14.8, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25, all}, 4, 15, 17.2, NAN, 0},
+    {{SPL_METHOD_POINTS, 1, 0.25, all}, 4, 20, 20.2, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25, all}, 5, 30, 21.1, NAN, 0},
+    {{SPL_METHOD_FILL, 1, 0.25, all}, 5, 31, 22.0, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 0.25, all}, 5, 42, 22.1, NAN, 0},
+    {{SPL_METHOD_SPLAT, 2, 0.5, all}, 6, 72, 22.6, NAN, 0},   {{SPL_METHOD_FILL, 1, 0.5, all}, 8, 60, 23.36, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 0.5, all}, 8, 90, 23.42, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 1, all}, 8, 180, 23.6, NAN, 0},
+    {{SPL_METHOD_FILL, 1, 1, all}, 8, 140, 23.7, NAN, 0},     {{SPL_METHOD_SPLAT, 1, 1, all}, 10, 250, 24.4, NAN, 0},
+    {{SPL_METHOD_SPLAT, 1, 2, all}, 20, 900, 25.1, NAN, 0},
 };
 enum { common_count = sizeof common / sizeof *common };
 
@@ -99,10 +102,9 @@ static struct spl_setting get_setting(const struct spl_planner *planner, const s
     return out;
 }
 
-static bool matches(const struct spl_planner *planner, const struct spl_setting *setting,
-                    const struct spl_demand *demand)
+static bool matches(const struct spl_setting *setting, const struct spl_demand *demand)
 {
-    struct spl_setting kept = get_setting(planner, &demand->kept);
+    struct spl_setting kept = demand->kept;
     kept.method = demand->keep_method ? kept.method : setting->method;
     kept.lod = demand->keep_lod ? kept.lod : setting->lod;
     kept.supersample = demand->keep_supersample ? kept.supersample : setting->supersample;
@@ -110,12 +112,29 @@ static bool matches(const struct spl_planner *planner, const struct spl_setting 
     return spl_setting_equal(setting, &kept);
 }
 
-/* Is the accuracy that was measured another setting's, one of all atoms? */
-static bool is_unmeasured(const struct spl_planner *planner, const struct spl_setting *setting,
-                          const struct spl_demand *demand)
+/* The demand with atoms that were measured: the next more than those kept, else the most; so its time is no promise
+ * too much. The same where no method with textures matches. */
+static struct spl_demand get_measured(const struct spl_planner *planner, const struct spl_demand *demand)
 {
-    return !planner->atoms && demand->keep_atoms && demand->kept.atoms < SPL_TEXTURE_ATOMS &&
-           spl_method_has_textures(setting->method);
+    struct spl_demand out = *demand, any = *demand;
+    bool found = false;
+    any.keep_atoms = false;
+    for (size_t i = 0; demand->keep_atoms && i < planner->count; i++) {
+        const struct spl_setting *s = &planner->candidates[i].setting;
+        if (!spl_method_has_textures(s->method) || !matches(s, &any))
+            continue;
+        bool enough = s->atoms >= demand->kept.atoms, had = found && out.kept.atoms >= demand->kept.atoms;
+        if (!found || (enough && (!had || s->atoms < out.kept.atoms)) || (!enough && !had && s->atoms > out.kept.atoms))
+            out.kept.atoms = s->atoms;
+        found = true;
+    }
+    return out;
+}
+
+/* Is the accuracy that was measured that of other atoms than are asked for? */
+static bool is_unmeasured(const struct spl_setting *setting, const struct spl_demand *demand)
+{
+    return demand->keep_atoms && demand->kept.atoms != setting->atoms && spl_method_has_textures(setting->method);
 }
 
 static double rank(double psnr)
@@ -132,7 +151,7 @@ struct standing {
 static struct standing assess(const struct spl_planner *planner, size_t index, const struct spl_demand *demand)
 {
     const struct spl_candidate *c = &planner->candidates[index];
-    double bound = is_unmeasured(planner, &c->setting, demand) ? NAN : c->bound;
+    double bound = is_unmeasured(&c->setting, demand) ? NAN : c->bound;
     struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
     s.tail_ms = s.ms * exp(planner->spread);
@@ -163,10 +182,7 @@ static bool better(const struct spl_demand *demand, const struct spl_candidate *
 
 static int refuse(const struct spl_demand *demand, struct spl_error *err)
 {
-    const char *field = demand->keep_lod           ? "lod"
-                        : demand->keep_supersample ? "supersample"
-                        : demand->keep_atoms       ? "atoms"
-                                                   : "method";
+    const char *field = demand->keep_lod ? "lod" : demand->keep_supersample ? "supersample" : "method";
     return spl_fail_field(err, SPL_E_INPUT, field,
                           "no measured setting has the %s asked for; leave it out, or ask without budget and psnr",
                           field);
@@ -177,9 +193,10 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
 {
     struct standing best = {0};
     const struct spl_candidate *chosen = NULL;
+    struct spl_demand measured = get_measured(planner, demand);
     for (size_t i = 0; i < planner->count; i++) {
         const struct spl_candidate *c = &planner->candidates[i];
-        if (!matches(planner, &c->setting, demand))
+        if (!matches(&c->setting, &measured))
             continue;
         struct standing s = assess(planner, i, demand);
         if (chosen && !better(demand, c, &s, chosen, &best))
@@ -192,7 +209,7 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
     *choice = (struct spl_choice){.setting = chosen->setting,
                                   .index = (size_t)(chosen - planner->candidates),
                                   .ms = best.ms,
-                                  .psnr = is_unmeasured(planner, &chosen->setting, demand) ? NAN : chosen->bound,
+                                  .psnr = is_unmeasured(&chosen->setting, demand) ? NAN : chosen->bound,
                                   .meets = best.in_time && best.accurate};
     if (demand->keep_atoms)
         choice->setting.atoms = demand->kept.atoms;

@@ -3,8 +3,9 @@
  * A setting's time is estimated as
  *     ms = (fixed_ms + ms_per_mpx · megapixels) · exp(shared + setting + layer)
  * where the three terms are learned from measured frames: how this machine is now, how this setting differs from its
- * model, how a layer other than colour does. `spread` follows the 97 % quantile of what remains, ln(measured / estimate),
- * so that the tail, not the mean, is held against the budget. No clock, no I/O; a planner belongs to one thread. */
+ * model, how a layer other than colour does. `spread` follows the 97 % quantile of what remains, ln(measured /
+ * estimate), so that the tail, not the mean, is held against the budget. No clock, no I/O; a planner belongs to one
+ * thread. */
 #ifndef SPL_MEASURE_PLANNER_H
 #define SPL_MEASURE_PLANNER_H
 
@@ -14,9 +15,9 @@
 #define SPL_BUDGET_TOLERANCE 1.2
 
 struct spl_demand {
-    double budget_ms;  /* > 0; NAN: any time */
-    double psnr;       /* dB; NAN: any accuracy */
-    double extra_ms;   /* >= 0: what the budget must hold beside the frame, the encoding */
+    double budget_ms; /* > 0; NAN: any time */
+    double psnr;      /* dB; NAN: any accuracy */
+    double extra_ms;  /* >= 0: what the budget must hold beside the frame, the encoding */
     uint32_t width, height;
     enum spl_layer layer;
     bool keep_method, keep_lod, keep_supersample, keep_atoms; /* only settings that equal `kept` in these */
@@ -25,10 +26,10 @@ struct spl_demand {
 
 struct spl_choice {
     struct spl_setting setting;
-    size_t index;      /* of the planner's setting; for learn() */
-    double ms;         /* expected time of the frame, without extra_ms */
-    double psnr;       /* dB that 19 of 20 views reach, see spl_profile_psnr_bound(); NAN without a profile */
-    bool meets;        /* whether the demand can be met; else this is the best there is */
+    size_t index; /* of the planner's setting; for learn() */
+    double ms;    /* expected time of the frame, without extra_ms */
+    double psnr;  /* dB that 19 of 20 views reach, see spl_profile_psnr_bound(); NAN without a profile */
+    bool meets;   /* whether the demand can be met; else this is the best there is */
 };
 
 struct spl_planner {
@@ -37,15 +38,15 @@ struct spl_planner {
         double fixed_ms, ms_per_mpx;
         double psnr, bound; /* mean and lower bound, dB; the mean without a profile is a rank, the bound NAN */
         double learned;     /* ln of this setting's own factor */
-    } *candidates;
+    } * candidates;
     size_t count;
     bool atoms; /* candidates differ in them; else every number of atoms is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
-    uint64_t frames;    /* learned from */
+    uint64_t frames;                               /* learned from */
 };
 
-/* The PSNR that a further view reaches with 95 % probability: the one-sided prediction bound mean − t · sd · √(1 + 1/n) of n
- * views whose PSNR is normally distributed. The 5 % quantile where the deviation is unknown; NAN where PSNR is. */
+/* The PSNR that a further view reaches with 95 % probability: the one-sided prediction bound mean − t · sd · √(1 + 1/n)
+ * of n views whose PSNR is normally distributed. The 5 % quantile where the deviation is unknown; NAN where PSNR is. */
 double spl_profile_psnr_bound(const struct spl_profile *profile, const struct spl_profile_point *point);
 
 /* Takes what it needs from `profile`. NULL: a conservative table of common settings whose times are those of a slow
@@ -59,8 +60,9 @@ void spl_planner_finish(struct spl_planner *planner);
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
  * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
- * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has; atoms that
- * nobody measured are kept instead, and nothing is promised of their accuracy. */
+ * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has. Atoms that
+ * nobody measured are kept: they are drawn in place of the next more, or the most, that were measured, whose time they
+ * are taken to need, and nothing is promised of their accuracy; methods without textures have any number of them. */
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
                        struct spl_error *err);
 

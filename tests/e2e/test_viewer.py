@@ -316,14 +316,14 @@ def test_the_address_restores_the_picture():
 
 
 def test_a_phone():
-    with page(size=(390, 780), phone=True) as tab:
+    with page(f"{SITE}/{FACING}&method=fill", size=(390, 780), phone=True) as tab:
         start, (x, y) = link(tab), middle(tab)
         assert tab.run(
             "[document.documentElement, document.querySelector('#panel')].every(e => e.scrollWidth <= innerWidth)"
         )
         assert tab.run("document.querySelector('#stage').clientHeight") > 400, "the picture comes first"
         small = tab.run(
-            "[...document.querySelectorAll('button, select')]"
+            "[...document.querySelectorAll('button, select, input[type=number]')]"
             ".filter(e => e.offsetHeight && e.offsetHeight < 40).map(e => e.id)"
         )
         assert not small, f"too small for a finger: {small}"

@@ -88,6 +88,7 @@ def test_without_a_profile_the_choice_is_cautious():
         assert d.ask("/v1/datasets/wall").json()["profile"] is None
         setting, reply = ask(d, budget="10ms")
         assert setting[0] == "points" and "psnr" not in reply.headers["Splatd-Promised"]
+        assert ask(d, budget="10ms", method="fill")[0][0] == "fill"
         setting, reply = ask(d, psnr=20)
         assert setting == ("splat", 1, 2) and reply.headers["Splatd-Demand"] == "best-effort"
 
@@ -136,19 +137,21 @@ def test_atoms_are_chosen_where_there_are_textures():
     with serving(document, source=TEXTURED) as (d, _):
         textures = d.ask("/v1/datasets/wall").json()["textures"]
         assert textures == {"size": 8, "atoms": 16, "methods": ["splat"]}, textures
-        for params, wanted in [({"psnr": 31.5}, "2"), ({"psnr": 32.5}, "8"), ({"psnr": 28.5, "lod": 1}, "0"),
-                               ({"psnr": 20, "atoms": 2}, "8"), ({"psnr": 25, "atoms": 2}, "2"),
-                               ({"psnr": 29, "lod": 2}, "8")]:
+        for params, *wanted in [({"psnr": 31.5}, "splat", "2"), ({"psnr": 32.5}, "splat", "8"),
+                                ({"psnr": 28.5, "lod": 1}, "splat", "0"), ({"psnr": 20, "atoms": 2}, "points", "2"),
+                                ({"psnr": 25, "atoms": 2}, "splat", "2"), ({"psnr": 29, "lod": 2}, "splat", "8")]:
             _, reply = ask(d, **params)
             chosen = fields(reply.headers["Splatd-Chosen"])
-            if chosen["method"] == "splat":
-                assert chosen["atoms"] == wanted, (params, chosen)
+            assert [chosen["method"], chosen["atoms"]] == wanted, (params, chosen)
             assert reply.headers["Splatd-Demand"] == "met", (params, chosen)
         assert [p["atoms"] for p in d.ask(PROFILE).json()["points"]] == [0, 8, 0, 2, 8, 8]
         chart = d.ask(PROFILE + "?format=svg").body.decode()
         assert "splat atoms=2" in chart and chart.count("<polyline") == 4, chart
-        reply = d.view(budget="1s", atoms=3, method="splat")
-        assert reply.status == 400 and reply.json()["field"] == "atoms", reply.body
+        setting, reply = ask(d, budget="1s", atoms=3)  # which nobody measured: not points in their place
+        assert setting[0] == "splat" and fields(reply.headers["Splatd-Chosen"])["atoms"] == "3", setting
+        assert "psnr" not in reply.headers["Splatd-Promised"]
+        reply = d.view(budget="1s", atoms=2, lod=3)
+        assert reply.status == 400 and reply.json()["field"] == "lod", reply.status
     for p in document["points"]:
         del p["atoms"]  # as they were before textures: all of them
     document["points"] = [document["points"][i] for i in (1, 4, 5)]

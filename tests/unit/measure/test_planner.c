@@ -205,6 +205,26 @@ static void test_without_a_profile_nothing_is_promised(void **state)
     struct spl_demand wanted = demand(20, NAN);
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
     assert_true(choice.setting.method == SPL_METHOD_POINTS && isnan(choice.psnr));
+    static const struct {
+        double budget_ms;
+        enum spl_method method;
+        double supersample;
+    } more[] = {{60, SPL_METHOD_FILL, 0.25},
+                {110, SPL_METHOD_FILL, 0.5},
+                {230, SPL_METHOD_FILL, 1},
+                {400, SPL_METHOD_SPLAT, 1}}; // fill lies between points and splat
+    for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
+        wanted = demand(more[i].budget_ms, NAN);
+        assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+        assert_true(choice.setting.method == more[i].method && choice.setting.supersample == more[i].supersample);
+    }
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) { // each can be kept
+        wanted = demand(60, NAN);
+        wanted.keep_method = true;
+        wanted.kept.method = (enum spl_method)method;
+        assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+        assert_true((int)choice.setting.method == method && choice.meets);
+    }
     wanted = demand(NAN, 20);
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
     assert_true(choice.setting.method == SPL_METHOD_SPLAT && choice.setting.lod == 1 &&
@@ -249,13 +269,30 @@ static void test_atoms_are_chosen_and_kept(void **state)
     wanted.kept.atoms = 2;
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
     assert_int_equal(choice.index, 2);
-    wanted.kept.atoms = 5; // points alone are what they were measured as
+    assert_true(choice.psnr == settings[2].psnr);
+    wanted.kept.atoms = 5; // not points in their place: the next more, of unknown accuracy
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
-    assert_int_equal(choice.index, 4);
-    wanted.keep_method = true;
-    wanted.kept.method = SPL_METHOD_SPLAT;
+    assert_true(choice.index == 3 && choice.setting.atoms == 5 && isnan(choice.psnr) && choice.meets);
+    wanted.kept.atoms = 0;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 1 && choice.setting.atoms == 0 && choice.psnr == settings[1].psnr); // measured
+    wanted.budget_ms = 15; // too little for any texture
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 0 && choice.psnr == settings[0].psnr && choice.meets);
+    wanted = demand(NAN, 30); // of 5 atoms nothing is known, so they cannot be said to reach it
+    wanted.keep_method = wanted.keep_atoms = wanted.keep_lod = true;
+    wanted.kept = (struct spl_setting){SPL_METHOD_SPLAT, 1, 1, 5};
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 3 && !choice.meets);
+    wanted.kept.lod = 4; // measured with all atoms: the most there is
+    profile.points[1].setting.atoms = 3;
+    spl_planner_finish(&planner);
+    assert_int_equal(spl_planner_init(&planner, &profile, NULL, &err), 0);
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 1 && choice.setting.atoms == 5);
+    wanted.kept.lod = 3;
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, &err), SPL_E_INPUT);
-    assert_string_equal(err.field, "atoms");
+    assert_string_equal(err.field, "lod");
     spl_planner_finish(&planner);
     spl_profile_finish(&profile);
 }
