@@ -119,8 +119,14 @@ static int run(const struct arguments *a, struct spl_error *err)
     struct spl_renderer *renderer = NULL;
     struct spl_left_out sums = {0};
     int rc = spl_view_list_load_photographs(&list, a->cameras, &how, err);
-    if (rc || (rc = spl_dataset_open(a->dataset, true, &dataset, err)) ||
-        (rc = spl_renderer_create(&(struct spl_renderer_options){.device = a->device}, &renderer, err)) ||
+    if (rc || (rc = spl_dataset_open(a->dataset, true, &dataset, err)))
+        goto done;
+    if (!spl_dataset_get_info(dataset)->atoms) {
+        rc = spl_fail(err, SPL_E_INPUT, "%s has no textures whose gain could be measured: pack it with --cameras",
+                      a->dataset);
+        goto done;
+    }
+    if ((rc = spl_renderer_create(&(struct spl_renderer_options){.device = a->device}, &renderer, err)) ||
         (rc = spl_renderer_add(renderer, dataset, err)))
         goto done;
     if (a->folder && mkdir(a->folder, 0777) && errno != EEXIST) {

@@ -185,6 +185,10 @@ with tempfile.TemporaryDirectory() as folder:
                              (("--cameras", "views.json", "--lod", "x"), "--lod")):
         done = subprocess.run([SPLATD, "bench", "--left-out", "wall.spld", *arguments], stderr=subprocess.PIPE, text=True)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
+    run("pack", "wall.xyz", "--points-only", "-o", "bare.spld")
+    done = subprocess.run([SPLATD, "bench", "--left-out", "bare.spld", "--cameras", "views.json"], stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2 and "bare.spld has no textures" in done.stderr, done.stderr
+    os.remove("bare.spld")
 
     # the textures as they were before: coders beside each other, the photograph itself on the splats, a view that was
     # left out and whose photograph is the same plane seen from nearer
