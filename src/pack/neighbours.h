@@ -2,11 +2,11 @@
 #ifndef SPL_PACK_NEIGHBOURS_H
 #define SPL_PACK_NEIGHBOURS_H
 
-#include "pack/points.h"
+#include "pack/boxes.h"
 
 struct spl_neighbours;
 
-enum { SPL_NEAR_LEAF = 16, SPL_NEAR_LEAVES = 64 };
+enum { SPL_NEAR_LEAVES = 64 };
 
 /* What a search found, unsorted, and what the searches for the points beside it in order share: spl_nearest_init() it,
  * then reuse it. */
@@ -20,7 +20,7 @@ struct spl_nearest {
     unsigned leaves;
     bool crowded;
     uint32_t leaf_index[SPL_NEAR_LEAVES];
-    double bound[SPL_NEAR_LEAF];
+    double bound[SPL_BOXES_LEAF];
     double low[3][SPL_NEAR_LEAVES], high[3][SPL_NEAR_LEAVES];
 };
 
