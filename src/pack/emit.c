@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/chunks.h"
+#include "pack/median.h"
 
 enum { batch_nodes = 256 };
 struct encoded { /* one node of the batch; owned by the batch */
@@ -77,12 +78,6 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
     set_color(s, from->color_class);
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The discs as they decode: codes may stand out by a step. */
 static void grow_box(struct spl_node *node, const struct spl_splat *splats, double (*position)[3],
                      const struct spl_chunk *chunk)
@@ -129,8 +124,7 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
     uint32_t sample = count < 1023 ? count : 1023;
     for (uint32_t i = 0; i < sample; i++)
         w->radii[i] = w->radii[(uint64_t)i * count / sample];
-    qsort(w->radii, sample, sizeof *w->radii, compare_floats);
-    header->spacing = w->radii[sample / 2] / SPL_RADIUS_SPACING;
+    header->spacing = spl_median(w->radii, sample) / SPL_RADIUS_SPACING;
 
     spl_chunks_cut(w->items, count);
     out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;

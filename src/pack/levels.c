@@ -14,6 +14,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/median.h"
 
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
  */
@@ -74,19 +75,12 @@ static size_t take_child(const struct spl_points *p, const struct spl_tree_node 
     return child->splat_count;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 static double median_radius(const struct spl_inner_splat *splats, size_t count, float *radii)
 {
     size_t sample = count < 255 ? count : 255;
     for (size_t i = 0; i < sample; i++)
         radii[i] = splats[i * count / sample].radius;
-    qsort(radii, sample, sizeof *radii, compare_floats);
-    return radii[sample / 2];
+    return spl_median(radii, sample);
 }
 
 static uint64_t cell_of(const struct spl_inner_splat *s, double inverse)

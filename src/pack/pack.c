@@ -18,6 +18,7 @@
 #include "base/parallel.h"
 #include "pack/emit.h"
 #include "pack/linear.h"
+#include "pack/median.h"
 #include "pack/texture/pass.h"
 #include "pack/view.h"
 
@@ -66,12 +67,6 @@ static int check_options(struct pack *p, struct spl_error *err)
     return 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
     size_t sample = points->count < 65536 ? points->count : 65536;
@@ -80,8 +75,7 @@ static int median_radius(const struct spl_points *points, double *median, struct
         return SPL_E_NOMEM;
     for (size_t i = 0; i < sample; i++)
         radii[i] = points->radius[i * points->count / sample];
-    qsort(radii, sample, sizeof *radii, compare_floats);
-    *median = radii[sample / 2];
+    *median = spl_median(radii, sample);
     free(radii);
     return 0;
 }

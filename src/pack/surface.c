@@ -5,9 +5,8 @@
  * percent, until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does
  * the result.
  *
- * The radius that a point's own neighbours give (radius.c) still makes blobs of stray points. So none exceeds a small
- * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand
- * points around it (a flock of strays): a smaller multiple where there is no surface. */
+ * What a point's own neighbours give (radius.c) is held against the radii around it (settle.c), more strictly where
+ * there is no surface. */
 #include "pack/points.h"
 
 #include <math.h>
@@ -19,24 +18,16 @@
 #include "pack/clip.h"
 #include "pack/orient.h"
 #include "pack/radius.h"
+#include "pack/settle.h"
 
 enum { block_points = 1 << 16 };
 static const float lone_radius = 0.01f;             /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
-static const float stray_limit = 2.5f;              /* times the median radius of the neighbours */
 static const float flat_limit = 4, round_limit = 2; /* times the median radius of the run of points around */
-enum { run_points = 4096, run_sample = 256, wide_factor = 3 };
-
-struct deferred { /* a point with a neighbour in another block */
-    uint32_t point;
-    float limit; /* of its radius */
-    float radius, uncertainty;
-};
+enum { wide_factor = 3 };
 
 struct block {
-    struct deferred *deferred;
-    uint32_t *neighbours; /* k a deferred point */
-    size_t deferred_count;
+    struct spl_unsettled unsettled;
     struct spl_component *components;
     uint32_t component_count, first_component;
 };
@@ -87,100 +78,6 @@ static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, 
     return known;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
-/* Multiplies limit[] by the median radius of the run that each point belongs to. */
-static void limit_runs(const struct spl_points *p, size_t begin, size_t end, float *limit)
-{
-    for (size_t run = begin; run < end; run += run_points) {
-        size_t n = end - run < run_points ? end - run : run_points, sample = n < run_sample ? n : run_sample;
-        float radii[run_sample];
-        for (size_t i = 0; i < sample; i++)
-            radii[i] = p->radius[run + i * n / sample];
-        qsort(radii, sample, sizeof *radii, compare_floats);
-        for (size_t i = run; i < run + n; i++)
-            limit[i - begin] *= radii[sample / 2];
-    }
-}
-
-/* Radius and uncertainty of point i once the normals around it agree in sign. */
-static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float limit,
-                   float *radius, float *uncertainty)
-{
-    float around[SPL_NEIGHBOURS_MAX];
-    unsigned n = 0;
-    double sum = 0;
-    const float *a = p->normal[i];
-    for (; n < k && neighbours[n] != UINT32_MAX; n++) {
-        const float *b = p->normal[neighbours[n]];
-        float r = p->radius[neighbours[n]], bend = 2 - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-        sum += bend * bend;
-        unsigned at = n;
-        for (; at > 0 && around[at - 1] > r; at--)
-            around[at] = around[at - 1];
-        around[at] = r;
-    }
-    *radius = fminf(p->radius[i], fminf(limit, stray_limit * around[n / 2]));
-    *uncertainty = (float)(*radius * sum / n);
-}
-
-static bool keep_deferred(struct surface *s, struct block *block, size_t begin, size_t end, const struct scratch *w)
-{
-    unsigned k = s->k;
-    const uint32_t *neighbours = w->neighbours;
-    size_t count = 0, at = 0;
-    for (int store = 0; store < 2; store++) {
-        for (size_t i = 0; i < end - begin; i++) {
-            const uint32_t *list = neighbours + i * k;
-            bool outside = false;
-            for (unsigned a = 0; a < k && list[a] != UINT32_MAX; a++)
-                outside |= list[a] < begin || list[a] >= end;
-            if (!outside)
-                continue;
-            if (store) {
-                block->deferred[at].point = (uint32_t)(begin + i);
-                block->deferred[at].limit = w->limit[i];
-                memcpy(block->neighbours + at++ * k, list, k * sizeof *list);
-            }
-            count += !store;
-        }
-        if (!store) {
-            block->deferred = spl_alloc_raw(count, sizeof *block->deferred, NULL);
-            block->neighbours = spl_alloc_raw(count, k * sizeof *block->neighbours, NULL);
-            block->deferred_count = count;
-            if (!block->deferred || !block->neighbours)
-                return false;
-        }
-    }
-    return true;
-}
-
-/* Settles what lies wholly in the block; raw radii are read until all are settled, so results wait in w->limit. */
-static void settle_inner(struct surface *s, const struct block *block, size_t begin, size_t end, struct scratch *w)
-{
-    struct spl_points *p = s->points;
-    float *limit = w->limit;
-    size_t next = 0;
-    for (size_t i = begin; i < end; i++) {
-        if (next < block->deferred_count && block->deferred[next].point == i) {
-            next++;
-            continue;
-        }
-        settle(p, i, w->neighbours + (i - begin) * s->k, s->k, limit[i - begin], &limit[i - begin], &p->uncertainty[i]);
-    }
-    next = 0;
-    for (size_t i = begin; i < end; i++) {
-        if (next < block->deferred_count && block->deferred[next].point == i)
-            next++;
-        else
-            p->radius[i] = limit[i - begin];
-    }
-}
-
 static bool orient_inner(struct surface *s, struct block *block, struct scratch *w, size_t begin, size_t end)
 {
     struct spl_orient *o = &w->orient;
@@ -225,13 +122,13 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             if (s->edge)
                 s->edge[i] = edge;
         }
-        limit_runs(s->points, begin, end, w->limit);
-        if (!keep_deferred(s, &s->blocks[b], begin, end, w) ||
+        const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, w->limit};
+        if (spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
             atomic_store(&s->failed, true);
             return;
         }
-        settle_inner(s, &s->blocks[b], begin, end, w);
+        spl_settle_block(&settle, &s->blocks[b].unsettled);
     }
 }
 
@@ -241,7 +138,7 @@ static int join_blocks(struct surface *s, struct spl_error *err)
     for (size_t b = 0; b < s->block_count; b++) {
         s->blocks[b].first_component = (uint32_t)components;
         components += s->blocks[b].component_count;
-        edges += s->blocks[b].deferred_count * s->k;
+        edges += s->blocks[b].unsettled.count * s->k;
     }
     struct spl_orient_edge *edge = spl_alloc_raw(edges, sizeof *edge, err);
     s->components = spl_alloc_raw(components, sizeof *s->components, err);
@@ -250,9 +147,9 @@ static int join_blocks(struct surface *s, struct spl_error *err)
         struct block *block = &s->blocks[b];
         memcpy(s->components + block->first_component, block->components,
                block->component_count * sizeof *block->components);
-        for (size_t d = 0; d < block->deferred_count; d++) {
-            uint32_t i = block->deferred[d].point;
-            const uint32_t *list = block->neighbours + d * s->k;
+        for (size_t d = 0; d < block->unsettled.count; d++) {
+            uint32_t i = block->unsettled.points[d].index;
+            const uint32_t *list = block->unsettled.neighbours + d * s->k;
             for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
                 if (list[a] / block_points != b)
                     edge[count++] =
@@ -277,16 +174,12 @@ static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
                 s->points->normal[i][c] = -s->points->normal[i][c];
 }
 
-static void settle_deferred(void *context, size_t begin, size_t end, unsigned worker)
+static void settle_rest(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct surface *s = context;
     (void)worker;
     for (size_t b = begin; b < end; b++)
-        for (size_t d = 0; d < s->blocks[b].deferred_count; d++) {
-            struct deferred *deferred = &s->blocks[b].deferred[d];
-            settle(s->points, deferred->point, s->blocks[b].neighbours + d * s->k, s->k, deferred->limit,
-                   &deferred->radius, &deferred->uncertainty);
-        }
+        spl_settle_find(s->points, s->k, &s->blocks[b].unsettled);
 }
 
 static bool all_sides_known(const struct spl_points *p)
@@ -334,8 +227,7 @@ static int allocate(struct surface *s, struct spl_error *err)
 static void finish(struct surface *s)
 {
     for (size_t b = 0; s->blocks && b < s->block_count; b++) {
-        free(s->blocks[b].deferred);
-        free(s->blocks[b].neighbours);
+        spl_unsettled_finish(&s->blocks[b].unsettled);
         free(s->blocks[b].components);
     }
     for (unsigned t = 0; s->scratch && t < s->stage->threads; t++) {
@@ -386,12 +278,9 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
             goto done;
         spl_parallel_for(stage->threads, points->count, block_points, flip_block, &s);
     }
-    spl_parallel_for(stage->threads, s.block_count, 1, settle_deferred, &s);
+    spl_parallel_for(stage->threads, s.block_count, 1, settle_rest, &s);
     for (size_t b = 0; b < s.block_count; b++)
-        for (size_t d = 0; d < s.blocks[b].deferred_count; d++) {
-            points->radius[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].radius;
-            points->uncertainty[s.blocks[b].deferred[d].point] = s.blocks[b].deferred[d].uncertainty;
-        }
+        spl_settle_store(points, &s.blocks[b].unsettled);
     spl_stage_finish(stage);
     if (s.edge)
         rc = spl_clip_lines(points, s.neighbours, s.wide, s.edge, stage, err);

@@ -1,0 +1,122 @@
+/* The radius that a point's own neighbours give (radius.c) makes blobs of stray points. So none exceeds a small
+ * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand
+ * points around it (a flock of strays). Radii are read as they were estimated until all of a block, and of those that
+ * wait, are settled, so that no result depends on the order. */
+#include "pack/settle.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "pack/median.h"
+
+enum { run_points = 4096, run_sample = 256 };
+static const float stray_limit = 2.5f; /* times the median radius of the neighbours */
+
+/* Multiplies limit[] by the median radius of the run that each point belongs to. */
+static void limit_runs(const struct spl_settle_block *block)
+{
+    const float *radius = block->points->radius;
+    for (size_t run = block->begin; run < block->end; run += run_points) {
+        size_t n = block->end - run < run_points ? block->end - run : run_points;
+        size_t sample = n < run_sample ? n : run_sample;
+        float radii[run_sample];
+        for (size_t i = 0; i < sample; i++)
+            radii[i] = radius[run + i * n / sample];
+        float median = spl_median(radii, sample);
+        for (size_t i = run; i < run + n; i++)
+            block->limit[i - block->begin] *= median;
+    }
+}
+
+static bool waits(const struct spl_settle_block *block, const uint32_t *list)
+{
+    bool outside = false;
+    for (unsigned a = 0; a < block->k && list[a] != UINT32_MAX; a++)
+        outside |= list[a] < block->begin || list[a] >= block->end;
+    return outside;
+}
+
+int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_block *block)
+{
+    size_t points = block->end - block->begin, k = block->k, count = 0;
+    limit_runs(block);
+    for (size_t i = 0; i < points; i++)
+        count += waits(block, block->neighbours + i * k);
+    unsettled->points = spl_alloc_raw(count, sizeof *unsettled->points, NULL);
+    unsettled->neighbours = spl_alloc_raw(count, k * sizeof *unsettled->neighbours, NULL);
+    if (!unsettled->points || !unsettled->neighbours)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < points; i++) {
+        const uint32_t *list = block->neighbours + i * k;
+        if (!waits(block, list))
+            continue;
+        unsettled->points[unsettled->count].index = (uint32_t)(block->begin + i);
+        unsettled->points[unsettled->count].limit = block->limit[i];
+        memcpy(unsettled->neighbours + unsettled->count++ * k, list, k * sizeof *list);
+    }
+    return SPL_OK;
+}
+
+void spl_unsettled_finish(struct spl_unsettled *unsettled)
+{
+    free(unsettled->points);
+    free(unsettled->neighbours);
+    *unsettled = (struct spl_unsettled){0};
+}
+
+/* Radius and uncertainty of point i once the normals around it agree in sign. */
+static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float limit,
+                   float *radius, float *uncertainty)
+{
+    float around[SPL_NEIGHBOURS_MAX];
+    unsigned n = 0;
+    double sum = 0;
+    const float *a = p->normal[i];
+    for (; n < k && neighbours[n] != UINT32_MAX; n++) {
+        const float *b = p->normal[neighbours[n]];
+        float r = p->radius[neighbours[n]], bend = 2 - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+        sum += bend * bend;
+        unsigned at = n;
+        for (; at > 0 && around[at - 1] > r; at--)
+            around[at] = around[at - 1];
+        around[at] = r;
+    }
+    *radius = fminf(p->radius[i], fminf(limit, stray_limit * around[n / 2]));
+    *uncertainty = (float)(*radius * sum / n);
+}
+
+void spl_settle_block(const struct spl_settle_block *block, const struct spl_unsettled *unsettled)
+{
+    struct spl_points *p = block->points;
+    float *radius = block->limit; /* the settled one takes its limit's place */
+    size_t next = 0;
+    for (size_t i = block->begin; i < block->end; i++) {
+        size_t at = i - block->begin;
+        if (next < unsettled->count && unsettled->points[next].index == i) {
+            radius[at] = p->radius[i];
+            next++;
+        } else {
+            settle(p, i, block->neighbours + at * block->k, block->k, radius[at], &radius[at], &p->uncertainty[i]);
+        }
+    }
+    memcpy(p->radius + block->begin, radius, (block->end - block->begin) * sizeof *radius);
+}
+
+void spl_settle_find(const struct spl_points *points, unsigned k, struct spl_unsettled *unsettled)
+{
+    for (size_t i = 0; i < unsettled->count; i++) {
+        struct spl_unsettled_point *point = &unsettled->points[i];
+        settle(points, point->index, unsettled->neighbours + i * k, k, point->limit, &point->radius,
+               &point->uncertainty);
+    }
+}
+
+void spl_settle_store(struct spl_points *points, const struct spl_unsettled *unsettled)
+{
+    for (size_t i = 0; i < unsettled->count; i++) {
+        points->radius[unsettled->points[i].index] = unsettled->points[i].radius;
+        points->uncertainty[unsettled->points[i].index] = unsettled->points[i].uncertainty;
+    }
+}

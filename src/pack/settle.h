@@ -1,0 +1,38 @@
+/* What points around say of a point's radius, and its uncertainty (soft-transparency paper, eq. 21). */
+#ifndef SPL_PACK_SETTLE_H
+#define SPL_PACK_SETTLE_H
+
+#include "pack/points.h"
+
+/* Points [begin, end) whose radii and normals are estimated; `limit` is scratch of one float a point. */
+struct spl_settle_block {
+    struct spl_points *points;
+    size_t begin, end;
+    const uint32_t *neighbours; /* k a point of the block, unused ones UINT32_MAX */
+    unsigned k;
+    float *limit; /* in: times the median radius of its surroundings, which a point's radius may be */
+};
+
+/* Those that have a neighbour outside their block: they wait until all blocks have radii and signs. */
+struct spl_unsettled {
+    struct spl_unsettled_point {
+        uint32_t index;
+        float limit; /* of its radius */
+        float radius, uncertainty;
+    } * points;
+    uint32_t *neighbours; /* k a point */
+    size_t count;
+};
+
+/* Makes limit[] radii, and lists who waits. SPL_E_NOMEM; finish it in any case. */
+int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_block *block);
+void spl_unsettled_finish(struct spl_unsettled *unsettled);
+
+/* Radii and uncertainties of the others; the signs of their normals agree. limit[] is used up. */
+void spl_settle_block(const struct spl_settle_block *block, const struct spl_unsettled *unsettled);
+
+/* Of those that waited: first all are found, of each block by any thread, then all are stored. */
+void spl_settle_find(const struct spl_points *points, unsigned k, struct spl_unsettled *unsettled);
+void spl_settle_store(struct spl_points *points, const struct spl_unsettled *unsettled);
+
+#endif
