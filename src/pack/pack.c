@@ -20,6 +20,7 @@
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/texture/pass.h"
+#include "pack/texture/photographs.h"
 #include "pack/view.h"
 
 struct pack {

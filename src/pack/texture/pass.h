@@ -6,11 +6,6 @@
 #include "dataset/dataset.h"
 #include "pack/stage.h"
 
-/* Poses and lenses, each held against its photograph's header: what can be refused is refused before anything is
- * packed. Faults of single photographs go to options->refused where it is set. Fills `list` on success. */
-int spl_photos_load(const struct spl_photo_options *options, struct spl_view_list *list,
-                    struct spl_photo_report *report, struct spl_error *err);
-
 /* Writes `output` from `dataset` with the photographs' colours. The renderer is made and used by the calling thread.
  * Blocks; adds to *report. */
 int spl_photos_apply(const struct spl_photo_options *options, const struct spl_view_list *list,
