@@ -1,26 +1,12 @@
 /* The cost of every metric of a 1280x720 pair: process CPU time and wall time, median of runs. Fails above 100 ms of
  * wall time on two threads, measured as CPU time / 2 so that a shared machine does not decide. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <math.h>
-#include <time.h>
 
 #include "measure/metrics.h"
+#include "timing.h"
 
 enum { width = 1280, height = 720, count = width * height, runs = 15, threads = 2 };
-
-static double now_ms(clockid_t clock)
-{
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* A wavy surface under a sky, and the same with noise: every branch is taken by many pixels. */
 static void fill(struct spl_image layers[SPL_LAYER_COUNT], unsigned seed)
@@ -57,14 +43,14 @@ int main(void)
     double cpu[runs], wall[runs];
     struct spl_metrics m;
     for (int i = 0; i < runs; i++) {
-        double c = now_ms(CLOCK_PROCESS_CPUTIME_ID), w = now_ms(CLOCK_MONOTONIC);
+        double c = bench_now_ms(CLOCK_PROCESS_CPUTIME_ID), w = bench_now_ms(CLOCK_MONOTONIC);
         if (spl_metrics_compare(&image, &truth, threads, &m, NULL))
             return 2;
-        cpu[i] = now_ms(CLOCK_PROCESS_CPUTIME_ID) - c;
-        wall[i] = now_ms(CLOCK_MONOTONIC) - w;
+        cpu[i] = bench_now_ms(CLOCK_PROCESS_CPUTIME_ID) - c;
+        wall[i] = bench_now_ms(CLOCK_MONOTONIC) - w;
     }
-    qsort(cpu, runs, sizeof *cpu, ascending);
-    qsort(wall, runs, sizeof *wall, ascending);
+    bench_median(cpu, runs);
+    bench_median(wall, runs);
     printf("all metrics of %dx%d on %d threads: %.1f ms CPU (%.1f to %.1f), %.1f ms wall; psnr %.2f ssim %.4f\n", width,
            height, threads, cpu[runs / 2], cpu[0], cpu[runs - 1], wall[runs / 2], m.psnr, m.ssim);
     for (int i = 0; i < SPL_LAYER_COUNT; i++) {

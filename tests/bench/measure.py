@@ -1,12 +1,13 @@
 """The figures of RESULTS.md, one subcommand each, on the scan of a vault (11.6 M points) that lies beside the checkout.
 
-usage: measure.py frames|scaling|http|pack|size|planner; service.py has those of the service under load
+usage: measure.py frames|scaling|http|pack|size|planner|fill; service.py has those of the service under load
 
 Prints what was measured and, where a figure has a bound, how it stands to it; exit 1 beyond a bound, 77 without the data.
 Frame times are bounded in units of the calibrator that 'splatd bench' runs beside each frame, so a slow or busy machine
 shifts nothing. Datasets are packed once into ~/.cache/splatd-bench and again when splatd is newer than they are.
 
 environment: SPLATD_BINARY, SPLATD_DATA (folder with tls/grenoble.ply or .ply.zst and cameras.json),
+             SPLATD_BENCH_FILL (the program of that figure),
              SPLATD_BENCH_LARGE=1 lets 'scaling' make and pack 100 M points, which takes 10 GB of disk and memory
 """
 import http.client
@@ -79,13 +80,14 @@ def packed(source, name):
     return str(out)
 
 
-def courtyard(points):
-    name = f"courtyard-{points}"
+def scan_of(scene, points):
+    """A simulated scan of one of `splatd synth`'s scenes, packed."""
+    name = f"{scene}-{points}"
     folder = CACHE / name
-    if not (folder / "courtyard.ply").exists():
-        subprocess.run([SPLATD, "synth", "courtyard", "--points", str(points), "--seed", "1", "--format", "ply",
+    if not (folder / f"{scene}.ply").exists():
+        subprocess.run([SPLATD, "synth", scene, "--points", str(points), "--seed", "1", "--format", "ply",
                         "-o", folder], check=True, stdout=subprocess.DEVNULL)
-    return packed(folder / "courtyard.ply", name)
+    return packed(folder / f"{scene}.ply", name)
 
 
 def bench(*arguments):
@@ -133,7 +135,7 @@ def scaling():
                    "splat,points")
     compare_sizes(report, "grenoble-1m", "grenoble", 1.5)
     if os.environ.get("SPLATD_BENCH_LARGE"):
-        report = bench(courtyard(1000000), courtyard(100000000), "--method", "splat,points")
+        report = bench(scan_of("courtyard", 1000000), scan_of("courtyard", 100000000), "--method", "splat,points")
         compare_sizes(report, "courtyard-1000000", "courtyard-100000000", 2)
     else:
         print("100 M points: not measured, set SPLATD_BENCH_LARGE=1")
@@ -265,7 +267,7 @@ def exact(folder, views):
 
 def profiled():
     """The courtyard of 5 M points with a profile of its sample views beside it; and that profile."""
-    dataset = pathlib.Path(courtyard(5000000))
+    dataset = pathlib.Path(scan_of("courtyard", 5000000))
     profile = dataset.with_suffix(".profile.json")
     if not profile.exists() or profile.stat().st_mtime < dataset.stat().st_mtime:
         views = json.loads(subprocess.run([SPLATD, "synth", "courtyard", "--print-views"], check=True,
@@ -362,12 +364,20 @@ def planner():
         daemon.wait(30)
 
 
+def fill():
+    """Table 1 of the screen-space-filling paper: from the bridge, from the cab, close to the ground."""
+    places = ["36.9,4,9.6", "18,2,1.5", "-34,0.97,2.2", "2,0,1.6", "-3,2.1,0.5", "9,1.4,-0.6"]
+    if subprocess.run([os.environ["SPLATD_BENCH_FILL"], scan_of("railway", 300000), *places]).returncode:
+        beyond.append("fill")
+
+
 if __name__ == "__main__":
-    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner}
+    figures = {"frames": frames, "scaling": scaling, "http": serve, "pack": pack, "size": size, "planner": planner,
+               "fill": fill}
     if len(sys.argv) != 2 or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)
-    if sys.argv[1] != "planner":
+    if sys.argv[1] not in ("planner", "fill"):  # which make their own
         scan()
     figures[sys.argv[1]]()
     if beyond:
