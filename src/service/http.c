@@ -1,125 +1,19 @@
 /* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer,
  * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
- * Limits: the connection pool bounds request line, headers and the reply's headers together; the first two have smaller
- * bounds, so that our 414 and 431 answer them. libmicrohttpd writes zeros over the whole pool between requests, so all
- * of it is resident on every idle connection and costs time with every request: it is small. Bodies past body_max are
- * read and dropped up to drain_max, because a client that is cut off while sending seldom reads the reply. Phases of a
- * connection have time limits of their own, which trickling bytes does not extend. A PUT is routed before its body,
- * which change_route.c takes whatever its size. Invariant: a suspended request is in `waiting`, or has a change. Owned
- * by the loop's thread. */
-#include <poll.h>
+ * Bodies past body_max are read and dropped up to drain_max, because a client that is cut off while sending seldom
+ * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size. Invariant: a
+ * suspended request is in `waiting`, or has a change. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
 #include "service/state.h"
 
-enum {
-    connection_memory = 14 * 1024,
-    value_memory = 64,       /* of the pool, for each header, parameter and cookie beside its text */
-    reply_memory = 2 * 1024, /* of the pool, for a reply's headers */
-    parameters_max = 64,
-    drain_max = 8 * body_max,
-    idle_s = 30,
-    slow_sweep_ms = 500,
-};
-
-/* How long a connection may stay in a phase; MHD's own limit (idle_s) is about silence only. */
-static const uint64_t phase_max_ns[] = {
-    [PHASE_IDLE] = 40 * SPL_NS_PER_S,     [PHASE_READING] = 10 * SPL_NS_PER_S, [PHASE_UPLOADING] = 60 * SPL_NS_PER_S,
-    [PHASE_WORKING] = SPL_NEVER, // views have deadlines
-    [PHASE_WRITING] = 120 * SPL_NS_PER_S,
-};
-
-static const uint64_t drain_reading_max_ns = 2 * SPL_NS_PER_S; /* half a request holds up no exit */
-
-static void enter(struct connection *connection, enum phase phase)
-{
-    connection->phase = phase;
-    connection->since_ns = spl_now_ns();
-}
-
-void spl_http_enter_upload(struct request *request, bool client_sends)
-{
-    enter(request->connection, client_sends ? PHASE_UPLOADING : PHASE_WORKING);
-}
-
-static void on_connection(void *context, struct MHD_Connection *handle, void **socket_context,
-                          enum MHD_ConnectionNotificationCode code)
-{
-    struct spl_service *service = context;
-    struct connection *connection = *socket_context;
-    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
-        if (!connection)
-            return;
-        LIST_REMOVE(connection, link);
-        service->connections_open--;
-        free(connection);
-        return;
-    }
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_CONNECTION_FD);
-    if (!info || !(connection = spl_alloc(1, sizeof *connection, NULL)))
-        return; // its requests are refused
-    connection->service = service;
-    connection->fd = info->connect_fd;
-    enter(connection, PHASE_READING);
-    LIST_INSERT_HEAD(&service->connections, connection, link);
-    service->connections_open++;
-    *socket_context = connection;
-}
-
-/* libmicrohttpd 0.9.75 falls silent when the parameters of a query, or a reply's headers, do not fit what is left of
- * its pool, so such a request is answered past it, right on the socket, and the connection ended. `detail` needs no
- * quoting.
- */
-static void refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
-{
-    char text[512], reply[sizeof text + 256];
-    const char *title = MHD_get_reason_phrase_for(status);
-    int length =
-        snprintf(text, sizeof text,
-                 "{\"type\": \"urn:splatd:error:limit\", \"title\": \"%s\", \"status\": %u, \"detail\": \"%s\", "
-                 "\"instance\": \"urn:splatd:request:%s\", \"field\": \"%s\"}",
-                 title, status, detail, request->id, field);
-    length = snprintf(reply, sizeof reply,
-                      "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                      "X-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
-                      status, title, request->id, length, text);
-    request->status = status;
-    request->abandoned = true;
-    if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
-        spl_count(&request->service->counters, replies_4xx);
-    shutdown(request->connection->fd, SHUT_RDWR);
-}
-
-static void refuse_many_parameters(struct request *request, const char *uri)
-{
-    unsigned count = 0;
-    for (; *uri && count <= parameters_max; uri++)
-        count += *uri == '&';
-    if (count > parameters_max)
-        refuse_on_socket(request, MHD_HTTP_URI_TOO_LONG, "url", "the URL has too many parameters");
-}
-
-/* Once the headers are there. Cookies lie in the pool twice. */
-static void refuse_many_headers(struct request *request)
-{
-    struct MHD_Connection *handle = request->handle;
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
-    const char *cookie = MHD_lookup_connection_value(handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_COOKIE);
-    int kinds = MHD_HEADER_KIND | MHD_GET_ARGUMENT_KIND | MHD_COOKIE_KIND;
-    int values = MHD_get_connection_values(handle, (enum MHD_ValueKind)kinds, NULL, NULL);
-    size_t used = (info ? info->header_size : 0) + value_memory * (size_t)values + (cookie ? strlen(cookie) : 0);
-    if (used > connection_memory - reply_memory)
-        refuse_on_socket(request, MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE, "headers",
-                         "URL and headers are larger than 12 KiB together; POST takes long views");
-}
+enum { drain_max = 8 * body_max, idle_s = 30 };
 
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
@@ -148,9 +42,9 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     }
     request->number = spl_count(&service->counters, requests) + 1;
     spl_request_set_id(request, NULL);
-    enter(request->connection, PHASE_READING);
+    spl_connection_enter(request->connection, PHASE_READING);
     service->requests_open++;
-    refuse_many_parameters(request, uri);
+    spl_refuse_many_parameters(request, uri);
     return request;
 }
 
@@ -165,7 +59,7 @@ static void on_completed(void *context, struct MHD_Connection *handle, void **re
     spl_access_log_write(request, code);
     spl_assert(!request->waits);
     spl_change_abandon(request);
-    enter(request->connection, PHASE_IDLE);
+    spl_connection_enter(request->connection, PHASE_IDLE);
     service->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
@@ -202,7 +96,7 @@ static enum MHD_Result send_reply(struct request *request)
     count_reply(request);
     spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
-    enter(request->connection, PHASE_WRITING);
+    spl_connection_enter(request->connection, PHASE_WRITING);
     return MHD_queue_response(request->handle, request->status, request->response);
 }
 
@@ -244,7 +138,7 @@ static bool announces_more(struct request *request, uint64_t most)
 static bool answer_headers(struct request *request)
 {
     if (!strcmp(request->method, MHD_HTTP_METHOD_PUT)) {
-        spl_http_enter_upload(request, true);
+        spl_connection_enter(request->connection, PHASE_UPLOADING);
         spl_route(request, request->method);
         return !request->change && announces_more(request, 0);
     }
@@ -278,7 +172,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         request->started = true;
         snprintf(request->method, sizeof request->method, "%s", method);
         spl_request_set_id(request, MHD_lookup_connection_value(handle, MHD_HEADER_KIND, "X-Request-Id"));
-        refuse_many_headers(request);
+        spl_refuse_many_headers(request);
         if (request->abandoned)
             return MHD_NO;
         return answer_headers(request) ? send_reply(request) : MHD_YES;
@@ -289,10 +183,10 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         return taken ? MHD_YES : MHD_NO;
     }
     if (request->change) {
-        enter(request->connection, PHASE_WORKING);
+        spl_connection_enter(request->connection, PHASE_WORKING);
         spl_change_end(request);
     } else if (!request->response) {
-        enter(request->connection, PHASE_WORKING);
+        spl_connection_enter(request->connection, PHASE_WORKING);
         if (request->body_seen > body_max)
             refuse_body(request);
         else
@@ -325,45 +219,16 @@ void spl_http_pump(struct spl_service *service)
         uv_timer_stop(&service->http_timer);
 }
 
-/* Has the client of an unfinished upload closed its side? libmicrohttpd 0.9.75 waits for an edge of epoll that does not
- * come when the end of the stream arrived with the last data, while the connection was suspended. */
-static bool has_ended_early(const struct connection *connection)
-{
-    struct pollfd socket = {.fd = connection->fd, .events = POLLRDHUP};
-    int unread = 1;
-    return connection->phase == PHASE_UPLOADING && poll(&socket, 1, 0) > 0 &&
-           socket.revents & (POLLRDHUP | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
-}
-
-/* Cuts connections whose phase lasts too long; MHD then sees them closed. */
-static void on_slow_timer(uv_timer_t *timer)
-{
-    struct spl_service *service = timer->data;
-    uint64_t now = spl_now_ns();
-    struct connection *connection;
-    LIST_FOREACH(connection, &service->connections, link)
-    {
-        bool hurry = service->draining && connection->phase == PHASE_READING;
-        if (has_ended_early(connection))
-            shutdown(connection->fd, SHUT_RDWR);
-        if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
-            continue;
-        spl_count(&service->counters, slow_closed);
-        shutdown(connection->fd, SHUT_RDWR);
-        connection->since_ns = now;
-    }
-}
-
 int spl_http_start(struct spl_service *service, struct spl_error *err)
 {
-    service->daemon =
-        MHD_start_daemon(MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service,
-                         MHD_OPTION_LISTEN_SOCKET, service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service,
-                         MHD_OPTION_NOTIFY_COMPLETED, on_completed, service, MHD_OPTION_NOTIFY_CONNECTION,
-                         on_connection, service, MHD_OPTION_CONNECTION_LIMIT, (unsigned)service->options->connections,
-                         MHD_OPTION_PER_IP_CONNECTION_LIMIT, (unsigned)service->options->connections_per_address,
-                         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                         (size_t)connection_memory, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    service->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET,
+        service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
+        service, MHD_OPTION_NOTIFY_CONNECTION, spl_connection_notify, service, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)service->options->connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+        (unsigned)service->options->connections_per_address, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)connection_pool, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1,
+        MHD_OPTION_END);
     if (!service->daemon)
         return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start");
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->daemon, MHD_DAEMON_INFO_EPOLL_FD);
@@ -376,7 +241,7 @@ int spl_http_start(struct spl_service *service, struct spl_error *err)
     }
     service->http_poll.data = service;
     uv_poll_start(&service->http_poll, UV_READABLE, on_poll);
-    uv_timer_start(&service->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);
+    spl_connections_watch(service);
     spl_http_pump(service);
     return 0;
 }

@@ -18,13 +18,14 @@
 enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
+    connection_pool = 14 * 1024, /* libmicrohttpd's pool; see oversize.c */
     reply_bytes_max = 1 << 30, /* in all; beyond, views are refused until clients have read theirs */
 };
 
 enum phase {
     PHASE_IDLE,      /* between a reply and the next request's first line */
     PHASE_READING,   /* from accept, or a first line, to the end of the request */
-    PHASE_UPLOADING, /* a dataset's body, from one MiB to the next */
+    PHASE_UPLOADING, /* a dataset's body, from one MiB that is stored to the next that is there */
     PHASE_WORKING,
     PHASE_WRITING,
 };
@@ -142,9 +143,18 @@ struct spl_service {
 int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
-/* The time begins for a dataset's client to send the next MiB, or for us to store it. */
-void spl_http_enter_upload(struct request *request, bool client_sends);
 void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
+
+/* connections.c: every connection, and how long its phases may take. */
+void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
+                           enum MHD_ConnectionNotificationCode code);
+void spl_connection_enter(struct connection *connection, enum phase phase); /* its time begins */
+void spl_connections_watch(struct spl_service *service);                    /* from now on the slow ones are closed */
+
+/* oversize.c: requests that libmicrohttpd would not answer are `abandoned`, answered past it. The first looks at the
+ * target, still encoded; the second is for when the headers are there. */
+void spl_refuse_many_parameters(struct request *request, const char *uri);
+void spl_refuse_many_headers(struct request *request);
 
 /* flights.c: views on their way. Boards the flight of an equal request or launches one; SPL_E_BUSY when the queue is
  * full. The caller has set ticket->deadline_ns, route and done, and keeps the ticket where it is until then or until it

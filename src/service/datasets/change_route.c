@@ -48,7 +48,7 @@ static void resume(struct change *change)
     if (!change->suspended)
         return;
     change->suspended = false;
-    spl_http_enter_upload(change->request, true);
+    spl_connection_enter(change->request->connection, PHASE_UPLOADING);
     MHD_resume_connection(change->request->handle);
 }
 
@@ -168,7 +168,7 @@ static void step(struct change *change)
     }
     change->working = change->suspended = true;
     service->library.tasks++;
-    spl_http_enter_upload(change->request, false);
+    spl_connection_enter(change->request->connection, PHASE_WORKING);
     MHD_suspend_connection(change->request->handle);
 }
 

@@ -1,0 +1,86 @@
+/* Connections and how long they may take. Each phase has a time limit of its own, which trickling bytes does not
+ * extend: libmicrohttpd's own limit is about silence only. A connection that is too slow is shut down here, and
+ * libmicrohttpd then sees it closed. Owned by the loop's thread. */
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/state.h"
+
+enum { slow_sweep_ms = 500 };
+
+/* How long a connection may stay in a phase. */
+static const uint64_t phase_max_ns[] = {
+    [PHASE_IDLE] = 40 * SPL_NS_PER_S,     [PHASE_READING] = 10 * SPL_NS_PER_S, [PHASE_UPLOADING] = 60 * SPL_NS_PER_S,
+    [PHASE_WORKING] = SPL_NEVER, // views have deadlines
+    [PHASE_WRITING] = 120 * SPL_NS_PER_S,
+};
+
+static const uint64_t drain_reading_max_ns = 2 * SPL_NS_PER_S; /* half a request holds up no exit */
+
+void spl_connection_enter(struct connection *connection, enum phase phase)
+{
+    connection->phase = phase;
+    connection->since_ns = spl_now_ns();
+}
+
+void spl_connection_notify(void *context, struct MHD_Connection *handle, void **socket_context,
+                           enum MHD_ConnectionNotificationCode code)
+{
+    struct spl_service *service = context;
+    struct connection *connection = *socket_context;
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+        if (!connection)
+            return;
+        LIST_REMOVE(connection, link);
+        service->connections_open--;
+        free(connection);
+        return;
+    }
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (!info || !(connection = spl_alloc(1, sizeof *connection, NULL)))
+        return; // its requests are refused
+    connection->service = service;
+    connection->fd = info->connect_fd;
+    spl_connection_enter(connection, PHASE_READING);
+    LIST_INSERT_HEAD(&service->connections, connection, link);
+    service->connections_open++;
+    *socket_context = connection;
+}
+
+/* Has the client of an unfinished upload closed its side? libmicrohttpd 0.9.75 waits for an edge of epoll that does not
+ * come when the end of the stream arrived with the last data, while the connection was suspended. */
+static bool has_ended_early(const struct connection *connection)
+{
+    struct pollfd socket = {.fd = connection->fd, .events = POLLRDHUP};
+    int unread = 1;
+    return connection->phase == PHASE_UPLOADING && poll(&socket, 1, 0) > 0 &&
+           socket.revents & (POLLRDHUP | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
+}
+
+/* Cuts connections whose phase lasts too long; MHD then sees them closed. */
+static void on_slow_timer(uv_timer_t *timer)
+{
+    struct spl_service *service = timer->data;
+    uint64_t now = spl_now_ns();
+    struct connection *connection;
+    LIST_FOREACH(connection, &service->connections, link)
+    {
+        bool hurry = service->draining && connection->phase == PHASE_READING;
+        if (has_ended_early(connection))
+            shutdown(connection->fd, SHUT_RDWR);
+        if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
+            continue;
+        spl_count(&service->counters, slow_closed);
+        shutdown(connection->fd, SHUT_RDWR);
+        connection->since_ns = now;
+    }
+}
+
+void spl_connections_watch(struct spl_service *service)
+{
+    uv_timer_start(&service->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);
+}

@@ -1,0 +1,62 @@
+/* Requests whose words do not fit. The connection pool bounds request line, headers and the reply's headers together;
+ * the first two have smaller bounds, so that our 414 and 431 answer them. libmicrohttpd writes zeros over the whole
+ * pool between requests, so all of it is resident on every idle connection and costs time with every request: it is
+ * small. Owned by the loop's thread. */
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+
+#include "service/state.h"
+
+enum {
+    value_memory = 64,       /* of the pool, for each header, parameter and cookie beside its text */
+    reply_memory = 2 * 1024, /* of the pool, for a reply's headers */
+    parameters_max = 64,
+};
+
+/* libmicrohttpd 0.9.75 falls silent when the parameters of a query, or a reply's headers, do not fit what is left of
+ * its pool, so such a request is answered past it, right on the socket, and the connection ended. `detail` needs no
+ * quoting.
+ */
+static void refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
+{
+    char text[512], reply[sizeof text + 256];
+    const char *title = MHD_get_reason_phrase_for(status);
+    int length =
+        snprintf(text, sizeof text,
+                 "{\"type\": \"urn:splatd:error:limit\", \"title\": \"%s\", \"status\": %u, \"detail\": \"%s\", "
+                 "\"instance\": \"urn:splatd:request:%s\", \"field\": \"%s\"}",
+                 title, status, detail, request->id, field);
+    length = snprintf(reply, sizeof reply,
+                      "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
+                      "X-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
+                      status, title, request->id, length, text);
+    request->status = status;
+    request->abandoned = true;
+    if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
+        spl_count(&request->service->counters, replies_4xx);
+    shutdown(request->connection->fd, SHUT_RDWR);
+}
+
+void spl_refuse_many_parameters(struct request *request, const char *uri)
+{
+    unsigned count = 0;
+    for (; *uri && count <= parameters_max; uri++)
+        count += *uri == '&';
+    if (count > parameters_max)
+        refuse_on_socket(request, MHD_HTTP_URI_TOO_LONG, "url", "the URL has too many parameters");
+}
+
+/* Once the headers are there. Cookies lie in the pool twice. */
+void spl_refuse_many_headers(struct request *request)
+{
+    struct MHD_Connection *handle = request->handle;
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    const char *cookie = MHD_lookup_connection_value(handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_COOKIE);
+    int kinds = MHD_HEADER_KIND | MHD_GET_ARGUMENT_KIND | MHD_COOKIE_KIND;
+    int values = MHD_get_connection_values(handle, (enum MHD_ValueKind)kinds, NULL, NULL);
+    size_t used = (info ? info->header_size : 0) + value_memory * (size_t)values + (cookie ? strlen(cookie) : 0);
+    if (used > connection_pool - reply_memory)
+        refuse_on_socket(request, MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE, "headers",
+                         "URL and headers are larger than 12 KiB together; POST takes long views");
+}
