@@ -43,6 +43,7 @@
 #define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
 #define SPL_BIND_TEXTURES SPL_BIND_OUTPUT /* uint[], one page's section TEXP as it lies in the file */
 #define SPL_BIND_ATOMS SPL_BIND_ID     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
+#define SPL_BIND_SUMMED SPL_BIND_ID    /* uint[], sums of atoms, texels as in the dictionary; written as SPL_BIND_SUMS */
 
 /* Some of them a second time, as texel buffers of words (image buffers, r32ui), whole and from their start: a software
  * driver gathers texels for all lanes in one instruction, but reads storage buffers in a loop over the lanes. Vulkan
@@ -52,7 +53,7 @@
 #define SPL_TEXELS_CHUNKS 2 /* SPL_BIND_CHUNKS, SPL_CHUNK_WORDS each */
 #define SPL_TEXELS_TEXTURES 3 /* SPL_BIND_TEXTURES */
 #define SPL_TEXELS_ATOMS 4  /* SPL_BIND_ATOMS */
-#define SPL_TEXELS_ID SPL_TEXELS_ATOMS /* SPL_BIND_ID and _TILES, the same binding */
+#define SPL_TEXELS_ID SPL_TEXELS_ATOMS /* SPL_BIND_ID, _TILES and _SUMMED, the same binding */
 #define SPL_TEXELS_SUMS 5   /* SPL_BIND_SUMS */
 #define SPL_TEXELS_COUNT 6
 #ifdef VULKAN
@@ -95,8 +96,14 @@
 /* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
  * from this bit on the number of planes, 1..8. */
 #define SPL_CHUNK_TEXTURE_PLANES 28
-/* The same word of a drawn chunk has this bit where texels are interpolated. */
+/* The same word of a drawn chunk has this bit where texels are interpolated; then the textures are summed first, a splat after
+ * the other, since its fragments outnumber its texels. */
 #define SPL_CHUNK_TEXTURE_SMOOTH 27
+
+/* Words from a summed texture to the next. A row more than there is: lanes that draw neighbours at a power of two from one
+ * another would fight for the same lines of a cache. */
+#define SPL_SUMMED_WORDS(size) ((size) * ((size) + 1))
+#define SPL_SUM_LANES(size) ((size) > 8 ? SPL_LANES : 1) /* invocations that share a texture */
 
 /* A chunk's codes in TEXP, a stream of bits that begins on a word; for each plane
  *   a header of SPL_TEXTURE_HEADER_BITS

@@ -81,6 +81,7 @@ void draw(splat_run run, splat s)
     clip_line line = load_clip(run.chunk, s);
 #ifdef SPL_TEXTURED
     splat_texture t = load_texture(run.chunk, s, value);
+    lay_texture(t, run.chunk, s, gl_GlobalInvocationID.x / SPL_LANES * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);
 #endif
     ivec2 sample_at = d.first;
     for (;;) {

@@ -114,20 +114,19 @@ vec3 rotate_to_view(vec3 v)
     return r;
 }
 
-/* The invocation's run; empty behind the list's end. */
-splat_run load_splat_run()
+/* Run `entry` of the dispatch; empty behind the list's end. */
+splat_run load_run_of(uint entry)
 {
     splat_run r;
     r.first = 0u;
     r.end = 0u;
     r.low = vec2(0.0);
     r.high = vec2(0.0);
-    uint entry = gl_GlobalInvocationID.x / SPL_LANES;
     if (entry < frame.entries) {
         uint packed_entry = draw_entries[frame.first_entry + entry];
         r.chunk = load_chunk(packed_entry >> SPL_RUN_BITS);
         uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_SPLATS;
-        r.first = first + gl_GlobalInvocationID.x % SPL_LANES;
+        r.first = first;
         r.end = min(first + SPL_RUN_SPLATS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
         uint column = bitfieldExtract(r.chunk.count, SPL_COUNT_BITS, SPL_WINDOW_BITS);
         uint row = r.chunk.count >> (SPL_COUNT_BITS + SPL_WINDOW_BITS);
@@ -135,6 +134,14 @@ splat_run load_splat_run()
         r.low = column == 0u ? vec2(0.0) : vec2(float(column - 1u), float(row)) * float(SPL_WINDOW);
         r.high = (column == 0u ? size : min(r.low + float(SPL_WINDOW), size)) - 1.0;
     }
+    return r;
+}
+
+/* The invocation's run, from its own first splat on. */
+splat_run load_splat_run()
+{
+    splat_run r = load_run_of(gl_GlobalInvocationID.x / SPL_LANES);
+    r.first += gl_GlobalInvocationID.x % SPL_LANES;
     return r;
 }
 

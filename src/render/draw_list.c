@@ -32,7 +32,7 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
     return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
-/* Which row of the table of batches: one for each number of planes, interpolation, clip lines or none, and phase. */
+/* Which row of the table of batches: number of planes, interpolation, clip lines or none, and phase. */
 static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
 {
     bool clipped = list->chunks[chunk].color_bits >> SPL_COLOR_CLIP;
@@ -119,6 +119,19 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl
     }
     free(batch_of_page);
     return rc;
+}
+
+uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed)
+{
+    uint64_t slots = 0;
+    most = most < ENTRIES_MAX ? most : ENTRIES_MAX;
+    for (size_t i = 0; i < list->batch_count; i++) {
+        struct spl_draw_batch *batch = &list->batches[i];
+        batch->first_slot = (uint32_t)slots;
+        batch->slot_entries = (uint32_t)(batch->smooth && most_summed < most ? most_summed : most);
+        slots += (batch->entries + batch->slot_entries - 1) / batch->slot_entries;
+    }
+    return slots;
 }
 
 void spl_draw_list_finish(struct spl_draw_list *list)

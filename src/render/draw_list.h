@@ -10,15 +10,17 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page, phase, number of planes of atoms, with or without clip lines: what one dispatch works off. The front phase
- * is the nearer half of the splats, whose depth occludes chunks of the back phase. */
+/* The draw-list entries of one page, phase, number of planes of atoms, interpolated or not, with or without clip lines:
+ * what one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
+ * phase. */
 struct spl_draw_batch {
     uint32_t page;
     uint8_t planes; /* 0 = no textures */
-    bool smooth;    /* texels are interpolated */
+    bool smooth;    /* texels are interpolated, of sums */
     bool clipped;   /* chunks with clip lines */
     bool back;
     uint32_t first_entry, entries;
+    uint32_t first_slot, slot_entries; /* parameters: a slot for every so many entries, the same in every pass */
 };
 
 struct spl_draw_list {
@@ -46,6 +48,11 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct sp
 
 /* Lays out entries and batches of all chunks added; `pages` is the dataset's number of pages. */
 int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err);
+
+/* Gives every batch its slots of parameters, of `most` entries at most, or of `most_summed` where texels are
+ * interpolated (both 1 and more), and returns how many there are. All passes share them, so that a page takes at most
+ * one for each of its kinds of chunks, whatever layers a view has. */
+uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed);
 
 void spl_draw_list_finish(struct spl_draw_list *list);
 

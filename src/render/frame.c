@@ -100,6 +100,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
     if (rc)
         return rc;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
+    rc = spl_tile_take_slots(tile, err);
     for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
         uint32_t layers = 0;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)

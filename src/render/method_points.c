@@ -13,10 +13,9 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, uint32_t slot, stru
     for (uint32_t pass = 0; pass < (wide ? 1u : 2u); pass++) {
         struct spl_gpu_kernel *kernel;
         int rc = spl_renderer_get_kernel(r, slot + 2 * group + pass, &kernel, err);
-        if (!rc)
-            rc = spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
         if (rc)
             return rc;
+        spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

@@ -17,8 +17,9 @@ enum spl_kernel_slot {
     SPL_KERNEL_OCCLUSION_TILES,
     SPL_KERNEL_OCCLUSION_CHUNKS,
     SPL_KERNEL_SPLAT_SHADE,                                          /* + 2 SPL_SUMS_* */
-    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + 2 * SPL_SUMS_COUNT, /* + 4 (planes - 1) + 2 smooth */
-    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_TEXTURE + 4 * SPL_TEXTURE_ATOMS, /* + 2 SPL_SUMS_* + pass */
+    SPL_KERNEL_SPLAT_TEXTURE = SPL_KERNEL_SPLAT_SHADE + 2 * SPL_SUMS_COUNT, /* + 2 planes, 0: interpolated sums */
+    SPL_KERNEL_SPLAT_SUM = SPL_KERNEL_SPLAT_TEXTURE + 2 * (SPL_TEXTURE_ATOMS + 1), /* + planes - 1 */
+    SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_SUM + SPL_TEXTURE_ATOMS,    /* + 2 SPL_SUMS_* + pass */
     SPL_KERNEL_FILL_POINTS = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT, /* the same */
     SPL_KERNEL_FILL_PULL = SPL_KERNEL_FILL_POINTS + 2 * SPL_SUMS_COUNT, /* + first */
     SPL_KERNEL_FILL_VISIBLE = SPL_KERNEL_FILL_PULL + 2,              /* + adaptive */
@@ -34,7 +35,7 @@ struct spl_scratch {
     uint64_t samples;                /* capacity */
     struct spl_gpu_buffer *depth;    /* 4 bytes a sample; 8 with 64 bit atomics (method points) */
     struct spl_gpu_buffer *sums;     /* 16 bytes a sample */
-    struct spl_gpu_buffer *ids;      /* 4 bytes a sample */
+    struct spl_gpu_buffer *ids;      /* 4 bytes a sample, and room for the summed textures of a run */
     struct spl_gpu_buffer *output;   /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
                                         write where the host reads */
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
@@ -64,7 +65,7 @@ struct spl_tile {
     uint32_t x, y, width, height;    /* in the image, pixels */
     uint64_t samples;
     struct spl_frame_params params;  /* common to all dispatches of the tile */
-    uint32_t slots_used;             /* of scratch.params */
+    uint32_t slots_used;             /* of scratch.params; first those of the draw list's batches */
     uint32_t stamps;                 /* timestamps written */
     uint8_t stamp_stage[SPL_GPU_TIMESTAMPS_MAX]; /* enum spl_stage that ended at each */
 };
@@ -81,6 +82,9 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
 int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot slot, struct spl_gpu_kernel **out,
                             struct spl_error *err);
 
+/* Gives the draw list's batches their slots of parameters, before anything else of the tile takes one. SPL_E_LIMIT. */
+int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err);
+
 enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
 /* Records `kernel` once per page of the draw list (and per the device's largest dispatch), for the given phases and
  * chunks. */
@@ -90,9 +94,10 @@ struct spl_dispatch {
     uint32_t planes;
     bool smooth;
     struct spl_gpu_kernel *clipped; /* for chunks with clip lines; NULL = as the others */
+    struct spl_gpu_kernel *sum;     /* runs before, to sum textures; NULL = none */
 };
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, const struct spl_dispatch *what,
-                             struct spl_error *err);
+void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
+                              const struct spl_dispatch *what);
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides. Clobbers the id buffer. */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err);
 /* Records the kernel of `slot`, one invocation for each of `items`, and a barrier. */

@@ -3,7 +3,11 @@
 
 #include <string.h>
 
-enum { chunks_at_start = 16384, entries_at_start = 262144 };
+enum {
+    chunks_at_start = 16384,
+    entries_at_start = 262144,
+    run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
+};
 
 int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, struct spl_error *err)
 {
@@ -21,7 +25,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
     } wanted[] = {
         {&scratch->depth, SPL_GPU_DEVICE, samples * (limits->atomics_64 ? 8 : 4)},
         {&scratch->sums, SPL_GPU_DEVICE, samples * 16},
-        {&scratch->ids, SPL_GPU_DEVICE, samples * 4},
+        {&scratch->ids, SPL_GPU_DEVICE, 4 * (samples > run_texels ? samples : run_texels)},
         {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
         {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
@@ -30,9 +34,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
-        int rc = wanted[i].bytes
-                     ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
-                     : SPL_OK;
+        int rc = wanted[i].bytes ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
+                                 : SPL_OK;
         if (rc) {
             spl_scratch_finish(scratch, gpu);
             return rc;
@@ -43,8 +46,9 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
 
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
-    struct spl_gpu_buffer *all[] = {scratch->depth,  scratch->sums,   scratch->ids,    scratch->output, scratch->readback,
-                                    scratch->params, scratch->chunks, scratch->bounds, scratch->entries};
+    struct spl_gpu_buffer *all[] = {scratch->depth,  scratch->sums,     scratch->ids,
+                                    scratch->output, scratch->readback, scratch->params,
+                                    scratch->chunks, scratch->bounds,   scratch->entries};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     *scratch = (struct spl_scratch){0};
@@ -78,5 +82,6 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
     int rc = upload(residency, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
     if (!rc)
         rc = upload(residency, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
-    return rc ? rc : upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
+    return rc ? rc
+              : upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
 }

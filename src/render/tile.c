@@ -17,10 +17,15 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
         return "occlusion_tiles";
     if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
         return "occlusion_chunks";
+    if (slot >= SPL_KERNEL_SPLAT_SUM && slot < SPL_KERNEL_POINTS) {
+        *count = 1;
+        constants[0] = slot - SPL_KERNEL_SPLAT_SUM + 1;
+        return "splat_sum";
+    }
     if (slot >= SPL_KERNEL_SPLAT_TEXTURE && slot < SPL_KERNEL_POINTS) {
-        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 4 + 1;
-        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2 % 2;
-        constants[(*count)++] = (slot - SPL_KERNEL_SPLAT_TEXTURE) % 2;
+        *count = 3;
+        constants[0] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2;
+        constants[2] = (slot - SPL_KERNEL_SPLAT_TEXTURE) % 2;
         return wide ? "splat_texture64" : "splat_texture";
     }
     if (slot < SPL_KERNEL_POINTS) {
@@ -76,15 +81,27 @@ int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot 
     return SPL_OK;
 }
 
+static int too_many(struct spl_error *err)
+{
+    return spl_fail(err, SPL_E_LIMIT, "a view takes more than %d dispatches, as of so many pages; raise lod",
+                    SPL_PARAMS_SLOTS);
+}
+
+static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t slot,
+                                         const struct spl_frame_params *params)
+{
+    struct spl_gpu_buffer *buffer = tile->renderer->scratch.params;
+    uint64_t offset = (uint64_t)slot * SPL_PARAMS_STRIDE;
+    memcpy((char *)spl_gpu_buffer_map(buffer) + offset, params, sizeof *params);
+    return (struct spl_gpu_binding){.buffer = buffer, .offset = offset, .bytes = SPL_PARAMS_STRIDE};
+}
+
 static int next_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
                        struct spl_error *err)
 {
-    struct spl_gpu_buffer *buffer = tile->renderer->scratch.params;
     if (tile->slots_used == SPL_PARAMS_SLOTS)
-        return spl_fail(err, SPL_E_LIMIT, "a view touches more than %d pages at once; raise lod", SPL_PARAMS_SLOTS);
-    uint64_t offset = (uint64_t)tile->slots_used++ * SPL_PARAMS_STRIDE;
-    memcpy((char *)spl_gpu_buffer_map(buffer) + offset, params, sizeof *params);
-    *binding = (struct spl_gpu_binding){.buffer = buffer, .offset = offset, .bytes = SPL_PARAMS_STRIDE};
+        return too_many(err);
+    *binding = put_params(tile, tile->slots_used++, params);
     return SPL_OK;
 }
 
@@ -100,12 +117,43 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
     bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
 }
 
-int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kernel, const struct spl_dispatch *what,
-                             struct spl_error *err)
+enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
+
+int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
 {
-    enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
+    uint64_t workgroups = spl_gpu_get_limits(tile->renderer->gpu)->workgroups, size = tile->params.texture_size;
+    uint64_t words = spl_gpu_buffer_get_bytes(tile->renderer->scratch.ids) / sizeof(uint32_t);
+    uint64_t most = workgroups * entries_per_workgroup,
+             summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
+    if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
+        summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
+    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed);
+    if (slots > SPL_PARAMS_SLOTS)
+        return too_many(err);
+    tile->slots_used = (uint32_t)slots;
+    return SPL_OK;
+}
+
+/* Sums the textures of as many entries into the id buffer, where `shade` reads them. */
+static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
+                          const struct spl_gpu_binding shade[SPL_BIND_COUNT], uint32_t entries)
+{
+    const struct spl_resident_dataset *resident = tile->resident;
+    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
+    uint32_t invocations = entries * SPL_RUN_SPLATS * SPL_SUM_LANES(tile->params.texture_size);
+    memcpy(bindings, shade, sizeof bindings);
+    bindings[SPL_BIND_SUMS].buffer = shade[SPL_BIND_SUMMED].buffer;
+    bindings[SPL_BIND_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
+    spl_gpu_barrier(tile->renderer->gpu); /* whoever reads the last sums is done */
+    spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (invocations + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
+    spl_gpu_barrier(tile->renderer->gpu);
+}
+
+void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
+                              const struct spl_dispatch *what)
+{
     const struct spl_draw_list *list = &tile->renderer->list;
-    uint64_t most = (uint64_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * entries_per_workgroup;
+    const struct spl_resident_dataset *resident = tile->resident;
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
@@ -113,30 +161,28 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, struct spl_gpu_kernel *kerne
         if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
             (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
             continue;
-        bindings[SPL_BIND_PAGE].buffer = tile->resident->pages[batch->page].buffer;
-        if (what->planes) {
-            bindings[SPL_BIND_TEXTURES].buffer =
-                tile->resident->pages[spl_textures_slot(tile->resident, batch->page)].buffer;
-            bindings[SPL_BIND_ATOMS].buffer = tile->resident->pages[spl_dictionary_slot(tile->resident)].buffer;
-        }
-        for (uint32_t done = 0; done < batch->entries;) {
+        bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->page].buffer;
+        if (what->planes)
+            bindings[SPL_BIND_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->page)].buffer;
+        if (what->planes && !what->sum)
+            bindings[SPL_BIND_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
+        uint32_t slot = batch->first_slot;
+        for (uint32_t done = 0; done < batch->entries; done += batch->slot_entries) {
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
-            params.entries = left < most ? left : (uint32_t)most;
-            int rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
-            if (rc)
-                return rc;
+            params.entries = left < batch->slot_entries ? left : batch->slot_entries;
+            bindings[SPL_BIND_FRAME] = put_params(tile, slot++, &params);
+            if (what->sum)
+                dispatch_sums(tile, what->sum, bindings, params.entries);
             spl_gpu_dispatch(tile->renderer->gpu, batch->clipped && what->clipped ? what->clipped : kernel, bindings,
                              (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
-            done += params.entries;
         }
     }
-    return SPL_OK;
 }
 
 int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
-                              uint32_t items, struct spl_error *err)
+                            uint32_t items, struct spl_error *err)
 {
     struct spl_gpu_kernel *kernel;
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];

@@ -1,9 +1,9 @@
 /* What textures cost: processor time of frames with all atoms, four, one, and of the coloured frame, in turns, at the
- * dataset's default view and at 2/5 and 1/5 of its distance, 1280 x 720, lod 1; the lower quartile of the rounds.
- * Processor time, because other work on the machine stretches wall time.
+ * dataset's default view and at 2/5 and 1/5 of its distance, or at those given, 1280 x 720, lod 1; the lower quartile
+ * of the rounds. Processor time, because other work on the machine stretches wall time.
  *
- * usage: bench-textures DATASET.spld [DEVICE] [ROUNDS]    exit 1 where all atoms cost more than 1.5 times the coloured
- * frame at the default view, or 2.5 times in a nearer one */
+ * usage: bench-textures DATASET.spld [DEVICE [ROUNDS [DISTANCE...]]]    exit 1 where all atoms cost more than 1.5 times
+ * the coloured frame at the default view, or 2.5 times in a nearer one */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
@@ -36,14 +36,14 @@ static void must(int rc, const struct spl_error *err)
 int main(int argc, char **argv)
 {
     static const uint32_t atoms[caps] = {0, 8, 4, 1};
-    static const double distances[] = {1, 0.4, 0.2}, bounds[] = {1.5, 2.5, 2.5};
+    static const double usual[] = {1, 0.4, 0.2};
     static double ms[caps][rounds_max];
     struct spl_error err = {0};
     struct spl_dataset *dataset;
     struct spl_renderer *renderer;
     int rounds = argc > 3 ? atoi(argv[3]) : 9, worst = 0;
     if (argc < 2 || rounds < 1 || rounds > rounds_max) {
-        fprintf(stderr, "usage: bench-textures DATASET.spld [DEVICE] [ROUNDS]\n");
+        fprintf(stderr, "usage: bench-textures DATASET.spld [DEVICE [ROUNDS [DISTANCE...]]]\n");
         return 2;
     }
     struct spl_renderer_options options = {.device = argc > 2 ? argv[2] : NULL};
@@ -52,13 +52,14 @@ int main(int argc, char **argv)
     must(spl_renderer_add(renderer, dataset, &err), &err);
     must(spl_renderer_preload(renderer, dataset, &err), &err);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    for (int v = 0; v < 3; v++) {
+    for (int v = 0; v < (argc > 4 ? argc - 4 : 3); v++) {
+        double distance = argc > 4 ? atof(argv[4 + v]) : usual[v], bound = distance < 1 ? 2.5 : 1.5;
         struct spl_view view;
         spl_view_init(&view);
         must(spl_dataset_get_default_camera(dataset, 1280, 720, &view.camera, &err), &err);
         double eye[3];
         for (int a = 0; a < 3; a++)
-            eye[a] = info->default_target[a] + distances[v] * (info->default_eye[a] - info->default_target[a]);
+            eye[a] = info->default_target[a] + distance * (info->default_eye[a] - info->default_target[a]);
         must(spl_camera_look_at(&view.camera, eye, info->default_target, info->default_up, &err), &err);
         uint64_t splats = 0;
         for (int round = -1; round < rounds; round++)
@@ -72,14 +73,15 @@ int main(int argc, char **argv)
                 splats = frame.stats.splats_drawn;
                 spl_frame_finish(&frame);
             }
-        printf("%.1f of the distance, %llu splats:", distances[v], (unsigned long long)splats);
+        printf("%.2f of the distance, %llu splats:", distance, (unsigned long long)splats);
         for (int cap = 0; cap < caps; cap++)
             qsort(ms[cap], (size_t)rounds, sizeof **ms, compare);
         for (int cap = 0; cap < caps; cap++)
             printf("  %u atoms %.0f ms (%.2f)", atoms[cap], ms[cap][rounds / 4],
                    ms[cap][rounds / 4] / ms[0][rounds / 4]);
-        bool within = ms[1][rounds / 4] <= bounds[v] * ms[0][rounds / 4];
-        printf("  %s %.1f\n", within ? "within" : "BEYOND", bounds[v]);
+        bool within = ms[1][rounds / 4] <= bound * ms[0][rounds / 4];
+        printf("  %s %.1f\n", within ? "within" : "BEYOND", bound);
+        fflush(stdout);
         worst |= !within;
     }
     spl_renderer_destroy(renderer);

@@ -146,6 +146,19 @@ static uint32_t texel_of(const struct scene *s, uint32_t atom, int channel, int 
     return level[row * side + column] >> (16 - 8 * channel) & 255;
 }
 
+/* A channel of the splat's texture, 8 bit. */
+static uint32_t sum_texel(const struct scene *s, const struct disc *d, int channel, int column, int row, int side)
+{
+    const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
+    double sum = d->color[channel];
+    for (uint32_t t = 0; t < d->atoms->count && t < d->planes; t++) {
+        uint32_t atom = d->atoms->atom[t];
+        double weight = 255.0 * spl_code_weight(&d->code->plane[t], d->atoms->weight[t]) * dictionary->scale[atom];
+        sum += weight * ((double)texel_of(s, atom, channel, column, row, side) - 128);
+    }
+    return (uint32_t)fmin(fmax(sum + 0.5, 0), 255.5);
+}
+
 /* The colour of the splat's texture at `offset`. The level's texels are half a sample to a sample wide and the nearest
  * one counts; in chunks whose finest are wider than a sample they are interpolated, in steps of a 16th. */
 static void sample_texture(const struct scene *s, const struct disc *d, const float offset[3], uint32_t color[3])
@@ -173,17 +186,11 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
         part[i] = magnified ? (int)((value - (float)corner[i]) * 16 + 0.5f) : 0;
     }
     for (int c = 0; c < 3; c++) {
-        double sum = d->color[c];
-        for (uint32_t t = 0; t < d->atoms->count && t < d->planes; t++) {
-            uint32_t atom = d->atoms->atom[t];
-            double weight = 255.0 * spl_code_weight(&d->code->plane[t], d->atoms->weight[t]) * dictionary->scale[atom];
-            uint32_t texel = 0;
-            for (int k = 0; k < (magnified ? 4 : 1); k++)
-                texel += texel_of(s, atom, c, corner[0] + k % 2, corner[1] + k / 2, side) *
-                         (uint32_t)((k % 2 ? part[0] : 16 - part[0]) * (k / 2 ? part[1] : 16 - part[1]));
-            sum += weight * (texel / 256.0 - 128);
-        }
-        color[c] = (uint32_t)fmin(fmax(sum + 0.5, 0), 255.5);
+        uint32_t sum = 128;
+        for (int k = 0; k < (magnified ? 4 : 1); k++)
+            sum += sum_texel(s, d, c, corner[0] + k % 2, corner[1] + k / 2, side) *
+                   (uint32_t)((k % 2 ? part[0] : 16 - part[0]) * (k / 2 ? part[1] : 16 - part[1]));
+        color[c] = sum >> 8;
     }
 }
 
