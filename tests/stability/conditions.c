@@ -154,7 +154,7 @@ struct drawing {
     uint32_t atoms;
 };
 
-/* One row a drawing. */
+/* One row a drawing; of strips, to whose sides the filter looks as far as along them, `fill` in the whole form only. */
 static void measure_rows(struct conditions *c, const struct world *world, const struct spl_view *view,
                          const struct drawing *drawings, size_t count, const struct row *name)
 {
@@ -168,7 +168,11 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
     truth_render(world, &crop.camera, truths[1]);
     for (size_t i = 0; i < count; i++) {
         struct row row = *name;
+        bool strip = view->camera.width > 64 * view->camera.height || view->camera.height > 64 * view->camera.width;
         row.method = drawings[i].name;
+        row.whole |= strip && drawings[i].method == SPL_METHOD_FILL;
+        if (row.whole && !c->suite->whole)
+            continue;
         views[0].method = views[1].method = drawings[i].method;
         views[0].atoms = views[1].atoms = drawings[i].atoms;
         bool measured = measure(c, world, views, truths, true, &row);
@@ -176,8 +180,8 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
             table_put(c->table, &row);
         if (measured)
             table_judge(c->table, &c->suite->report, &row, spl_renderer_get_device(c->suite->renderer)->backend);
-        if (!c->suite->other)
-            continue;
+        if (!c->suite->other || (drawings[i].method == SPL_METHOD_FILL && !c->suite->whole))
+            continue; /* filled frames are the slowest, and check_drivers() compares them pixel by pixel */
         struct spl_renderer *renderer = c->suite->renderer;
         c->suite->renderer = c->suite->other;
         if (measure(c, world, views, truths, false, &row))
@@ -191,11 +195,11 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
 void conditions_measure(struct conditions *c, const struct world *world, const struct spl_view *view,
                         const char *condition, const char *value, bool whole_only)
 {
-    struct drawing drawings[JUDGED_METHODS];
-    for (int method = 0; method < JUDGED_METHODS; method++)
+    struct drawing drawings[SPL_METHOD_COUNT];
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
         drawings[method] =
             (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method, view->atoms};
-    measure_rows(c, world, view, drawings, JUDGED_METHODS, &(struct row){condition, value, NULL, whole_only, {0}});
+    measure_rows(c, world, view, drawings, SPL_METHOD_COUNT, &(struct row){condition, value, NULL, whole_only, {0}});
 }
 
 void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,

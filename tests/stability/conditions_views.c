@@ -68,8 +68,9 @@ static void fields_of_view(struct conditions *c, const struct world *yard)
 
 static void sizes(struct conditions *c, const struct world *yard)
 {
-    static const uint32_t sizes[][3] = {{1, 1, 0},    {2, 2, 0},       {16, 16, 0},     {8192, 2, 0},
-                                        {2, 8192, 0}, {1024, 1024, 1}, {4096, 4096, 1}, {8192, 8192, 1}};
+    static const uint32_t sizes[][3] = {{1, 1, 0},       {2, 2, 0},      {16, 16, 0},     {64, 64, 0},
+                                        {8192, 2, 0},    {2, 8192, 0},   {1024, 1024, 1}, {4096, 4096, 1},
+                                        {8192, 4096, 1}, {8192, 8192, 1}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         char value[32];
         const uint32_t *side = sizes[i];

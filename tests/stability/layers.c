@@ -98,7 +98,7 @@ void check_layers(struct suite *suite)
         world_init(&world, &scans[s]);
         size_t step = suite->whole ? 1 : 4;
         for (size_t v = 0; v < world.scene->camera_count; v += step)
-            for (int method = 0; method < JUDGED_METHODS; method++)
+            for (int method = 0; method < SPL_METHOD_COUNT; method++)
                 for (int side = 1; side <= (v && !suite->whole ? 1 : 2); side++) {
                     struct spl_view view = world_view(&world, v, WIDTH, HEIGHT);
                     view.method = (enum spl_method)method;
@@ -139,7 +139,7 @@ void check_drivers(struct suite *suite)
         struct world world;
         world_init(&world, &scans[s]);
         for (size_t v = 0; v < world.scene->camera_count; v += suite->whole ? 1 : 3)
-            for (int method = 0; method < JUDGED_METHODS; method++) {
+            for (int method = 0; method < SPL_METHOD_COUNT; method++) {
                 struct spl_view view = world_view(&world, v, WIDTH, HEIGHT);
                 view.method = (enum spl_method)method;
                 struct place place = {world.name, world.scene->cameras[v].name, spl_method_name(view.method), NULL};

@@ -14,7 +14,7 @@ static void check_view(struct suite *suite, const struct world *world, size_t v)
     struct spl_view view = world_view(world, v, WIDTH, HEIGHT);
     struct spl_image truth[SPL_LAYER_COUNT];
     truth_render(world, &view.camera, truth);
-    for (int method = 0; method < JUDGED_METHODS; method++) {
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         static const char *const names[lod_count] = {"lod 4", "lod 2", "lod 1", "lod 0.5", "lod 0"};
         double coarser = 0;
         view.method = (enum spl_method)method;

@@ -55,7 +55,7 @@ static void check_scan(struct suite *suite)
         memcpy(points[i].color, painted, sizeof painted);
     world_init_points(&world, "courtyard-one-color", points, count);
     free(points);
-    for (int method = 0; method < JUDGED_METHODS; method++)
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
         for (int lod = 0; lod <= 2; lod++)
             for (int near = 0; near < 2; near++) {
                 struct spl_view view = world_look(&world, near ? eye : far_eye, target, near ? 70 : 10, WIDTH, HEIGHT);
@@ -85,7 +85,7 @@ static void check_heap(struct suite *suite, const char *name, size_t count, floa
     struct world world = {.dataset = make_dataset_levels(splats, count, count > 1 ? 2 : 1)};
     snprintf(world.name, sizeof world.name, "%s", name);
     free(splats);
-    for (int method = 0; method < (spread ? 1 : JUDGED_METHODS); method++)
+    for (int method = 0; method < (spread ? 1 : SPL_METHOD_COUNT); method++)
         for (int lod = 0; lod < 2; lod++) {
             struct spl_view view = world_look(&world, eye, origin, 40, side, side);
             view.method = (enum spl_method)method;

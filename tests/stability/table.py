@@ -20,6 +20,8 @@ SPLAT = [("psnr", "PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("holes", "holes", 100,
          ("flicker", "flicker", 1, 1)]
 POINTS = [("psnr", "points: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
+FILL = [("psnr", "fill: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
+        ("depth_beyond", "beyond", 100, 1), ("halo", "halo", 100, 1), ("flicker", "flicker", 1, 1)]
 BEGIN_TEXTURES, END_TEXTURES = "<!-- table.py: textures begin -->\n", "<!-- table.py: textures end -->\n"
 COLOURED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
 TEXTURED = [("psnr", "textures: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
@@ -63,7 +65,7 @@ def main(arguments):
         sys.exit(__doc__)
     text = RESULTS.read_text(encoding="utf-8")
     new = text
-    for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS}),
+    for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL}),
                               (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
         if text.count(begin) != 1 or text.count(end) != 1:
             sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")

@@ -28,9 +28,6 @@ struct world {
     char name[64];
 };
 
-/* The invariants and the table are about the methods before this one. */
-enum { JUDGED_METHODS = SPL_METHOD_FILL };
-
 enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP };
 
 struct suite {
