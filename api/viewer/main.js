@@ -92,7 +92,8 @@ async function open() {
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
-    choices($("method"), dataset.methods, wanted.method ?? "splat");
+    const method = wanted.method ?? "splat";
+    choices($("method"), dataset.methods, dataset.methods.includes(method) ? method : "fill"); // of bare points
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
     choose($("atoms"), wanted.atoms ?? "");

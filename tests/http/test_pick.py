@@ -178,6 +178,7 @@ def test_bare_points():
         subprocess.run([REAL, "pack", cloud, "--points-only", "-o", bare], check=True, stderr=subprocess.DEVNULL)
         with Daemon(REAL, datasets=(bare,)) as d:
             at = "/v1/datasets/bare"
+            assert d.ask(at).json()["methods"] == ["points", "fill"]
             camera = "eye=3,0,1&target=0,0,1&fov=30&width=64&height=48"
             points = d.ask(f"{at}/pick?{camera}&x=32&y=24&method=points").json()
             assert points["normal"] is None, points

@@ -10,22 +10,22 @@ static json_t *vector(const double v[3])
     return json_pack("[f, f, f]", v[0], v[1], v[2]);
 }
 
-static json_t *names(const char *(*name)(int), int count)
+static json_t *describe_layers(void)
 {
     json_t *list = json_array();
-    for (int i = 0; i < count; i++)
-        json_array_append_new(list, json_string(name(i)));
+    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+        json_array_append_new(list, json_string(spl_layer_name((enum spl_layer)i)));
     return list;
 }
 
-static const char *layer_name(int i)
+/* Without radii there are no discs: method fill is drawn where splat is asked for. */
+static json_t *describe_methods(const struct spl_dataset_info *info)
 {
-    return spl_layer_name((enum spl_layer)i);
-}
-
-static const char *method_name(int i)
-{
-    return spl_method_name((enum spl_method)i);
+    json_t *list = json_array();
+    for (int i = 0; i < SPL_METHOD_COUNT; i++)
+        if (i != SPL_METHOD_SPLAT || info->has_surface)
+            json_array_append_new(list, json_string(spl_method_name((enum spl_method)i)));
+    return list;
 }
 
 static json_t *count(uint64_t n)
@@ -84,8 +84,8 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "leaf_splats", count(info->leaf_splats));
     set(json, "page_bytes", count(info->page_bytes));
     set(json, "splat_radius", json_real(info->splat_radius));
-    set(json, "layers", names(layer_name, SPL_LAYER_COUNT));
-    set(json, "methods", names(method_name, SPL_METHOD_COUNT));
+    set(json, "layers", describe_layers());
+    set(json, "methods", describe_methods(info));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)
