@@ -32,10 +32,9 @@ struct spl_file_header { /* at offset 0 */
 #define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* struct spl_chunk[] */
 #define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
-#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, scales, texels */
+#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, cosine coefficients */
 #define SPL_SECTION_CHUNK_TEXTURES SPL_FOURCC('C', 'T', 'E', 'X') /* uint32_t[chunks], see below */
-#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's number  \
-                                                             */
+#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P')       /* codes of a page's chunks; `index` is the page's */
 
 struct spl_section {
     uint32_t type;

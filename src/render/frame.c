@@ -227,7 +227,7 @@ static int plan_fill(struct frame_job *job, struct spl_error *err)
     struct spl_select_params params = selection(job, &camera);
     uint64_t clock = spl_now_ns();
     spl_residency_begin_frame(&job->renderer->residency);
-    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
+    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
     job->frame->stats.select_ms += since_ms(&clock);
     if (job->page_error.code)
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);

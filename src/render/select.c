@@ -276,10 +276,10 @@ static struct walk begin_walk(const struct spl_select_params *params)
     };
 }
 
-int spl_select_spacing(const struct spl_select_params *params, double *spacing, struct spl_error *err)
+int spl_select_spacing(const struct spl_select_params *params, double *spacing, bool *complete, struct spl_error *err)
 {
     double covered[SPACING_CLASSES] = {0}, sum = 0, sparser = 0;
-    struct spl_draw_list counts = {0}; // its numbers only
+    struct spl_draw_list counts = {.complete = true}; // its numbers only
     struct walk w = begin_walk(params);
     w.list = &counts;
     w.covered = covered;
@@ -292,6 +292,7 @@ int spl_select_spacing(const struct spl_select_params *params, double *spacing, 
     while (class > 1 && sparser + covered[class - 1] <= 0.01 * sum)
         sparser += covered[--class];
     *spacing = sum > 0 ? exp2(class / 4.0) : 1;
+    *complete &= counts.complete;
     return SPL_OK;
 }
 

@@ -41,7 +41,8 @@ static inline bool spl_view_is_textured(const struct spl_view *view)
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);
 
 /* How far apart, in samples, the drawn splats lie where they are sparsest: all but a hundredth of what they cover on
- * the image has a spacing of at most so much. 1 where nothing is drawn. */
-int spl_select_spacing(const struct spl_select_params *params, double *spacing, struct spl_error *err);
+ * the image has a spacing of at most so much. 1 where nothing is drawn. Clears *complete where coarser nodes stood in,
+ * as the list's does. */
+int spl_select_spacing(const struct spl_select_params *params, double *spacing, bool *complete, struct spl_error *err);
 
 #endif

@@ -475,7 +475,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
         double spacing = 1;
-        rc = view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, err);
+        bool complete = true;
+        rc = view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &complete, err);
         spl_fill_plan_init(&plan, view, spacing);
         s.guard = plan.guard;
         s.camera.width += 2 * plan.guard;
