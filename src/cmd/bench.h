@@ -1,6 +1,6 @@
-/* What the files of 'splatd bench' share: bench.c reads the options, bench_table.c prints frame times, bench_sweep.c
- * runs the comparison with a reference, bench_textures.c that of texture coders, bench_left_out.c
- * that with photographs left out of packing. */
+/* What the files of 'splatd bench' share: bench_options.c reads the options, bench_table.c prints frame times,
+ * bench_sweep.c runs the comparison with a reference, bench_textures.c that of texture coders, bench_left_out.c that
+ * with photographs left out of packing. */
 #ifndef SPL_CMD_BENCH_H
 #define SPL_CMD_BENCH_H
 
@@ -28,6 +28,24 @@ struct spl_cmd_bench_sweep {
     size_t method_count, lod_count, supersample_count, atom_count;
     bool atoms_listed; /* asked for, not the default */
 };
+
+struct spl_cmd_bench_arguments {
+    struct spl_dataset *datasets[SPL_CMD_BENCH_LIST_MAX];
+    const char *devices[SPL_CMD_BENCH_LIST_MAX];
+    enum spl_method methods[SPL_CMD_BENCH_LIST_MAX];
+    double lods[SPL_CMD_BENCH_LIST_MAX], supersamples[SPL_CMD_BENCH_LIST_MAX];
+    uint32_t atoms[SPL_CMD_BENCH_LIST_MAX];
+    size_t supersample_count, atom_count;
+    struct spl_path path;
+    const char *views, *set;
+    bool json, sized, listed[4]; /* listed: --method, --lod, --supersample, --atoms were given */
+    struct spl_bench_options bench;
+    struct spl_cmd_bench_sweep sweep;
+};
+
+/* Fills zeroed `arguments` from the command line and opens the datasets, which the caller closes on failure too; lists
+ * point into `argv`. SPL_E_USAGE, and what opening fails with. */
+int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *arguments, int argc, char **argv, struct spl_error *err);
 
 /* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */
 int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_dataset *dataset, struct spl_error *err);
