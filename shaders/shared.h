@@ -125,6 +125,12 @@
 #define SPL_FILL_DEPTH_BITS 63u
 /* A point whose radius is more than so many times the least of its chunk strays: it counts as this. */
 #define SPL_FILL_STRAY 3.0f
+/* A linear splat is joined with the nearest one within so many radii, and with one within so many on the other side, which
+ * lies off the line through both by a radius and this share of its distance at most; by lines of so many samples at most. */
+#define SPL_FILL_LINE_NEAR 3.0f
+#define SPL_FILL_LINE_FAR 64.0f
+#define SPL_FILL_LINE_OFF 0.08f
+#define SPL_FILL_LINE_MOST 6000
 #define SPL_FILL_HOLE 0x80000000u
 #define SPL_FILL_LEVELS_MAX 8
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
@@ -241,6 +247,7 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
+_Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * (SPL_FILL_LINE_MOST + SPL_CHUNK_SPLATS) < 60000, "so does one with lines");
 _Static_assert(sizeof(struct spl_frame_params) == 188, "spl_frame_params is 188 bytes on both sides");
 #endif
 

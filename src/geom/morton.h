@@ -17,6 +17,17 @@ static inline uint64_t spl_morton_spread(uint32_t v)
     return (x | x << 2) & 0x1249249249249249ull;
 }
 
+/* The inverse: every third bit of `x`, from the lowest on. */
+static inline uint32_t spl_morton_compact(uint64_t x)
+{
+    x &= 0x1249249249249249ull;
+    x = (x | x >> 2) & 0x10c30c30c30c30c3ull;
+    x = (x | x >> 4) & 0x100f00f00f00f00full;
+    x = (x | x >> 8) & 0x001f0000ff0000ffull;
+    x = (x | x >> 16) & 0x001f00000000ffffull;
+    return (uint32_t)(x | x >> 32) & 0x1fffff;
+}
+
 static inline uint64_t spl_morton_encode(uint32_t x, uint32_t y, uint32_t z)
 {
     return spl_morton_spread(x) | spl_morton_spread(y) << 1 | spl_morton_spread(z) << 2;

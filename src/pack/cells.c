@@ -22,20 +22,10 @@ struct build {
     uint64_t *key; /* of each point */
 };
 
-static uint32_t compact(uint64_t v)
-{
-    v &= 0x1249249249249249ull;
-    v = (v | v >> 2) & 0x10c30c30c30c30c3ull;
-    v = (v | v >> 4) & 0x100f00f00f00f00full;
-    v = (v | v >> 8) & 0x001f0000ff0000ffull;
-    v = (v | v >> 16) & 0x001f00000000ffffull;
-    return (uint32_t)(v | v >> 32) & 0x1fffff;
-}
-
 void spl_cells_place(const struct spl_cells *cells, uint32_t cell, int64_t at[3])
 {
     for (int c = 0; c < 3; c++)
-        at[c] = compact(cells->cells[cell].key >> c);
+        at[c] = spl_morton_compact(cells->cells[cell].key >> c);
 }
 
 static uint32_t slot_of(const struct spl_cells *cells, uint64_t key)
@@ -84,6 +74,13 @@ struct spl_cell_sums spl_cells_around(const struct spl_cells *cells, uint32_t ce
                     add_sums(&all, &cells->cells[other].sums, (const float[3]){(float)x, (float)y, (float)z});
             }
     return all;
+}
+
+void spl_cells_covariance(const struct spl_cell_sums *sums, float m[6])
+{
+    float inverse = 1 / sums->count;
+    for (int e = 0; e < 6; e++)
+        m[e] = sums->square[e] * inverse - sums->sum[row[e]] * sums->sum[column[e]] * inverse * inverse;
 }
 
 static void key_points(void *context, size_t begin, size_t end, unsigned worker)

@@ -44,6 +44,9 @@ void spl_cells_place(const struct spl_cells *cells, uint32_t cell, int64_t at[3]
 /* Sums over the cell and its 26 neighbours, about its middle. */
 struct spl_cell_sums spl_cells_around(const struct spl_cells *cells, uint32_t cell);
 
+/* Spread about their mean, xx xy xz yy yz zz; there is a point. */
+void spl_cells_covariance(const struct spl_cell_sums *sums, float m[6]);
+
 void spl_cells_finish(struct spl_cells *cells);
 
 #endif

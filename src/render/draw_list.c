@@ -32,11 +32,12 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
     return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
-/* Which row of the table of batches: number of planes, interpolation, clip lines or none, and phase. */
+/* Which row of the table of batches: number of planes, interpolation, whether apart, and phase. */
 static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
 {
-    bool clipped = list->chunks[chunk].color_bits >> SPL_COLOR_CLIP;
-    return 4 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + 2 * clipped +
+    bool apart =
+        list->chunks[chunk].color_bits >> SPL_COLOR_CLIP || list->chunks[chunk].geometry_bits >> SPL_GEOMETRY_LINEAR;
+    return 4 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + 2 * apart +
            (chunk >= list->first_back_chunk);
 }
 
@@ -87,7 +88,7 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, ui
             list->batches[list->batch_count++] = (struct spl_draw_batch){.page = list->page_of_chunk[i],
                                                                          .planes = (uint8_t)(row / 8),
                                                                          .smooth = row / 4 % 2,
-                                                                         .clipped = row / 2 % 2,
+                                                                         .apart = row / 2 % 2,
                                                                          .back = row % 2};
         }
         list->batches[*batch].entries += runs(&list->chunks[i]);

@@ -10,14 +10,14 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page, phase, number of planes of atoms, interpolated or not, with or without clip lines:
+/* The draw-list entries of one page, phase, number of planes of atoms, interpolated or not, apart or not:
  * what one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
  * phase. */
 struct spl_draw_batch {
     uint32_t page;
     uint8_t planes; /* 0 = no textures */
     bool smooth;    /* texels are interpolated, of sums */
-    bool clipped;   /* chunks with clip lines */
+    bool apart;     /* chunks with clip lines, or with linear splats where these are drawn as lines */
     bool back;
     uint32_t first_entry, entries;
     uint32_t first_slot, slot_entries; /* parameters: a slot for every so many entries, the same in every pass */

@@ -64,6 +64,7 @@ static struct spl_select_params selection(struct frame_job *job, const struct sp
         .lod = job->view->lod,
         .low_pass = SPL_LOW_PASS,
         .points = job->view->method != SPL_METHOD_SPLAT,
+        .lines = job->view->method == SPL_METHOD_FILL,
         .resident = ask_page,
         .atoms = spl_view_is_textured(job->view) ? job->view->atoms : 0,
         .textured = ask_textures,

@@ -1,5 +1,5 @@
-/* Method fill: points as method points draws them, with their spacing in the depth's low bits, then the screen-space
- * filter over them. */
+/* Method fill: points as method points draws them, with their spacing in the depth's low bits and linear ones joined by
+ * lines, then the screen-space filter over what is not linear. */
 #include "render/fill.h"
 #include "render/renderer.h"
 

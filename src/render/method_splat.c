@@ -9,7 +9,7 @@ static int get_kernels(struct spl_renderer *r, uint32_t slot, struct spl_gpu_ker
 {
     bool any = false;
     for (size_t i = 0; i < r->list.batch_count; i++)
-        any |= r->list.batches[i].clipped;
+        any |= r->list.batches[i].apart;
     *clipped = NULL;
     int rc = spl_renderer_get_kernel(r, slot, plain, err);
     return rc || !any ? rc : spl_renderer_get_kernel(r, slot + 1, clipped, err);

@@ -21,7 +21,8 @@ enum spl_kernel_slot {
     SPL_KERNEL_SPLAT_SUM = SPL_KERNEL_SPLAT_TEXTURE + 2 * (SPL_TEXTURE_ATOMS + 1), /* + planes - 1 */
     SPL_KERNEL_POINTS = SPL_KERNEL_SPLAT_SUM + SPL_TEXTURE_ATOMS,    /* + 2 SPL_SUMS_* + pass */
     SPL_KERNEL_FILL_POINTS = SPL_KERNEL_POINTS + 2 * SPL_SUMS_COUNT, /* the same */
-    SPL_KERNEL_FILL_PULL = SPL_KERNEL_FILL_POINTS + 2 * SPL_SUMS_COUNT, /* + first */
+    SPL_KERNEL_FILL_LINES = SPL_KERNEL_FILL_POINTS + 2 * SPL_SUMS_COUNT, /* the same */
+    SPL_KERNEL_FILL_PULL = SPL_KERNEL_FILL_LINES + 2 * SPL_SUMS_COUNT, /* + first */
     SPL_KERNEL_FILL_VISIBLE = SPL_KERNEL_FILL_PULL + 2,              /* + adaptive */
     SPL_KERNEL_FILL_NORMAL = SPL_KERNEL_FILL_VISIBLE + 2,
     SPL_KERNEL_FILL_GATHER,                                          /* + 2 SPL_SUMS_* + first */
@@ -90,6 +91,7 @@ enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
  * chunks. */
 struct spl_dispatch {
     enum spl_phase phases;
+    bool apart;        /* only batches that are */
     bool by_texture;   /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;

@@ -154,13 +154,14 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     uint32_t clip = spl_clip_count(chunk) && !w->params->points
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
                         : 0; // at most 157
+    uint32_t linear = 3u << SPL_GEOMETRY_LINEAR;
     struct spl_draw_chunk out = {
         .step = chunk->step,
         .radius_min = (float)(chunk->radius_min * scale),
         .radius_step = (float)(chunk->radius_step * scale),
         .geometry_word = chunk->geometry_word,
         .color_word = spl_chunk_color_word(chunk),
-        .geometry_bits = chunk->geometry_bits,
+        .geometry_bits = w->params->lines ? chunk->geometry_bits : chunk->geometry_bits & ~linear,
         .color_bits = chunk->color_bits | clip << SPL_COLOR_CLIP,
         .color_base = chunk->color_base,
         .normal_u = chunk->normal_u,

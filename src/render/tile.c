@@ -34,7 +34,13 @@ static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t const
         *count = 3;
         return wide ? "splat_shade64" : "splat_shade";
     }
-    if (slot < SPL_KERNEL_FILL_PULL) {
+    if (slot >= SPL_KERNEL_FILL_LINES && slot < SPL_KERNEL_FILL_PULL) {
+        *count = 2;
+        constants[0] = (slot - SPL_KERNEL_FILL_LINES) / 2;
+        constants[1] = (slot - SPL_KERNEL_FILL_LINES) % 2;
+        return wide ? "fill_lines64" : "fill_lines";
+    }
+    if (slot < SPL_KERNEL_FILL_LINES) {
         *count = 3;
         constants[0] = (slot - SPL_KERNEL_POINTS) / 2 % SPL_SUMS_COUNT;
         constants[1] = (slot - SPL_KERNEL_POINTS) % 2;
@@ -158,7 +164,7 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
+        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || (what->apart && !batch->apart) ||
             (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
             continue;
         bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->page].buffer;
@@ -175,7 +181,7 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_BIND_FRAME] = put_params(tile, slot++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
-            spl_gpu_dispatch(tile->renderer->gpu, batch->clipped && what->clipped ? what->clipped : kernel, bindings,
+            spl_gpu_dispatch(tile->renderer->gpu, batch->apart && what->clipped ? what->clipped : kernel, bindings,
                              (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
         }
     }

@@ -432,13 +432,63 @@ static void what_method_fill_takes_matches(void **state)
     done(dataset);
 }
 
+/* Two wires, points seven pixels apart with a gap of eighty: whole lines, one pixel wide, and nothing between them. */
+static void wires_are_joined_along_themselves(void **state)
+{
+    (void)state;
+    struct make_splat splats[82] = {0};
+    size_t count = 0;
+    for (int wire = 0; wire < 2; wire++)
+        for (int i = 0; i <= 40; i++)
+            if (wire == 0 || i < 18 || i > 28)
+                splats[count++] = (struct make_splat){.position = {0.05 * i - 1, 0, 0.3 * wire + 0.002 * (i % 3)},
+                                                      .normal = {0, -1, 0},
+                                                      .radius = 0.04f,
+                                                      .linear = i != 20,
+                                                      .color = {200, 100, 50}};
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int fill = 0; fill < 2; fill++) {
+        struct spl_view view = looking(origin, 3, 401, 301);
+        const double eye[3] = {0, -3, 0.1}, target[3] = {0, 0, 0.1}, up[3] = {0, 0, 1};
+        struct spl_frame frame;
+        unsigned once = 0;
+        assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+        view.method = fill ? SPL_METHOD_FILL : SPL_METHOD_POINTS;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+        const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels, *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+        int from = (int)(view.camera.cx - view.camera.fx / 3) + 2, to = (int)(view.camera.cx + view.camera.fx / 3) - 2;
+        assert_true(from > 0 && to < 401);
+        for (int x = from; x < to; x++) {
+            unsigned covered = 0;
+            for (int y = 0; y < 301; y++) {
+                covered += coverage[401 * y + x] > 0;
+                assert_true(isnan(depth[401 * y + x]) || fabsf(depth[401 * y + x] - 3) < 1e-3f);
+            }
+            assert_true(covered <= 3); /* 3: the one that is not linear, beside the line */
+            once += covered >= 2;
+        }
+        printf("%s: %u of %d columns have both wires\n", fill ? "fill" : "points", once, to - from);
+        assert_true(fill ? (int)once == to - from : (int)once < (to - from) / 4);
+        spl_frame_finish(&frame);
+        if (fill)
+            same_images(dataset, &view, "wires");
+    }
+    done(dataset);
+}
+
 /* A pixel of method fill is the same in whatever tile it lies, to the bit. */
 static void tiles_of_method_fill_leave_no_seams(void **state)
 {
     struct spl_renderer_options options = {.device = *state, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
-    struct spl_dataset *dataset = random_cube(20000, origin, 0.02);
+    struct make_splat *splats = random_splats(20000, origin, 0.02);
+    for (size_t k = 0; k < 20000; k++)
+        splats[k].linear = k % 5 == 0;
+    struct spl_dataset *dataset = make_dataset(splats, 20000);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
     for (uint32_t side = 1; side <= 2; side++) {
         struct spl_view view = looking(origin, 3, 203, 151);
@@ -660,6 +710,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_splats_match),
         cmocka_unit_test(what_method_fill_takes_matches),
+        cmocka_unit_test(wires_are_joined_along_themselves),
         cmocka_unit_test_prestate(tiles_of_method_fill_leave_no_seams, device),
         cmocka_unit_test(a_wall_that_hides_the_rest_changes_nothing),
         cmocka_unit_test(inside_the_cloud_matches),

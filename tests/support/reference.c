@@ -236,18 +236,23 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     }
 }
 
-static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
+static void project(const struct scene *s, const float p[3], float out[2])
 {
-    float x = (float)s->camera.fx * (d->p[0] / d->p[2]) + (float)s->camera.cx;
-    float y = (float)s->camera.fy * (d->p[1] / d->p[2]) + (float)s->camera.cy;
-    if (!(x >= 0 && y >= 0 && x < (float)s->camera.width && y < (float)s->camera.height))
+    out[0] = (float)s->camera.fx * (p[0] / p[2]) + (float)s->camera.cx;
+    out[1] = (float)s->camera.fy * (p[1] / p[2]) + (float)s->camera.cy;
+}
+
+/* `behind`: steps of depth that are added. */
+static void put(struct scene *s, const float place[2], float z, const struct disc *d, uint32_t low_bits,
+                uint32_t behind)
+{
+    if (!(place[0] >= 0 && place[1] >= 0 && place[0] < (float)s->camera.width && place[1] < (float)s->camera.height))
         return;
-    struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
+    struct sample *at = &s->samples[(size_t)place[1] * s->camera.width + (size_t)place[0]];
     uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
-    float z = d->p[2];
     memcpy(&at->word, &z, 4);
     if (s->view->method == SPL_METHOD_FILL) { /* the low bits of the depth say more */
-        at->word = (at->word & ~SPL_FILL_DEPTH_BITS) | low_bits;
+        at->word = ((at->word & ~SPL_FILL_DEPTH_BITS) | low_bits) + behind * (SPL_FILL_DEPTH_BITS + 1);
         memcpy(&z, &at->word, 4);
     }
     if (z > at->first)
@@ -258,6 +263,34 @@ static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
     if (nearer || d->id < at->id) {
         at->id = d->id;
         memcpy(at->normal_winner, d->n, sizeof d->n);
+    }
+}
+
+static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
+{
+    float place[2];
+    project(s, d->p, place);
+    put(s, place, d->p[2], d, low_bits, 0);
+}
+
+/* From a linear splat to another one, a sample a column or, where the line is upright, a row. */
+static void line(struct scene *s, const struct disc *d, const float to[3], uint32_t low_bits)
+{
+    float a[2], b[2], near = fminf(d->p[2], to[2]), far = fmaxf(d->p[2], to[2]);
+    if (!(near >= (float)s->camera.near && far <= (float)s->camera.far))
+        return;
+    project(s, d->p, a);
+    project(s, to, b);
+    int main_axis = fabsf(b[1] - a[1]) > fabsf(b[0] - a[0]), other = 1 - main_axis;
+    float inverse = 1 / (b[main_axis] - a[main_axis]), w0 = 1 / d->p[2], w1 = 1 / to[2];
+    int size = (int)(main_axis ? s->camera.height : s->camera.width);
+    for (int k = 0; k < size; k++) {
+        float t = ((float)k + 0.5f - a[main_axis]) * inverse, place[2];
+        if (t < 0 || t > 1)
+            continue;
+        place[main_axis] = (float)k;
+        place[other] = a[other] + t * (b[other] - a[other]);
+        put(s, place, 1 / (w0 + t * (w1 - w0)), d, low_bits, t > 0.5f);
     }
 }
 
@@ -280,6 +313,25 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
     uint32_t texture = spl_dataset_get_chunk_textures(s->dataset)[index];
     spl_texture_decode(s->textures + spl_texture_word(texture), spl_texture_planes(texture), chunk->count, &s->code);
     s->coded = chunk;
+}
+
+/* To the linear splats of the chunk that splat `index` is joined with. */
+static void lines(struct scene *s, const struct spl_draw_chunk *draw, const struct spl_chunk *chunk,
+                  const uint32_t *page, uint32_t index, float radius, const struct disc *d, uint32_t low_bits)
+{
+    struct spl_splat splats[SPL_CHUNK_SPLATS];
+    uint32_t count = draw->count & ((1u << SPL_COUNT_BITS) - 1), next[2];
+    for (uint32_t i = 0; i < count; i++)
+        spl_chunk_decode(chunk, page, i, &splats[i]);
+    reference_fill_join(splats, count, index, radius, next);
+    for (int side = 0; side < 2 && next[side] != index; side++) {
+        float to[3];
+        to_view(&s->camera, splats[next[side]].position, to);
+        to[0] += draw->origin_x;
+        to[1] += draw->origin_y;
+        to[2] += draw->origin_z;
+        line(s, d, to, low_bits);
+    }
 }
 
 static void for_each_disc(struct scene *s, bool shade)
@@ -325,12 +377,14 @@ static void for_each_disc(struct scene *s, bool shade)
             if (!(d.p[2] >= (float)s->camera.near && d.p[2] <= (float)s->camera.far))
                 continue;
             double median = spl_dataset_get_info(s->dataset)->splat_radius;
+            float radius = fminf(splat.radius, SPL_FILL_STRAY * draw->radius_min);
+            uint32_t low_bits = reference_fill_code(radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0);
             if (s->view->method != SPL_METHOD_SPLAT)
-                point(s, &d,
-                      reference_fill_code(fminf(splat.radius, SPL_FILL_STRAY * draw->radius_min), median) << 1 |
-                          (splat.linear ? SPL_FILL_LINEAR : 0));
+                point(s, &d, low_bits);
             else
                 depth_disc(s, &d, shade);
+            if (s->view->method == SPL_METHOD_FILL && splat.linear)
+                lines(s, draw, &local, page, index, radius, &d, low_bits);
         }
     }
 }
@@ -468,6 +522,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                        .lod = view->lod,
                                        .low_pass = SPL_LOW_PASS,
                                        .resident = always,
+                                       .lines = view->method == SPL_METHOD_FILL,
                                        .points = view->method != SPL_METHOD_SPLAT,
                                        .textured = always,
                                        .atoms = spl_view_is_textured(view) ? view->atoms : 0};

@@ -82,6 +82,27 @@ static void test_wire_over_a_plane(void **state)
     assert_true(share[0] == 0 && share[1] > 0.95);
 }
 
+/* Scanned in stretches too short to be told from anything else. */
+static void test_wire_with_gaps(void **state)
+{
+    (void)state;
+    double share[2];
+    struct cloud *c = new_cloud(0.005);
+    add_plane(c, 20, 0.1, 0.1, 0);
+    size_t split = c->count;
+    for (double x = -9; x < 9; x += 2.2)
+        add_line(c, (double[3]){x, 0.1 * x, 3}, (double[3]){x + 0.7, 0.1 * x + 0.07, 3}, 0.1);
+    shares(c, split, share);
+    assert_true(share[0] == 0 && share[1] > 0.9);
+    c = new_cloud(0.005); /* the same stretches, none of which goes on where another ends */
+    add_plane(c, 20, 0.1, 0.1, 0);
+    split = c->count;
+    for (double x = -9; x < 9; x += 2.2)
+        add_line(c, (double[3]){x, fmod(3 * x, 7), 3}, (double[3]){x + 0.7, fmod(3 * x, 7) + 0.07, 3}, 0.1);
+    shares(c, split, share);
+    assert_true(share[0] == 0 && share[1] == 0);
+}
+
 /* As thick as three cells of the finest level, seen all round; its foot may count as the plane's. */
 static void test_pole(void **state)
 {
@@ -226,6 +247,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_wire_over_a_plane),
+        cmocka_unit_test(test_wire_with_gaps),
         cmocka_unit_test(test_pole),
         cmocka_unit_test(test_edges_of_planes),
         cmocka_unit_test(test_crossing_wires),
