@@ -172,6 +172,8 @@ void spl_texture_compare(const struct spl_photo *photo, const struct spl_tone *t
             high[k] = fmin(fmax(high[k], pixel[k]), k ? camera->height : camera->width);
         }
     }
+    error->sides += fmax(fmax(high[0] - low[0], high[1] - low[1]), 0);
+    error->splats++;
     double n[3] = {f.u[1] * f.v[2] - f.u[2] * f.v[1], f.u[2] * f.v[0] - f.u[0] * f.v[2],
                    f.u[0] * f.v[1] - f.u[1] * f.v[0]};
     double square = f.u[0] * f.u[0] + f.u[1] * f.u[1] + f.u[2] * f.u[2];

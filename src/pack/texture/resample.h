@@ -23,6 +23,8 @@ bool spl_texture_resample(const struct spl_photo *photo, const struct spl_tone *
 struct spl_resample_error {
     double squared; /* sum over channels, of 255 */
     uint64_t values;
+    double sides; /* sum over splats: the longer side of the square's box in the photograph, pixels */
+    uint64_t splats;
 };
 
 /* Adds, for every pixel of the photograph whose centre lies on the splat's disc, how far the bilinear texture is from

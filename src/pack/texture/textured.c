@@ -16,8 +16,13 @@ enum { splats_compared = 4000 };
  * and texels that are four times as many cost more bytes than they show. */
 static const double resampling_slack = 2; /* dB */
 
+/* Texels a pixel of the photograph from which on finer ones hold nothing that it shows: what they still gain in
+ * resampling is lost again by eight atoms that have four times as much to say. */
+static const double texels_enough = 1.25;
+
 /* Leaves are what is looked at closely; those of the photograph that most splats chose stand for all. The smallest
- * size whose resampling loses hardly more than coding will; the largest where there is no pixel to tell by. */
+ * size whose resampling loses hardly more than coding will, or that has texels enough; the largest where there is no
+ * pixel to tell by. */
 static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
 {
     double quality = pass->options->texture_quality > 0 ? pass->options->texture_quality : 40;
@@ -37,7 +42,9 @@ static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *da
         double mean = error[k].squared / fmax((double)error[k].values, 1);
         pass->report->texture_size = 8u << k;
         pass->report->resampling_psnr = !error[k].values ? NAN : mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
-        if (pass->report->resampling_psnr > quality - resampling_slack)
+        double side = error[k].sides / fmax((double)error[k].splats, 1);
+        if (pass->report->resampling_psnr > quality - resampling_slack ||
+            (error[k].values && pass->report->texture_size >= texels_enough * side))
             break;
     }
     return SPL_OK;

@@ -371,6 +371,8 @@ static void textures_show_the_plane_and_not_the_view(void **state)
     struct spl_resample_error error = {0}, coarse = {0};
     spl_texture_compare(&photo, &tone, &splat, 32, texture, &error);
     assert_true(error.values > 3 * 300 && 10 * log10(65025 * (double)error.values / error.squared) > 50);
+    double pixels_of_disc = (double)error.values / 3; /* pi / 4 of its square's */
+    assert_true(error.splats == 1 && fabs(error.sides - sqrt(pixels_of_disc * 4 / 3.14159)) < 0.2 * error.sides);
     memset(texture, 128, 3 * 64);
     spl_texture_compare(&photo, &tone, &splat, 8, texture, &coarse);
     assert_true(coarse.values == error.values && coarse.squared > 100 * error.squared);
