@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
- * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to one
- * reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
+ * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
+ * one reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -57,8 +57,9 @@ const struct spl_cloud_info *spl_cloud_get_info(const struct spl_cloud *cloud);
 /* Bytes of the file consumed so far, for progress. */
 uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
 
-/* Fills the next batch (overwriting it): 1 = batch.count > 0 points, 0 = end, negative = error. Points with a non-finite
- * coordinate are skipped and counted. A file with no usable point ends with 0 at once: the caller decides. */
+/* Fills the next batch (overwriting it): 1 = batch.count > 0 points, 0 = end, negative = error. Points with a
+ * non-finite coordinate are skipped and counted. A file with no usable point ends with 0 at once: the caller decides.
+ */
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
 
 /* NULL-safe. */

@@ -18,8 +18,8 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
  * overwritten in place since. Any thread; blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
-/* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, the words of CTEX (one a chunk) are
- * NULL then. */
+/* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, the words of CTEX (one a
+ * chunk) are NULL then. */
 const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset);
 const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset);
 

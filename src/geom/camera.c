@@ -1,8 +1,8 @@
 /* Pinhole cameras from look-at, matrix and COLMAP form, and the projection they mean.
  *
- * Everything is double and relative to the eye: at UTM coordinates the subtraction p - eye is exact, so a distant origin
- * costs no accuracy. Poses are stored as a rotation that is orthonormal to rounding, whatever precision it came in.
- * Pure functions; any thread. */
+ * Everything is double and relative to the eye: at UTM coordinates the subtraction p - eye is exact, so a distant
+ * origin costs no accuracy. Poses are stored as a rotation that is orthonormal to rounding, whatever precision it came
+ * in. Pure functions; any thread. */
 #include <splatd/camera.h>
 
 #include <math.h>

@@ -71,8 +71,8 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
 int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const json_t *json, const char *name,
                         struct spl_error *err);
 
-/* A form (gltf, open3d, ros, nerfstudio), itself claimed by the caller, to the values that it stands for; these are claimed here.
- * `json` is borrowed. Errors name the member: "gltf.perspective.yfov". */
+/* A form (gltf, open3d, ros, nerfstudio), itself claimed by the caller, to the values that it stands for; these are
+ * claimed here. `json` is borrowed. Errors name the member: "gltf.perspective.yfov". */
 int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum spl_camera_param form,
                               const json_t *json, struct spl_error *err);
 

@@ -1,5 +1,6 @@
-/* Listing the devices of every backend, and opening the one that is asked for. A device is used only after the self-test
- * kernels gave the right answers on it; when none is left, the error names each and why. Any thread may list. */
+/* Listing the devices of every backend, and opening the one that is asked for. A device is used only after the
+ * self-test kernels gave the right answers on it; when none is left, the error names each and why. Any thread may list.
+ */
 #include "gpu/backend.h"
 
 #include <ctype.h>
@@ -63,7 +64,8 @@ static bool matches(const struct spl_device_info *info, const char *wanted)
     size_t length = strlen(info->backend);
     if (!wanted || !strcmp(wanted, "auto") || !strcmp(wanted, info->backend))
         return true;
-    if (!strncmp(wanted, info->backend, length) && wanted[length] == ':' && isdigit((unsigned char)wanted[length + 1])) {
+    if (!strncmp(wanted, info->backend, length) && wanted[length] == ':' &&
+        isdigit((unsigned char)wanted[length + 1])) {
         char *end;
         return strtoul(wanted + length + 1, &end, 10) == info->index && !*end;
     }

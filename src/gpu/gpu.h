@@ -41,7 +41,8 @@ struct spl_gpu_limits {          /* 0 = cannot */
 /* Opens the device that options->device names, else the first usable one: GPUs before software, Vulkan before EGL. Runs
  * the self-test kernel. On failure the message names every device and why it was not used. */
 int spl_gpu_open(const struct spl_gpu_options *options, struct spl_gpu **out, struct spl_error *err);
-void spl_gpu_close(struct spl_gpu *gpu); /* NULL-safe; waits (bounded) for what runs; buffers and kernels must be gone */
+/* NULL-safe; waits (bounded) for what runs; buffers and kernels must be gone. */
+void spl_gpu_close(struct spl_gpu *gpu);
 
 const struct spl_device_info *spl_gpu_get_device(const struct spl_gpu *gpu);
 const struct spl_gpu_limits *spl_gpu_get_limits(const struct spl_gpu *gpu);
@@ -67,9 +68,10 @@ void spl_gpu_buffer_destroy(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer);
 void *spl_gpu_buffer_map(struct spl_gpu_buffer *buffer); /* UPLOAD and READBACK: mapped for the buffer's whole life */
 uint64_t spl_gpu_buffer_get_bytes(const struct spl_gpu_buffer *buffer);
 
-/* Kernels are embedded at build time under their file's stem ("depth" for shaders/depth.comp, its 64-bit-atomics variant
- * is "depth64"; shaders/meson.build lists them). Specialisation constants are 32 bit with ids 0..count-1; those that a
- * kernel does not declare are ignored. SPL_E_UNSUPPORTED without limits.atomics_64 where a kernel needs them on EGL. */
+/* Kernels are embedded at build time under their file's stem ("depth" for shaders/depth.comp, its 64-bit-atomics
+ * variant is "depth64"; shaders/meson.build lists them). Specialisation constants are 32 bit with ids 0..count-1; those
+ * that a kernel does not declare are ignored. SPL_E_UNSUPPORTED without limits.atomics_64 where a kernel needs them on
+ * EGL. */
 enum { SPL_GPU_CONSTANTS_MAX = 8 };
 int spl_gpu_kernel_create(struct spl_gpu *gpu, const char *name, const uint32_t *constants, size_t constant_count,
                           struct spl_gpu_kernel **out, struct spl_error *err);
@@ -81,8 +83,8 @@ struct spl_gpu_binding {
     uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
 };
 
-/* Recording. One list at a time: begin … submit. Lists run in order, each seeing all that the one before wrote. Errors of recording (bad ranges are our bugs: assertions) surface at
- * submit. */
+/* Recording. One list at a time: begin … submit. Lists run in order, each seeing all that the one before wrote. Errors
+ * of recording (bad ranges are our bugs: assertions) surface at submit. */
 int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
 void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
                       const struct spl_gpu_binding bindings[SPL_BIND_COUNT], uint32_t workgroups);

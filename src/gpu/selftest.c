@@ -1,6 +1,7 @@
 /* The self-test at open: a small kernel touches every binding, every field of the shared structs, every specialisation
  * constant and each kind of atomic that our kernels use, and each word it writes is compared with what C says. A driver
- * that miscompiles or lays out differently is refused here, with the first wrong word, instead of rendering nonsense. */
+ * that miscompiles or lays out differently is refused here, with the first wrong word, instead of rendering nonsense.
+ */
 #include "gpu/backend.h"
 
 #include <inttypes.h>

@@ -1,7 +1,7 @@
-/* Measures frames so that the figures can be compared on a machine whose speed wanders: nothing is measured in a block of
- * its own. At each place of the path the calibrator runs, then every row renders one frame; a row's units are quotients of
- * neighbours in time. Pages are preloaded and two frames a row rendered before anything counts.
- * Owned by one thread, which owns all renderers. */
+/* Measures frames so that the figures can be compared on a machine whose speed wanders: nothing is measured in a block
+ * of its own. At each place of the path the calibrator runs, then every row renders one frame; a row's units are
+ * quotients of neighbours in time. Pages are preloaded and two frames a row rendered before anything counts. Owned by
+ * one thread, which owns all renderers. */
 #include "measure/bench.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/* Camera paths: eye, target and field of view go linearly from one view to the other, and the eye turns about the target
- * on the way where the path says so. Pure functions but for the file that is read; any thread. */
+/* Camera paths: eye, target and field of view go linearly from one view to the other, and the eye turns about the
+ * target on the way where the path says so. Pure functions but for the file that is read; any thread. */
 #include "measure/path.h"
 
 #include <jansson.h>

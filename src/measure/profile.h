@@ -1,5 +1,5 @@
-/* What each setting costs and how accurate it is, measured for one dataset on one device by 'splatd bench': stored beside
- * the dataset as NAME.profile.json (api/profile.md), read by the service's planner. */
+/* What each setting costs and how accurate it is, measured for one dataset on one device by 'splatd bench': stored
+ * beside the dataset as NAME.profile.json (api/profile.md), read by the service's planner. */
 #ifndef SPL_MEASURE_PROFILE_H
 #define SPL_MEASURE_PROFILE_H
 
@@ -64,9 +64,9 @@ int spl_profile_init(struct spl_profile *profile, const struct spl_dataset_info 
                      const struct spl_device_info *device, size_t count, struct spl_error *err);
 void spl_profile_finish(struct spl_profile *profile);
 
-/* The line through a setting's median times at one or more sizes, for fixed_ms and ms_per_mpx: least squares in relative
- * error, neither term negative. With one size a quarter of the time is taken as fixed; the planner corrects it as other sizes
- * are asked for. count >= 1, mpx and ms > 0. */
+/* The line through a setting's median times at one or more sizes, for fixed_ms and ms_per_mpx: least squares in
+ * relative error, neither term negative. With one size a quarter of the time is taken as fixed; the planner corrects it
+ * as other sizes are asked for. count >= 1, mpx and ms > 0. */
 void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, double *fixed_ms, double *ms_per_mpx);
 
 /* Sets `front` of every point, from ms and psnr. Points without a PSNR are not on it. */

@@ -16,9 +16,9 @@ struct spl_report {
 };
 
 /* Times of a setting: median over the repeats of each view, then median (ms) and 90 % quantile (ms_q90) over the views.
- * psnr, psnr_sd, psnr_q05: of the views' own PSNR (psnr_overall, in JSON and CSV: of the mean of their square errors, which
- * is lower the more the views differ). Other measures: means over the views that have them, depth_rmse the root of
- * the mean of squares. Equal images count as SPL_PROFILE_PSNR_MAX. On failure *report is zeroed. */
+ * psnr, psnr_sd, psnr_q05: of the views' own PSNR (psnr_overall, in JSON and CSV: of the mean of their square errors,
+ * which is lower the more the views differ). Other measures: means over the views that have them, depth_rmse the root
+ * of the mean of squares. Equal images count as SPL_PROFILE_PSNR_MAX. On failure *report is zeroed. */
 int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, struct spl_error *err);
 void spl_report_finish(struct spl_report *report);
 

@@ -23,8 +23,8 @@ void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t spla
 /* The largest cell. Call once, after the last add. */
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy);
 
-/* The largest weight of a fragment such that the sums over `splats` splats stay below 2^32: each adds at most 512 weight
- * to any word (shaders/splat_shade.comp). 0 when even weight 1 is too much. */
+/* The largest weight of a fragment such that the sums over `splats` splats stay below 2^32: each adds at most 512
+ * weight to any word (shaders/splat_shade.comp). 0 when even weight 1 is too much. */
 uint32_t spl_occupancy_weight(uint64_t splats);
 
 #endif

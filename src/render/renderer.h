@@ -37,8 +37,8 @@ struct spl_scratch {
     struct spl_gpu_buffer *depth;    /* 4 bytes a sample; 8 with 64 bit atomics (method points) */
     struct spl_gpu_buffer *sums;     /* 16 bytes a sample */
     struct spl_gpu_buffer *ids;      /* 4 bytes a sample, and room for the summed textures of a run */
-    struct spl_gpu_buffer *output;   /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
-                                        write where the host reads */
+    struct spl_gpu_buffer *output; /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
+                                      write where the host reads */
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
     struct spl_gpu_buffer *params;   /* slots of SPL_PARAMS_STRIDE, one a dispatch */
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
@@ -113,8 +113,8 @@ void spl_tile_stamp(struct spl_tile *tile, enum spl_stage stage);
 /* A method is one row of this table: it records everything from the cleared scratch to the resolved layers. */
 struct spl_method_ops {
     const char *name;
-    /* The group of layers that one run of `record` serves is all layers with the same SPL_SUMS_*. `first` is true for the
-     * frame's first group. */
+    /* The group of layers that one run of `record` serves is all layers with the same SPL_SUMS_*. `first` is true for
+     * the frame's first group. */
     int (*record)(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err);
 };
 extern const struct spl_method_ops spl_method_splat, spl_method_points, spl_method_fill;

@@ -1,5 +1,5 @@
-/* Which pages of which datasets are on the device. Pages are loaded when a view asks for them and evicted, least recently
- * drawn first, when the device's memory limit refuses another. Bookkeeping of the renderer's thread. */
+/* Which pages of which datasets are on the device. Pages are loaded when a view asks for them and evicted, least
+ * recently drawn first, when the device's memory limit refuses another. Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
@@ -15,8 +15,8 @@ struct spl_resident_page {
     uint64_t last_frame;           /* when it was last asked for */
 };
 
-/* A dataset's slots: its pages; where it has textures, as many of their codes by page, and one of the dictionary. Each comes
- * and goes on its own. */
+/* A dataset's slots: its pages; where it has textures, as many of their codes by page, and one of the dictionary. Each
+ * comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
@@ -61,7 +61,8 @@ uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident);
 /* Starts a frame: what was asked for before may be evicted again. */
 void spl_residency_begin_frame(struct spl_residency *residency);
 
-/* A buffer of `bytes` for the renderer itself, evicting pages that this frame has not asked for as the limit demands. */
+/* A buffer of `bytes` for the renderer itself, evicting pages that this frame has not asked for as the limit demands.
+ */
 int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
                               struct spl_gpu_buffer **out, struct spl_error *err);
 

@@ -1,6 +1,6 @@
-/* Asks the kernel how much a connection has sent, which is right whoever made the reply: a buffer, a stream, a file. In a
- * file of its own because the kernel's struct tcp_info, which has these members, and the C library's, which does not and
- * which uv.h brings, cannot be seen in one place. Any thread. */
+/* Asks the kernel how much a connection has sent, which is right whoever made the reply: a buffer, a stream, a file. In
+ * a file of its own because the kernel's struct tcp_info, which has these members, and the C library's, which does not
+ * and which uv.h brings, cannot be seen in one place. Any thread. */
 #include "service/sent_bytes.h"
 
 #include <linux/tcp.h>

@@ -1,5 +1,5 @@
-/* The files that scans are written to: a header, perhaps one for each pass, then a record for each return (or, structured,
- * for each pulse). Pure functions; any thread. */
+/* The files that scans are written to: a header, perhaps one for each pass, then a record for each return (or,
+ * structured, for each pulse). Pure functions; any thread. */
 #ifndef SPL_SYNTH_FORMAT_H
 #define SPL_SYNTH_FORMAT_H
 
@@ -21,8 +21,8 @@ struct spl_scan_format {
     const char *name;             /* and extension */
     bool structured;              /* a record a pulse, in the station's frame: terrestrial scanners only */
     size_t record_max;            /* bytes */
-    /* These return the bytes they put at `to`. The file's header (may be NULL) has one length whatever is in it, so that it
-     * can be written again when the points are counted. */
+    /* These return the bytes they put at `to`. The file's header (may be NULL) has one length whatever is in it, so
+     * that it can be written again when the points are counted. */
     size_t (*header)(char *to, const struct spl_scan_file *file);
     size_t (*pass_header)(char *to, const struct spl_scan_file *file, size_t pass); /* may be NULL */
     size_t (*record)(char *to, const struct spl_scan_file *file, const struct spl_return *r);

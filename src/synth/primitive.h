@@ -9,7 +9,7 @@ enum spl_primitive_kind {
     SPL_PRIMITIVE_RECTANGLE, /* |(p - center).u| <= half[0], |(p - center).v| <= half[1] in the plane through center */
     SPL_PRIMITIVE_DISC,      /* radius half[0] around center in that plane */
     SPL_PRIMITIVE_SPHERE,    /* radius half[0] around center */
-    SPL_PRIMITIVE_CONE,      /* side of a truncated cone: radius half[0] at center, half[1] at center + length * normal */
+    SPL_PRIMITIVE_CONE, /* side of a truncated cone: radius half[0] at center, half[1] at center + length * normal */
 };
 
 struct spl_primitive {

@@ -1,7 +1,7 @@
 /* Simulated laser scanners: which pulses they send, what comes back, and how fine they must scan for so many points.
  *
- * A scan is a grid of pulses for each of the scene's stations (`pass`): columns of rows. What a column is depends on the
- * scanner: an azimuth, a revolution of the head, a line across the swath, a part of the sweep. All randomness is a
+ * A scan is a grid of pulses for each of the scene's stations (`pass`): columns of rows. What a column is depends on
+ * the scanner: an azimuth, a revolution of the head, a line across the swath, a part of the sweep. All randomness is a
  * function of (seed, pass, column, row), so a scan does not depend on the number of threads. Any thread. */
 #ifndef SPL_SYNTH_SCANNER_H
 #define SPL_SYNTH_SCANNER_H
@@ -18,9 +18,9 @@ struct spl_scan_faults {
     uint64_t seed;
     double noise;                /* sigma of the range, metres */
     double mixed;                /* share of the pulses on an edge whose range lies between both surfaces */
-    double dropout;              /* share S of returns that are lost where a surface of mid-grey is hit square on within the
-                                    scanner's range; in general 1 - (1 - S)^w, w = w_colour w_angle w_range, each at least
-                                    1: 0.5 / albedo, 1 / cos(incidence), (distance / range)^2 */
+    double dropout; /* share S of returns that are lost where a surface of mid-grey is hit square on within the
+                       scanner's range; in general 1 - (1 - S)^w, w = w_colour w_angle w_range, each at least
+                       1: 0.5 / albedo, 1 / cos(incidence), (distance / range)^2 */
     double misregister;          /* metres by which each pass's pose is off, in a direction of its own */
 };
 
@@ -48,10 +48,11 @@ void spl_scanner_spacing(const struct spl_scene *scene, const struct spl_scan_gr
                          uint64_t row, double steps[2][3]);
 
 /* The measurement of one pulse: the number of returns, nearest first; 0 for sky. Without faults and for scanners of one
- * return the beam is its central ray. Else it is seven rays over the footprint: surfaces more than half a metre apart are
- * separate returns of a scanner that has several; where rays of one return hit two surfaces more than two footprints
- * apart, a share `mixed` of them lies anywhere between, with a colour between. All lie on the central ray. Colours are
- * means over the surface between a pulse and the next ones (footprint.h). `returns` may be NULL: they are counted. */
+ * return the beam is its central ray. Else it is seven rays over the footprint: surfaces more than half a metre apart
+ * are separate returns of a scanner that has several; where rays of one return hit two surfaces more than two
+ * footprints apart, a share `mixed` of them lies anywhere between, with a colour between. All lie on the central ray.
+ * Colours are means over the surface between a pulse and the next ones (footprint.h). `returns` may be NULL: they are
+ * counted. */
 unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_grid *grid,
                           const struct spl_scan_faults *faults, size_t pass, uint64_t column, uint64_t row,
                           struct spl_return returns[SPL_SCANNER_RETURNS_MAX]);

@@ -1,8 +1,8 @@
 /* An analytic scene: primitives with materials, the scanner that samples it, sample cameras, and exact answers to rays.
  *
- * A scene is modelled near the origin, in metres, z up. What is written for others to read (points, poses, views) lies at
- * world = scene + spl_scene.offset.
- * Built once, then read-only: every call but create and destroy may run on any thread at once. */
+ * A scene is modelled near the origin, in metres, z up. What is written for others to read (points, poses, views) lies
+ * at world = scene + spl_scene.offset. Built once, then read-only: every call but create and destroy may run on any
+ * thread at once. */
 #ifndef SPL_SYNTH_SCENE_H
 #define SPL_SYNTH_SCENE_H
 
@@ -17,13 +17,13 @@
 
 enum spl_scanner_kind {
     SPL_SCANNER_TERRESTRIAL, /* each station is a tripod: a spherical grid of rays around it, -60 to +90 degrees */
-    SPL_SCANNER_MOBILE,      /* each station is a head on a vehicle (x forward, y left, z up, origin on the track), which
-                                turns around its z axis while the vehicle follows the track at constant speed */
-    SPL_SCANNER_AIRBORNE,    /* each station is the start of a flight line of `length` along its x axis, scanned in lines
-                                across: from -half_angle to +half_angle around -z */
-    SPL_SCANNER_SWEEP,       /* each station is the corner of a rectangle, `length` along its x axis by `width` along y,
-                                from which parallel beams leave along -z, their number per square metre growing
-                                `growth`-fold from x = 0 to the end, exponentially */
+    SPL_SCANNER_MOBILE,   /* each station is a head on a vehicle (x forward, y left, z up, origin on the track), which
+                             turns around its z axis while the vehicle follows the track at constant speed */
+    SPL_SCANNER_AIRBORNE, /* each station is the start of a flight line of `length` along its x axis, scanned in lines
+                             across: from -half_angle to +half_angle around -z */
+    SPL_SCANNER_SWEEP,    /* each station is the corner of a rectangle, `length` along its x axis by `width` along y,
+                             from which parallel beams leave along -z, their number per square metre growing
+                             `growth`-fold from x = 0 to the end, exponentially */
 };
 
 struct spl_station {

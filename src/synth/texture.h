@@ -28,7 +28,8 @@ struct spl_material {
     double grain;   /* 0..1, strength of the noise */
     uint32_t seed;
     double finest;         /* shortest wave of the noise, metres; 0 = 16 mm */
-    const char (*text)[SPL_PLAQUE_LETTERS + 1]; /* of a plaque: SPL_PLAQUE_LINES lines of A to Z; NULL = an inscription */
+    const char (
+        *text)[SPL_PLAQUE_LETTERS + 1]; /* of a plaque: SPL_PLAQUE_LINES lines of A to Z; NULL = an inscription */
 };
 
 /* The colour of `primitive` at a point of its surface: sRGB levels 0..255, not rounded. Any thread. */

@@ -5,8 +5,8 @@
  *   golden --self-test   the comparison finds what was planted
  *   golden --update      writes images/ anew (Vulkan); look at them before they are committed
  *
- * Verdicts: bytes equal (the file), pixels equal (what it decodes to), perceptually equal (within the view's tolerance).
- * Anything else fails and leaves NAME-BACKEND.png and NAME-BACKEND-difference.png in the working folder. */
+ * Verdicts: bytes equal (the file), pixels equal (what it decodes to), perceptually equal (within the view's
+ * tolerance). Anything else fails and leaves NAME-BACKEND.png and NAME-BACKEND-difference.png in the working folder. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -152,8 +152,8 @@ static bool keep_evidence(const char *name, const char *backend, const struct sp
 }
 
 /* One verdict, one line. */
-static bool judge(const char *name, const char *backend, const struct spl_encoded *made, const struct spl_encoded *wanted,
-                  struct tolerance tolerance)
+static bool judge(const char *name, const char *backend, const struct spl_encoded *made,
+                  const struct spl_encoded *wanted, struct tolerance tolerance)
 {
     if (made->length == wanted->length && !memcmp(made->bytes, wanted->bytes, made->length)) {
         printf("  %-18s bytes equal\n", name);
@@ -189,12 +189,14 @@ static bool against_goldens(struct spl_renderer *renderer, const struct spl_data
         golden_path(&goldens[i], path);
         if (!render(renderer, dataset, &view, goldens[i].layer, &made))
             return false;
-        good = read_file(path, &wanted) && judge(goldens[i].name, backend, &made, &wanted, goldens[i].tolerance) && good;
+        good =
+            read_file(path, &wanted) && judge(goldens[i].name, backend, &made, &wanted, goldens[i].tolerance) && good;
         spl_encoded_finish(&made);
         spl_encoded_finish(&wanted);
     }
     if (!good)
-        printf("  Where the change is meant: 'golden --update', look at tests/golden/images, commit them with the change.\n");
+        printf("  Where the change is meant: 'golden --update', look at tests/golden/images, commit them with the "
+               "change.\n");
     return good;
 }
 
@@ -292,8 +294,8 @@ static bool update(struct spl_renderer *renderer, const struct spl_dataset *data
     return true;
 }
 
-/* One pixel one level off is found where equality is asked for, let pass where a level is allowed; a picture shifted by a
- * column never passes; another size never passes. */
+/* One pixel one level off is found where equality is asked for, let pass where a level is allowed; a picture shifted by
+ * a column never passes; another size never passes. */
 static bool self_test(void)
 {
     uint8_t pixels[20 * 10 * 4];

@@ -1,6 +1,6 @@
 /* The GPU layer on a real driver, one body for every backend: opening and refusing, buffers, fill, copy and dispatch
- * against C on random input, specialisation constants, timestamps, deadlines, loss and reopening; with validation layers
- * on throughout, and silent. */
+ * against C on random input, specialisation constants, timestamps, deadlines, loss and reopening; with validation
+ * layers on throughout, and silent. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -465,8 +465,8 @@ static void pipeline_cache_is_only_a_cache(void **state)
     assert_non_null(mkdtemp(folder));
     snprintf(nested, sizeof nested, "%s/a/b", folder);
     spl_gpu_close(open_with((struct spl_gpu_options){.cache_dir = nested}));
-    static const char *const damage[] = {"truncate -s 7 %s/*", "dd if=/dev/urandom of=$(ls %s/*) bs=4k count=1 status=none",
-                                         "truncate -s 0 %s/*"};
+    static const char *const damage[] = {
+        "truncate -s 7 %s/*", "dd if=/dev/urandom of=$(ls %s/*) bs=4k count=1 status=none", "truncate -s 0 %s/*"};
     for (size_t i = 0; i < sizeof damage / sizeof *damage && !strcmp(device, "vulkan"); i++) {
         char broken[128];
         snprintf(broken, sizeof broken, damage[i], nested);

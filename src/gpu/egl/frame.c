@@ -1,5 +1,5 @@
-/* Recording, submission and waiting. OpenGL has no command lists of ours: commands go to the driver as they are recorded,
- * in order, and submit puts a fence behind them. Owned by the device's thread. */
+/* Recording, submission and waiting. OpenGL has no command lists of ours: commands go to the driver as they are
+ * recorded, in order, and submit puts a fence behind them. Owned by the device's thread. */
 #include "gpu/egl/gl.h"
 
 void gl_frames_init(struct gl_gpu *gpu)

@@ -1,5 +1,5 @@
-/* Programs from SPIR-V (GL_ARB_gl_spirv). Vulkan ignores specialisation constants that a kernel does not declare, OpenGL
- * refuses them, so the declared ones are looked up in the code first. Owned by the device's thread. */
+/* Programs from SPIR-V (GL_ARB_gl_spirv). Vulkan ignores specialisation constants that a kernel does not declare,
+ * OpenGL refuses them, so the declared ones are looked up in the code first. Owned by the device's thread. */
 #include "gpu/egl/gl.h"
 
 #include <stdlib.h>

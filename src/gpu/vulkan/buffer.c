@@ -1,5 +1,5 @@
-/* One allocation per buffer: buffers are few, large and live long, so nothing is suballocated. Host-visible buffers stay
- * mapped and are coherent. Owned by the device's thread. */
+/* One allocation per buffer: buffers are few, large and live long, so nothing is suballocated. Host-visible buffers
+ * stay mapped and are coherent. Owned by the device's thread. */
 #include "gpu/vulkan/vk.h"
 
 #include <inttypes.h>

@@ -1,5 +1,5 @@
-/* Opening and closing a Vulkan device, and the backend's table. One compute queue; one descriptor set layout and pipeline
- * layout for every kernel. Owned by the thread that opens it. */
+/* Opening and closing a Vulkan device, and the backend's table. One compute queue; one descriptor set layout and
+ * pipeline layout for every kernel. Owned by the thread that opens it. */
 #include "gpu/vulkan/vk.h"
 
 #include <stdlib.h>
@@ -74,8 +74,8 @@ static int create_device(struct vk_gpu *gpu, bool *atomics_64, struct spl_error 
     vkGetPhysicalDeviceFeatures2(gpu->physical, &have);
     *atomics_64 = have.features.shaderInt64 && have12.shaderBufferInt64Atomics;
 
-    /* Robust access: no dataset, however damaged, makes a kernel touch memory outside its bindings. Timeline semaphores,
-     * synchronization2 and maintenance4 belong to every Vulkan 1.3. */
+    /* Robust access: no dataset, however damaged, makes a kernel touch memory outside its bindings. Timeline
+     * semaphores, synchronization2 and maintenance4 belong to every Vulkan 1.3. */
     VkPhysicalDeviceVulkan13Features want13 = {.sType = have13.sType, .synchronization2 = VK_TRUE,
                                                .maintenance4 = VK_TRUE};
     VkPhysicalDeviceVulkan12Features want12 = {.sType = have12.sType, .pNext = &want13, .timelineSemaphore = VK_TRUE,

@@ -1,5 +1,5 @@
-/* Recording, submission and waiting. Two command buffers take turns; a timeline semaphore carries the ticket of the last
- * list that ended, so polling and waiting need no other state. Owned by the device's thread. */
+/* Recording, submission and waiting. Two command buffers take turns; a timeline semaphore carries the ticket of the
+ * last list that ended, so polling and waiting need no other state. Owned by the device's thread. */
 #include "gpu/vulkan/vk.h"
 
 int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err)

@@ -1,6 +1,6 @@
-/* Pipelines, and their cache on disk: one file per device and driver, written to a temporary name and renamed, so that a
- * crash or two processes at once never leave half a file. A file that is not ours, or not whole, is ignored.
- * Owned by the device's thread. */
+/* Pipelines, and their cache on disk: one file per device and driver, written to a temporary name and renamed, so that
+ * a crash or two processes at once never leave half a file. A file that is not ours, or not whole, is ignored. Owned by
+ * the device's thread. */
 #include "gpu/vulkan/vk.h"
 
 #include <stdio.h>

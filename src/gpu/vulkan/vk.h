@@ -47,7 +47,8 @@ struct vk_kernel {
     VkPipeline pipeline;
 };
 
-/* instance.c. Borrowed for the life of the process; with `debug` it carries the validation layer where that is installed. */
+/* instance.c. Borrowed for the life of the process; with `debug` it carries the validation layer where that is
+ * installed. */
 int vk_instance_get(bool debug, VkInstance *out, struct spl_error *err);
 
 /* list.c. Fills `err` with `what` and the name of `result`; the code is SPL_E_DEVICE_LOST for a lost device, else

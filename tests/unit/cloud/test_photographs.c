@@ -269,7 +269,8 @@ static void transforms_give_cameras_and_lenses(void **state)
              "{" LENS "\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"aabb_scale\":16,\"frames\":["
              "{\"file_path\":\"./images/f_1.jpg\",\"transform_matrix\":" MATRIX ",\"sharpness\":9},"
              "{\"file_path\":\"images/f_2\",\"transform_matrix\":" MATRIX ",\"k1\":0,\"w\":320,\"fl_x\":250},"
-             "{\"file_path\":\"f_3.png\",\"transform_matrix\":" MATRIX ",\"k1\":0,\"camera_model\":\"OPENCV_FISHEYE\"}]}");
+             "{\"file_path\":\"f_3.png\",\"transform_matrix\":" MATRIX
+             ",\"k1\":0,\"camera_model\":\"OPENCV_FISHEYE\"}]}");
     if (load(&list, at("transforms.json"), NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 3);

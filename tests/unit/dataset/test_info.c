@@ -154,7 +154,8 @@ static void test_textures(void **state)
     spl_dictionary_finish(&dictionary);
     assert_int_equal(run("--json textured.spld", output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL), *textures = json_object_get(json, "textures"), *count;
-    const json_t *bytes = json_object_get(json, "bytes_per_splat"), *counts = json_object_get(textures, "splats_by_atoms");
+    const json_t *bytes = json_object_get(json, "bytes_per_splat"),
+                 *counts = json_object_get(textures, "splats_by_atoms");
     assert_true(number(textures, "atoms") == 10 && number(textures, "size") == 8);
     assert_true(number(bytes, "texture") > 0 && number(bytes, "dictionary") > 16 / 4500.0 &&
                 number(bytes, "dictionary") < 10 * 192 / 4500.0);

@@ -101,7 +101,8 @@ static void axes_point_where_they_should(void **state)
     struct spl_camera camera = make_intrinsics();
     static const double eye[3] = {0, 0, 0}, north[3] = {0, 1, 0}, up[3] = {0, 0, 5};
     assert_int_equal(spl_camera_look_at(&camera, eye, north, up, NULL), 0);
-    static const double east_of_it[3] = {1, 10, 0}, above_it[3] = {0, 10, 1}, behind[3] = {0, -1, 0}, beside[3] = {1, 0, 0};
+    static const double east_of_it[3] = {1, 10, 0}, above_it[3] = {0, 10, 1}, behind[3] = {0, -1, 0},
+                        beside[3] = {1, 0, 0};
     assert_pixel(&camera, east_of_it, 331.25 + 50, 228.5, 10, 1e-12);
     assert_pixel(&camera, above_it, 331.25, 228.5 - 51, 10, 1e-12);
     double pixel[2] = {7, 7}, depth = 7;

@@ -43,7 +43,8 @@ static int load(const char *json, const char *set, struct spl_path *path, struct
     return status;
 }
 
-#define VIEW(eye) "{\"eye\": " eye ", \"target\": [0, 0, 1], \"up\": [0, 0, 1], \"vfov_deg\": 40, \"near\": 0.5, \"far\": 9}"
+#define VIEW(eye)                                                                                                      \
+    "{\"eye\": " eye ", \"target\": [0, 0, 1], \"up\": [0, 0, 1], \"vfov_deg\": 40, \"near\": 0.5, \"far\": 9}"
 #define HALL "\"hall\": {\"overview\": " VIEW("[4, 0, 1]") ", \"close\": " VIEW("[2, 0, 1]") "}"
 
 static void test_path_between_views(void **state)

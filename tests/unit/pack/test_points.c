@@ -170,8 +170,8 @@ static bool has_line(const struct spl_points *p, size_t i)
     return p->clip[i].direction[0] || p->clip[i].direction[1] || p->clip[i].direction[2];
 }
 
-/* A square sheet of a jittered grid: lines of the outermost row alone, outwards, and within a spacing of the border. A closed
- * surface has none. Any number of threads gives the same ones; who wants none gets none. */
+/* A square sheet of a jittered grid: lines of the outermost row alone, outwards, and within a spacing of the border. A
+ * closed surface has none. Any number of threads gives the same ones; who wants none gets none. */
 static void test_lines_at_borders(void **state)
 {
     (void)state;
@@ -181,7 +181,8 @@ static void test_lines_at_borders(void **state)
     for (size_t i = 0; i < count; i++)
         for (int c = 0; c < 2; c++) {
             random = random * 6364136223846793005u + 1442695040888963407u;
-            position[i][c] = ((double)(c ? i / side : i % side) + 0.5 + 0.3 * ((double)(random >> 40) / 0x1p24 - 0.5)) * step;
+            position[i][c] =
+                ((double)(c ? i / side : i % side) + 0.5 + 0.3 * ((double)(random >> 40) / 0x1p24 - 0.5)) * step;
         }
     struct spl_points p = sorted((const double(*)[3])position, count, 2), again, none;
     surface(&p, 2);
