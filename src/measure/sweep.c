@@ -1,6 +1,5 @@
-/* The sweep. Of a view only one reference and one frame are in memory at a time; results are some hundred bytes each. A
- * picture is on disk before the record that vouches for it, so a resumed run has all pictures of what it skips.
- * Owned by one thread, which owns the renderer. */
+/* The sweep. Of a view only one reference and one frame are in memory at a time; results are some hundred bytes each,
+ * kept as they come, so that a run that was stopped goes on. Owned by one thread, which owns the renderer. */
 #include "measure/sweep.h"
 
 #include <errno.h>
@@ -11,29 +10,27 @@
 #include <sys/stat.h>
 
 #include "base/clock.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "measure/calibrator.h"
-#include "measure/error_map.h"
 #include "measure/record.h"
 #include "measure/state.h"
-#include "measure/thumbnail.h"
+#include "measure/steady.h"
+#include "measure/sweep_pictures.h"
 #include "measure/tolerance.h"
 #include "measure/truth.h"
 
-enum { LOSSES_MAX = 3, COMPARE_SAMPLES = 1 << 21 }; /* of one frame */
-#define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S)       /* of rendering: a calibrator takes about 0.1 s */
+enum { COMPARE_SAMPLES = 1 << 21 };           /* of one frame */
+#define CALIBRATE_EVERY_NS (2 * SPL_NS_PER_S) /* of rendering: a calibrator takes about 0.1 s */
 
 struct job {
     struct spl_sweep *sweep;
     const struct spl_sweep_options *options;
-    struct spl_renderer *renderer;
+    struct spl_steady device;
     struct spl_calibrator *calibrator;
     struct spl_tolerance *tolerance;
     struct spl_state *state;
-    uint64_t rendering_ns, calibrated_ns; /* rendering_ns when the calibrator last ran */
-    uint64_t done, total;                 /* frames of this stage */
-    uint64_t scratch_samples;             /* of the renderer that is open, or is to be opened anew */
+    uint64_t calibrated_ns; /* device.rendering_ns when the calibrator last ran */
+    uint64_t done, total;   /* frames of this stage */
 };
 
 struct spl_sweep_accuracy *spl_sweep_get_accuracy(const struct spl_sweep *s, size_t setting, size_t view)
@@ -46,66 +43,6 @@ struct spl_sweep_time *spl_sweep_get_time(const struct spl_sweep *s, size_t sett
 {
     size_t pair = setting * s->options->views->count + view;
     return &s->times[(pair * SPL_SWEEP_SIZES + size) * s->options->repeats + repeat];
-}
-
-size_t spl_sweep_page_views(size_t views)
-{
-    return views < SPL_SWEEP_PAGE_VIEWS ? views : SPL_SWEEP_PAGE_VIEWS;
-}
-
-size_t spl_sweep_page_view(size_t views, size_t i)
-{
-    return i * views / spl_sweep_page_views(views);
-}
-
-static bool has_pictures(size_t views, size_t view)
-{
-    for (size_t i = 0; i < spl_sweep_page_views(views); i++)
-        if (spl_sweep_page_view(views, i) == view)
-            return true;
-    return false;
-}
-
-void spl_sweep_picture_path(const struct spl_sweep_options *o, enum spl_sweep_picture kind, size_t view, size_t setting,
-                            char path[4096])
-{
-    if (kind == SPL_SWEEP_REFERENCE)
-        snprintf(path, 4096, "%s/pictures/view%zu-reference.jpg", o->folder, view);
-    else
-        snprintf(path, 4096, "%s/pictures/view%zu-setting%zu%s.jpg", o->folder, view, setting,
-                 kind == SPL_SWEEP_ERROR ? "-error" : "");
-}
-
-static int save_picture(const struct spl_sweep_options *o, enum spl_sweep_picture kind, size_t view, size_t setting,
-                        const struct spl_image *color, struct spl_error *err)
-{
-    struct spl_encoded encoded;
-    int rc = spl_thumbnail(color, SPL_SWEEP_PICTURE_SIDE, &encoded, err);
-    if (rc)
-        return rc;
-    char path[4096];
-    spl_sweep_picture_path(o, kind, view, setting, path);
-    FILE *file = fopen(path, "w");
-    bool failed = !file || fwrite(encoded.bytes, 1, encoded.length, file) != encoded.length;
-    failed |= file && fclose(file);
-    if (failed)
-        rc = spl_fail_errno(err, errno, "cannot write %s", path);
-    spl_encoded_finish(&encoded);
-    return rc;
-}
-
-/* What a setting's point shows on the page. */
-static int save_pictures(const struct spl_sweep_options *o, size_t view, size_t setting, const struct spl_image *color,
-                         const struct spl_image *truth, struct spl_error *err)
-{
-    struct spl_image map = {0};
-    int rc = save_picture(o, SPL_SWEEP_RENDER, view, setting, color, err);
-    if (!rc)
-        rc = spl_error_map(color, truth, &map, err);
-    if (!rc)
-        rc = save_picture(o, SPL_SWEEP_ERROR, view, setting, &map, err);
-    spl_image_finish(&map);
-    return rc;
 }
 
 static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t view, enum spl_sweep_size size,
@@ -129,70 +66,18 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     c->cy *= y;
 }
 
-static void close_renderer(struct job *job)
-{
-    if (job->renderer)
-        spl_renderer_remove(job->renderer, job->options->dataset);
-    spl_renderer_destroy(job->renderer);
-    job->renderer = NULL;
-}
-
-static int open_renderer(struct job *job, struct spl_error *err)
-{
-    const struct spl_sweep_options *o = job->options;
-    struct spl_renderer_options options = o->renderer;
-    options.scratch_samples = job->scratch_samples;
-    int rc = spl_renderer_create(&options, &job->renderer, err);
-    if (!rc)
-        rc = spl_renderer_add(job->renderer, o->dataset, err);
-    if (!rc)
-        rc = spl_renderer_preload(job->renderer, o->dataset, err);
-    if (!rc)
-        job->sweep->device = *spl_renderer_get_device(job->renderer);
-    return rc;
-}
-
-/* True when a device was lost on the way to `why`, has been opened anew, and the work is worth trying again. A machine
- * that others use too loses a software device whenever a frame waits too long for its turn. */
-static bool recover(struct job *job, const struct spl_error *why, int losses)
-{
-    if ((why->code != SPL_E_DEVICE_LOST && why->code != SPL_E_TIMEOUT) || losses >= LOSSES_MAX)
-        return false;
-    spl_log_warn("%s; opening it anew", why->message);
-    close_renderer(job);
-    return !open_renderer(job, NULL);
-}
-
-/* Renders, and accounts for the time. */
-static int render(struct job *job, const struct spl_view *view, struct spl_frame *frame, double *ms,
-                  struct spl_error *err)
-{
-    for (int losses = 0;; losses++) {
-        struct spl_error why = {0};
-        uint64_t begin = spl_now_ns();
-        int rc = spl_renderer_render(job->renderer, job->options->dataset, view, frame, &why);
-        uint64_t taken = spl_now_ns() - begin;
-        job->rendering_ns += taken;
-        *ms = (double)taken / SPL_NS_PER_MS;
-        if (!rc)
-            return SPL_OK;
-        if (!recover(job, &why, losses))
-            return spl_fail_field(err, rc, why.field, "%s", why.message);
-    }
-}
-
 static int get_reference(struct job *job, size_t view, struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
     for (int losses = 0;; losses++) {
         struct spl_error why = {0};
         uint64_t begin = spl_now_ns();
-        int rc = spl_reference_get(&o->reference, view, job->renderer, o->dataset, images, &why);
+        int rc = spl_reference_get(&o->reference, view, job->device.renderer, o->dataset, images, &why);
         if (o->reference.kind == SPL_REFERENCE_SELF)
-            job->rendering_ns += spl_now_ns() - begin;
+            job->device.rendering_ns += spl_now_ns() - begin;
         if (!rc)
             return SPL_OK;
-        if (!recover(job, &why, losses))
+        if (!spl_steady_recover(&job->device, &why, losses))
             return spl_fail_field(err, rc, why.field, "%s", why.message);
     }
 }
@@ -217,7 +102,7 @@ static int mark_dense(struct job *job, size_t v, struct spl_truth *t, struct spl
     view.lod = 0;
     view.supersample = 1;
     view.layers = 1u << SPL_LAYER_DEPTH;
-    int rc = render(job, &view, &frame, &ms, err);
+    int rc = spl_steady_render(&job->device, &view, &frame, &ms, err);
     if (rc)
         return rc;
     rc = spl_truth_mark_dense(t, &frame.images[SPL_LAYER_DEPTH], err);
@@ -250,7 +135,7 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_t
         view.layers &= ~(1u << SPL_LAYER_NORMAL);
     struct spl_frame frame;
     double ms;
-    int rc = render(job, &view, &frame, &ms, err);
+    int rc = spl_steady_render(&job->device, &view, &frame, &ms, err);
     if (rc)
         return rc;
     spl_tolerance_fill(job->tolerance, &view, &frame.images[SPL_LAYER_ID], &frame.images[SPL_LAYER_DEPTH], 0,
@@ -258,8 +143,8 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_t
     a->splats = (double)frame.stats.splats_drawn;
     a->complete = frame.stats.complete;
     a->dense_share = t->dense_share;
-    if (has_pictures(o->views->count, v))
-        rc = save_pictures(o, v, setting, &frame.images[SPL_LAYER_COLOR], &t->images[SPL_LAYER_COLOR], err);
+    if (spl_sweep_has_pictures(o->views->count, v))
+        rc = spl_sweep_save_pictures(o, v, setting, &frame.images[SPL_LAYER_COLOR], &t->images[SPL_LAYER_COLOR], err);
     if (!rc)
         rc = spl_truth_compare(t, frame.images, &a->metrics, &a->dense, err);
     spl_frame_finish(&frame);
@@ -279,8 +164,8 @@ static int compare_view(struct job *job, size_t v, struct spl_error *err)
         return SPL_OK;
     struct spl_truth t;
     int rc = get_truth(job, v, &t, err);
-    if (!rc && has_pictures(o->views->count, v))
-        rc = save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &t.images[SPL_LAYER_COLOR], err);
+    if (!rc && spl_sweep_has_pictures(o->views->count, v))
+        rc = spl_sweep_save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &t.images[SPL_LAYER_COLOR], err);
     for (size_t s = 0; !rc && s < o->setting_count; s++) {
         if (spl_sweep_get_accuracy(job->sweep, s, v)->done)
             continue;
@@ -308,12 +193,12 @@ static int compare_all(struct job *job, struct spl_error *err)
 
 static int calibrate(struct job *job, struct spl_error *err)
 {
-    if (job->calibrated_ns && job->rendering_ns - job->calibrated_ns < CALIBRATE_EVERY_NS)
+    if (job->calibrated_ns && job->device.rendering_ns - job->calibrated_ns < CALIBRATE_EVERY_NS)
         return SPL_OK;
     json_t *record = spl_record_calibrator(spl_calibrator_run(job->calibrator));
     if (record && !spl_record_take(job->sweep, record))
         return spl_fail(err, SPL_E_NOMEM, "out of memory: the calibrator's time could not be kept");
-    job->calibrated_ns = job->rendering_ns ? job->rendering_ns : 1;
+    job->calibrated_ns = job->device.rendering_ns ? job->device.rendering_ns : 1;
     return spl_state_add(job->state, record, err);
 }
 
@@ -323,7 +208,7 @@ static int time_frame(struct job *job, size_t setting, size_t v, enum spl_sweep_
     struct spl_view view;
     struct spl_frame frame;
     fill_view(job->options, setting, v, size, &view);
-    int rc = render(job, &view, &frame, &t->ms, err);
+    int rc = spl_steady_render(&job->device, &view, &frame, &t->ms, err);
     if (rc)
         return rc;
     const struct spl_frame_stats *s = &frame.stats;
@@ -377,9 +262,9 @@ static int time_all(struct job *job, struct spl_error *err)
         job->total += !job->sweep->times[i].done;
     if (!job->total)
         return SPL_OK;
-    close_renderer(job);
-    job->scratch_samples = o->renderer.scratch_samples;
-    int rc = open_renderer(job, err);
+    spl_steady_close(&job->device);
+    job->device.scratch_samples = o->renderer.scratch_samples;
+    int rc = spl_steady_open(&job->device, err);
     if (!rc)
         rc = warm_up(job, err);
     for (size_t repeat = 0; !rc && repeat < o->repeats; repeat++)
@@ -388,8 +273,7 @@ static int time_all(struct job *job, struct spl_error *err)
     return rc;
 }
 
-/* ----------------------------------------------------------------------------------------------------------- the run
- */
+/* --------------------------------------------------------------------------------------------------------- the run */
 
 static int make_folder(const char *path, struct spl_error *err)
 {
@@ -441,12 +325,17 @@ int spl_sweep_run(const struct spl_sweep_options *options, struct spl_sweep *swe
     *sweep = (struct spl_sweep){.options = options};
     /* A frame of all layers, or of 16 samples a pixel, is many times the work of what is timed: in small tiles none of
      * it keeps the device beyond its deadline. */
-    struct job job = {.sweep = sweep, .options = options, .scratch_samples = COMPARE_SAMPLES};
+    struct job job = {
+        .sweep = sweep,
+        .options = options,
+        .device = {.options = &options->renderer, .dataset = options->dataset, .scratch_samples = COMPARE_SAMPLES}};
     int rc = spl_reference_check(&options->reference, &reference_hash, err);
     if (!rc)
         rc = allocate(sweep, err);
     if (!rc)
-        rc = open_renderer(&job, err);
+        rc = spl_steady_open(&job.device, err);
+    if (!rc)
+        sweep->device = *spl_renderer_get_device(job.device.renderer);
     if (!rc)
         rc = open_state(&job, reference_hash, err);
     if (!rc)
@@ -457,11 +346,11 @@ int spl_sweep_run(const struct spl_sweep_options *options, struct spl_sweep *swe
         rc = compare_all(&job, err);
     if (!rc)
         rc = time_all(&job, err);
-    close_renderer(&job);
+    spl_steady_close(&job.device);
     spl_calibrator_destroy(job.calibrator);
     spl_tolerance_destroy(job.tolerance);
     spl_state_close(job.state);
-    sweep->rendering_s = (double)job.rendering_ns / SPL_NS_PER_S;
+    sweep->rendering_s = (double)job.device.rendering_ns / SPL_NS_PER_S;
     sweep->seconds = (double)(spl_now_ns() - begin) / SPL_NS_PER_S;
     if (rc)
         spl_sweep_finish(sweep);

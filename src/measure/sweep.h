@@ -42,8 +42,8 @@ struct spl_sweep_accuracy {
     struct spl_metrics dense; /* over pixels where the scan has a point a pixel (measure/dense.h); NAN without exact
                                  depth; never SSIM and halo */
     double dense_share;       /* of the pixels with a true depth, 0..1; NAN as above */
-    double splats; /* drawn */
-    bool complete; /* no coarser nodes stood in */
+    double splats;            /* drawn */
+    bool complete;            /* no coarser nodes stood in */
     bool done;
 };
 
