@@ -38,7 +38,7 @@ struct spl_planner {
         double fixed_ms, ms_per_mpx;
         double psnr, bound; /* mean and lower bound, dB; the mean without a profile is a rank, the bound NAN */
         double learned;     /* ln of this setting's own factor */
-    } * candidates;
+    } *candidates;
     size_t count;
     bool atoms; /* candidates differ in them; else every number of atoms is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
