@@ -1,8 +1,8 @@
-/* The textures of splats whose texels are interpolated, so that they cover more fragments than texels: each summed once, at the level that it is drawn at,
- * for the shade pass behind. SPL_LANES invocations share a splat and take its texels in turn, so that it costs as many sums as
- * it has atoms, not as its chunk has planes; or one takes them all where a texture is so small that decoding the splat is most
- * of the work. What splat n of the dispatch's runs has starts at word n SPL_SUMMED_WORDS; the buffer is that of the ids, which
- * is free between occlusion and the ids' own pass. */
+/* The textures of splats whose texels are interpolated, so that they cover more fragments than texels: each summed once,
+ * at the level that it is drawn at, for the shade pass behind. SPL_LANES invocations share a splat and take its texels in
+ * turn, so that it costs as many sums as it has atoms, not as its chunk has planes; or one takes them all where a texture
+ * is so small that decoding the splat is most of the work. What splat n of the dispatch's runs has starts at word
+ * n SPL_SUMMED_WORDS; the buffer is that of the ids, which is free between occlusion and the ids' own pass. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/texture.glsl"

@@ -1,7 +1,7 @@
-/* A splat's texture: the sum of PLANES atoms at most, read from the codes of src/dataset/texture.c and the dictionary of
- * src/dataset/dictionary.h. The level is the splat's: its texels are half a sample to a sample wide, and the nearest one
- * counts; it has 8 bits a channel. In chunks whose finest are wider than a sample they are interpolated: another kernel, because
- * software drivers run both sides of a branch, of the sums that splat_sum.comp made of them. */
+/* A splat's texture: the sum of PLANES atoms at most, read from the codes of src/dataset/texture.c and the dictionary
+ * of src/dataset/dictionary.h. The level is the splat's: its texels are half a sample to a sample wide, and the nearest
+ * one counts; it has 8 bits a channel. In chunks whose finest are wider than a sample they are interpolated, from the
+ * sums that splat_sum.comp made of them: another kernel, because software drivers run both sides of a branch. */
 #ifndef SPL_TEXTURE_GLSL
 #define SPL_TEXTURE_GLSL
 

@@ -40,7 +40,7 @@ struct spl_scratch {
     struct spl_gpu_buffer *output; /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
                                       write where the host reads */
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
-    struct spl_gpu_buffer *params;   /* slots of SPL_PARAMS_STRIDE, one a dispatch */
+    struct spl_gpu_buffer *params;   /* slots of SPL_PARAMS_STRIDE: the batches', then one a dispatch */
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
     struct spl_gpu_buffer *bounds;   /* struct spl_chunk_bounds[], grown on demand */
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
