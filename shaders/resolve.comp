@@ -1,5 +1,6 @@
 /* Resolve pass: sums or winners of the samples become one word a pixel of one layer (constant 0), for method splat
- * (constant 1 = 0) or points (1). A pixel is the box average of its supersample^2 samples:
+ * (constant 1 = 0) or points (1). A neighbour stands for a speck of method splat. A pixel is the box average of its
+ * supersample^2 samples:
  *   color     RGBA8, straight alpha over the background
  *   depth     float, mean over the samples within 1 % of the nearest one, so that an edge gives no depth in between
  *   range     the same along the ray
@@ -73,10 +74,45 @@ uvec3 sample_color(uint at)
     return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
 }
 
+/* The i-th of the 3 x 3 samples around `at`; outside of the tile `at` itself. */
+uint sample_beside(ivec2 at, int i)
+{
+    ivec2 beside = at + ivec2(i % 3 - 1, i / 3 - 1);
+    return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
+}
+
+/* What stands for sample `at`: itself, or, where it is a speck (empty, and at least seven of the eight around it are not),
+ * the one of those whose depth is closest to their mean: no disc of the surface around happened to reach it. */
+uint standing_for(ivec2 at)
+{
+    uint own = sample_index(at), found = own;
+    if (POINTS != 0u || depth_word(own) != SPL_NOTHING)
+        return own;
+    precise float sum = 0.0;
+    float covered = 0.0, closest = 3.4e38;
+    for (int i = 0;;) {
+        uint bits = depth_word(sample_beside(at, i));
+        sum += bits != SPL_NOTHING ? uintBitsToFloat(bits) : 0.0;
+        covered += bits != SPL_NOTHING ? 1.0 : 0.0;
+        if (++i >= 9)
+            break;
+    }
+    for (int i = 0; covered >= 7.0;) {
+        uint beside = sample_beside(at, i), bits = depth_word(beside);
+        precise float off = abs(covered * uintBitsToFloat(bits) - sum);
+        bool closer = bits != SPL_NOTHING && off < closest;
+        found = closer ? beside : found;
+        closest = closer ? off : closest;
+        if (++i >= 9)
+            break;
+    }
+    return found;
+}
+
 /* The i-th sample, row by row, of the pixel whose first is `corner`; a side is a power of two. */
 uint pixel_sample(ivec2 corner, uint i)
 {
-    return sample_index(corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample)));
+    return standing_for(corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample)));
 }
 
 void main()

@@ -14,7 +14,7 @@
 struct spl_renderer;
 
 enum spl_method {
-    SPL_METHOD_SPLAT,   /* oriented discs, blended within a margin behind the first surface */
+    SPL_METHOD_SPLAT,   /* oriented discs, blended within a margin behind the first surface; specks closed */
     SPL_METHOD_POINTS,  /* one pixel each */
     SPL_METHOD_FILL,    /* one pixel each, hidden ones removed and holes filled in screen space */
     SPL_METHOD_COUNT

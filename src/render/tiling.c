@@ -23,18 +23,17 @@ void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camer
 int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint64_t samples, struct spl_error *err)
 {
     uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
-    uint64_t around = 0, square = (uint64_t)sqrt((double)samples);
-    if (view->method == SPL_METHOD_FILL) {
-        const struct spl_fill_plan *plan = &tiling->fill;
-        uint64_t guard = 2 * (uint64_t)plan->guard;
-        around = 2 * (uint64_t)plan->apron + plan->align;
-        if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
-            around = guard;
-        if (square < around + side)
-            return spl_fail_field(err, SPL_E_LIMIT, "kernel",
-                                  "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
-                                  2 * plan->kernel / side, (unsigned long long)samples);
-    }
+    const struct spl_fill_plan *plan = &tiling->fill;
+    if (view->method != SPL_METHOD_FILL)
+        tiling->fill = (struct spl_fill_plan){.align = 1, .apron = view->method == SPL_METHOD_SPLAT};
+    uint64_t guard = 2 * (uint64_t)plan->guard, around = 2 * (uint64_t)plan->apron + plan->align - 1;
+    uint64_t square = (uint64_t)sqrt((double)samples);
+    if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
+        around = guard;
+    if (view->method == SPL_METHOD_FILL && square < around + side)
+        return spl_fail_field(err, SPL_E_LIMIT, "kernel",
+                              "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
+                              2 * plan->kernel / side, (unsigned long long)samples);
     uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
     uint64_t widest = around
                           ? (samples / 2 / (around + side) > square ? samples / 2 / (around + side) : square) - around
@@ -98,12 +97,9 @@ void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, s
     tile->width = whole->width - x < tiling->width ? whole->width - x : tiling->width;
     tile->height = whole->height - y < tiling->height ? whole->height - y : tiling->height;
     tile->fill = tiling->fill;
-    int64_t from[2] = {(int64_t)x * side, (int64_t)y * side};
-    int64_t to[2] = {from[0] + tile->width * side, from[1] + tile->height * side};
-    if (tile->view->method == SPL_METHOD_FILL) {
-        widen(&tiling->fill, side, whole->width, x, x + tile->width, &from[0], &to[0]);
-        widen(&tiling->fill, side, whole->height, y, y + tile->height, &from[1], &to[1]);
-    }
+    int64_t from[2], to[2];
+    widen(&tiling->fill, side, whole->width, x, x + tile->width, &from[0], &to[0]);
+    widen(&tiling->fill, side, whole->height, y, y + tile->height, &from[1], &to[1]);
     spl_tiling_get_camera(tile->view, &tile->camera);
     tile->camera.width = (uint32_t)(to[0] - from[0]);
     tile->camera.height = (uint32_t)(to[1] - from[1]);

@@ -1,5 +1,5 @@
-/* An image cut into tiles that fit the scratch buffers. Tiles of method fill overlap by as far as samples act on each
- * other. Everything belongs to the renderer's thread. */
+/* An image cut into tiles that fit the scratch buffers. Tiles overlap by as far as samples act on each other: with
+ * method fill as its plan says, with splat by one. Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_TILING_H
 #define SPL_RENDER_TILING_H
 
@@ -11,7 +11,7 @@
 struct spl_tile;
 
 struct spl_tiling {
-    struct spl_fill_plan fill; /* method fill: set before spl_tiling_init() */
+    struct spl_fill_plan fill; /* method fill: set before spl_tiling_init(), which sets the overlap of the others */
     uint32_t width, height;    /* of the largest tile, pixels */
 };
 

@@ -408,6 +408,33 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
         out[i] /= sqrt(length);
 }
 
+/* What stands for the sample: where it is empty and at most one of the eight around it is, that of them whose depth is
+ * closest to their mean. */
+static const struct sample *standing_for(const struct scene *s, int64_t x, int64_t y)
+{
+    const struct sample *own = &s->samples[(size_t)y * s->camera.width + (size_t)x], *around[8], *found = own;
+    int covered = 0;
+    float sum = 0, closest = INFINITY;
+    if (s->view->method != SPL_METHOD_SPLAT || own->first < INFINITY)
+        return own;
+    for (int64_t j = y > 0 ? y - 1 : y; j <= y + 1 && j < s->camera.height; j++)
+        for (int64_t i = x > 0 ? x - 1 : x; i <= x + 1 && i < s->camera.width; i++) {
+            const struct sample *beside = &s->samples[(size_t)j * s->camera.width + (size_t)i];
+            if (beside->first == INFINITY)
+                continue;
+            around[covered++] = beside;
+            sum += beside->first;
+        }
+    for (int i = 0; covered >= 7 && i < covered; i++) {
+        float off = fabsf((float)covered * around[i]->first - sum);
+        if (off < closest) {
+            closest = off;
+            found = around[i];
+        }
+    }
+    return found;
+}
+
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
 {
     uint32_t side = (uint32_t)s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0,
@@ -418,8 +445,7 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
     size_t pixel = (size_t)y * width + x;
     for (uint32_t pass = 0; pass < 2; pass++) {
         for (uint32_t i = 0; i < side * side; i++) {
-            const struct sample *at = &s->samples[(size_t)(y * side + i / side + s->guard) * s->camera.width +
-                                                  x * side + i % side + s->guard];
+            const struct sample *at = standing_for(s, x * side + i % side + s->guard, y * side + i / side + s->guard);
             if (at->first == INFINITY)
                 continue;
             if (pass == 1) {
