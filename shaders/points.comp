@@ -5,9 +5,22 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
+#include "common/octahedral.glsl"
+#include "common/splat.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 2) const uint FILL = 0;
+
+uint payload(spl_draw_chunk chunk, splat s)
+{
+    if (GROUP == SPL_SUMS_COLOR) {
+        uvec3 c = load_color(chunk, s.index);
+        return c.x | c.y << 8 | c.z << 16;
+    }
+    if (GROUP == SPL_SUMS_NORMAL)
+        return pack_normal(s.normal);
+    return chunk.first_id + s.index;
+}
 
 void draw(spl_draw_chunk chunk, splat s)
 {
@@ -20,7 +33,9 @@ void draw(spl_draw_chunk chunk, splat s)
     uint bits = floatBitsToUint(p.z);
     if (FILL != 0u)
         bits = fill_word(bits, min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min), is_linear(chunk, s.index));
-    put(sample_index(ivec2(center)), bits, chunk, s);
+    uint at = sample_index(ivec2(center));
+    if (wins(at, bits))
+        put(at, bits, payload(chunk, s));
 }
 
 void main()

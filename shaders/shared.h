@@ -38,8 +38,9 @@
 #define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
 #define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
-/* The occlusion kernels use two of them otherwise, and so does the shade pass of splats with textures. */
+/* The occlusion kernels use two of them otherwise, the lines of wires one, and so does the shade pass of splats with textures. */
 #define SPL_BIND_BOUNDS SPL_BIND_DRAW  /* struct spl_chunk_bounds[], parallel to the chunks */
+#define SPL_BIND_LINES SPL_BIND_CHUNKS /* struct spl_draw_line[] */
 #define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
 #define SPL_BIND_TEXTURES SPL_BIND_OUTPUT /* uint[], one page's section TEXP as it lies in the file */
 #define SPL_BIND_ATOMS SPL_BIND_ID     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
@@ -125,12 +126,7 @@
 #define SPL_FILL_DEPTH_BITS 63u
 /* A point whose radius is more than so many times the least of its chunk strays: it counts as this. */
 #define SPL_FILL_STRAY 3.0f
-/* A linear splat is joined with the nearest one within so many radii, and with one within so many on the other side, which
- * lies off the line through both by a radius and this share of its distance at most; by lines of so many samples at most. */
-#define SPL_FILL_LINE_NEAR 3.0f
-#define SPL_FILL_LINE_FAR 64.0f
-#define SPL_FILL_LINE_OFF 0.08f
-#define SPL_FILL_LINE_MOST 6000
+#define SPL_FILL_LINE_MOST 50000 /* samples along which a line is drawn */
 #define SPL_FILL_HOLE 0x80000000u
 #define SPL_FILL_LEVELS_MAX 8
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
@@ -206,6 +202,14 @@ struct spl_draw_chunk {
 #define SPL_OCCLUSION_TILE 8
 #define SPL_OCCLUSION_TILES_MAX 32768
 
+/* A straight piece of a wire, view space, and its payload for each group of layers; made by the CPU. */
+struct spl_draw_line {
+    SPL_F32 from_x, from_y, from_z;
+    SPL_F32 to_x, to_y, to_z;
+    SPL_U32 color, normal, id; /* 8 bits a channel; octahedral.glsl; of a splat */
+};
+#define SPL_LINE_WORDS 9
+
 /* Where a drawn chunk can reach, made by the CPU. */
 struct spl_chunk_bounds {
     SPL_U32 first, last; /* occlusion tiles, x | y << 16, inclusive */
@@ -247,7 +251,7 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * (SPL_FILL_LINE_MOST + SPL_CHUNK_SPLATS) < 60000, "so does one with lines");
+_Static_assert(sizeof(struct spl_draw_line) == 4 * SPL_LINE_WORDS, "spl_draw_line is 36 bytes on both sides");
 _Static_assert(sizeof(struct spl_frame_params) == 188, "spl_frame_params is 188 bytes on both sides");
 #endif
 

@@ -7,8 +7,7 @@
 #extension GL_EXT_shader_atomic_int64 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #endif
-#include "common/splat.glsl"
-#include "common/octahedral.glsl"
+#include "common/frame.glsl"
 
 layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
 layout(constant_id = 1) const uint PASS = 0;
@@ -22,17 +21,6 @@ layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint payloads[]; };
 
 coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* what is read may be old, never too near */
 
-uint payload(spl_draw_chunk chunk, splat s)
-{
-    if (GROUP == SPL_SUMS_COLOR) {
-        uvec3 c = load_color(chunk, s.index);
-        return c.x | c.y << 8 | c.z << 16;
-    }
-    if (GROUP == SPL_SUMS_NORMAL)
-        return pack_normal(s.normal);
-    return chunk.first_id + s.index;
-}
-
 /* The depth word of method fill: its low bits hold the spacing, as the nearest one that has a code for a splat of this
  * radius, and whether the splat is linear. */
 uint fill_word(uint bits, float radius, bool linear)
@@ -43,18 +31,26 @@ uint fill_word(uint bits, float radius, bool linear)
     return (bits & ~SPL_FILL_DEPTH_BITS) | uint(code) << 1 | (linear ? SPL_FILL_LINEAR : 0u);
 }
 
-void put(uint at, uint bits, spl_draw_chunk chunk, splat s)
+/* Whether a sample of depth word `bits` may win; asked first, since what it would leave costs more. */
+bool wins(uint at, uint bits)
 {
 #ifdef SPL_ATOMICS_64
-    if (bits <= imageLoad(depth_texels, int(2u * at + 1u)).x)
-        atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload(chunk, s)));
+    return bits <= imageLoad(depth_texels, int(2u * at + 1u)).x;
 #else
-    if (PASS == 0) {
-        if (bits < imageLoad(depth_texels, int(at)).x)
-            atomicMin(depth[at], bits);
-    } else if (bits == imageLoad(depth_texels, int(at)).x) {
-        atomicMin(payloads[at], payload(chunk, s));
-    }
+    uint own = imageLoad(depth_texels, int(at)).x;
+    return PASS == 0 ? bits < own : bits == own;
+#endif
+}
+
+void put(uint at, uint bits, uint payload)
+{
+#ifdef SPL_ATOMICS_64
+    atomicMin(depth[at], uint64_t(bits) << 32 | uint64_t(payload));
+#else
+    if (PASS == 0)
+        atomicMin(depth[at], bits);
+    else
+        atomicMin(payloads[at], payload);
 #endif
 }
 

@@ -35,15 +35,14 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
 /* Which row of the table of batches: number of planes, interpolation, whether apart, and phase. */
 static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
 {
-    bool apart =
-        list->chunks[chunk].color_bits >> SPL_COLOR_CLIP || list->chunks[chunk].geometry_bits >> SPL_GEOMETRY_LINEAR;
+    bool apart = list->chunks[chunk].color_bits >> SPL_COLOR_CLIP;
     return 4 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + 2 * apart +
            (chunk >= list->first_back_chunk);
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
-    list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = 0;
+    list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = list->line_count = 0;
     list->splats = list->listed_splats = list->sample_splats = 0;
     list->nodes = 0;
     list->complete = true;
@@ -69,6 +68,11 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct sp
     list->entry_count += runs(chunk);
     list->listed_splats += splats(chunk);
     return SPL_OK;
+}
+
+int spl_draw_list_reserve_lines(struct spl_draw_list *list, size_t count, struct spl_error *err)
+{
+    return grow((void **)&list->lines, &list->line_capacity, list->line_count + count, sizeof *list->lines, err);
 }
 
 /* The batch of every chunk, counted; batches keep the order in which they are met. */
@@ -142,5 +146,6 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->entries);
     free(list->batches);
     free(list->page_of_chunk);
+    free(list->lines);
     *list = (struct spl_draw_list){0};
 }

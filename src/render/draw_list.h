@@ -17,7 +17,7 @@ struct spl_draw_batch {
     uint32_t page;
     uint8_t planes; /* 0 = no textures */
     bool smooth;    /* texels are interpolated, of sums */
-    bool apart;     /* chunks with clip lines, or with linear splats where these are drawn as lines */
+    bool apart;     /* chunks with clip lines */
     bool back;
     uint32_t first_entry, entries;
     uint32_t first_slot, slot_entries; /* parameters: a slot for every so many entries, the same in every pass */
@@ -28,9 +28,10 @@ struct spl_draw_list {
     struct spl_chunk_bounds *bounds; /* parallel to chunks */
     uint32_t *entries;               /* chunk index << SPL_RUN_BITS | run, batch after batch */
     struct spl_draw_batch *batches;  /* in the order in which their pages were first met */
+    struct spl_draw_line *lines;     /* pieces of wires, by spl_wires_draw() */
     size_t first_back_chunk;         /* chunks from here on are of the back phase */
-    size_t chunk_count, entry_count, batch_count;
-    size_t chunk_capacity, entry_capacity, batch_capacity;
+    size_t chunk_count, entry_count, batch_count, line_count;
+    size_t chunk_capacity, entry_capacity, batch_capacity, line_capacity;
     uint32_t *page_of_chunk; /* chunk_count, scratch */
     uint64_t splats;         /* that are drawn */
     uint64_t listed_splats;  /* the same, once for every window that they are drawn in */
@@ -45,6 +46,9 @@ void spl_draw_list_clear(struct spl_draw_list *list);
 /* Appends a chunk of page `page`. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
 int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct spl_draw_chunk *chunk,
                       const struct spl_chunk_bounds *bounds, struct spl_error *err);
+
+/* Makes room for `count` lines more. SPL_E_NOMEM. */
+int spl_draw_list_reserve_lines(struct spl_draw_list *list, size_t count, struct spl_error *err);
 
 /* Lays out entries and batches of all chunks added; `pages` is the dataset's number of pages. */
 int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err);

@@ -10,6 +10,7 @@
 #include "render/readback.h"
 #include "render/renderer.h"
 #include "render/tiling.h"
+#include "render/wires.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 /* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
@@ -83,6 +84,10 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
+    if (job->view->method == SPL_METHOD_FILL)
+        rc = spl_wires_draw(job->resident->wires, &tile->camera, &r->list, err);
+    if (rc)
+        return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
@@ -249,6 +254,8 @@ static int render_view(struct spl_renderer *renderer, const struct spl_dataset *
     frame->stats.complete = true;
     if (view->method == SPL_METHOD_FILL)
         rc = plan_fill(&job, err);
+    if (!rc && view->method == SPL_METHOD_FILL && !job.resident->wires)
+        rc = spl_wires_create(dataset, &job.resident->wires, err);
     if (!rc)
         rc = spl_tiling_init(&job.tiling, view, renderer->scratch.samples, err);
     if (!rc)

@@ -1,33 +1,23 @@
 /* Method points: the nearest splat centre of every sample. One pass with 64 bit atomics, two without. */
 #include "render/renderer.h"
 
-static bool has_lines(const struct spl_draw_list *list)
-{
-    bool any = false;
-    for (size_t i = 0; i < list->batch_count; i++)
-        any |= list->batches[i].apart;
-    return any;
-}
-
 int spl_points_record(struct spl_tile *tile, uint32_t group, uint32_t slot, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    bool wide = spl_gpu_get_limits(r->gpu)->atomics_64, lines = slot == SPL_KERNEL_FILL_POINTS && has_lines(&r->list);
+    bool wide = spl_gpu_get_limits(r->gpu)->atomics_64;
     spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * (wide ? 8 : 4), SPL_NOTHING);
     if (!wide)
         spl_gpu_fill(r->gpu, r->scratch.ids, 0, tile->samples * 4, SPL_NOTHING);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     for (uint32_t pass = 0; pass < (wide ? 1u : 2u); pass++) {
-        struct spl_gpu_kernel *kernel, *joining = NULL;
+        struct spl_gpu_kernel *kernel;
         int rc = spl_renderer_get_kernel(r, slot + 2 * group + pass, &kernel, err);
-        if (!rc && lines)
-            rc = spl_renderer_get_kernel(r, SPL_KERNEL_FILL_LINES + 2 * group + pass, &joining, err);
         if (rc)
             return rc;
         spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
-        if (lines)
-            spl_tile_dispatch_splats(tile, joining, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .apart = true});
+        if (slot == SPL_KERNEL_FILL_POINTS && (rc = spl_tile_dispatch_lines(tile, 2 * group + pass, err)))
+            return rc;
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

@@ -6,6 +6,7 @@
 enum {
     chunks_at_start = 16384,
     entries_at_start = 262144,
+    lines_at_start = 1024,
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
 
@@ -32,6 +33,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->chunks, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_draw_chunk)},
         {&scratch->bounds, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_chunk_bounds)},
         {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
+        {&scratch->lines, SPL_GPU_UPLOAD, lines_at_start * sizeof(struct spl_draw_line)},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         int rc = wanted[i].bytes ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
@@ -46,9 +48,9 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
 
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
-    struct spl_gpu_buffer *all[] = {scratch->depth,  scratch->sums,     scratch->ids,
-                                    scratch->output, scratch->readback, scratch->params,
-                                    scratch->chunks, scratch->bounds,   scratch->entries};
+    struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->sums,   scratch->ids,    scratch->output,
+                                    scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
+                                    scratch->entries,  scratch->lines};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     *scratch = (struct spl_scratch){0};
@@ -82,6 +84,7 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
     int rc = upload(residency, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
     if (!rc)
         rc = upload(residency, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
-    return rc ? rc
-              : upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
+    if (!rc)
+        rc = upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
+    return rc ? rc : upload(residency, &scratch->lines, list->lines, list->line_count * sizeof *list->lines, err);
 }

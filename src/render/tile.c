@@ -164,7 +164,7 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || (what->apart && !batch->apart) ||
+        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
             (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
             continue;
         bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->page].buffer;
@@ -194,6 +194,8 @@ int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, co
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];
     bind_scratch(tile, bindings);
     bindings[SPL_BIND_BOUNDS].buffer = tile->renderer->scratch.bounds;
+    if (slot >= SPL_KERNEL_FILL_LINES && slot < SPL_KERNEL_FILL_PULL)
+        bindings[SPL_BIND_LINES].buffer = tile->renderer->scratch.lines;
     int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
     if (!rc)
         rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
@@ -222,6 +224,16 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struc
     int rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
     for (size_t first = first_chunk; first < end && !rc; first += most)
         rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
+    return rc;
+}
+
+int spl_tile_dispatch_lines(struct spl_tile *tile, uint32_t kernel, struct spl_error *err)
+{
+    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
+    size_t end = tile->renderer->list.line_count;
+    int rc = SPL_OK;
+    for (size_t first = 0; first < end && !rc; first += most)
+        rc = dispatch_range(tile, SPL_KERNEL_FILL_LINES + kernel, first, end - first < most ? end - first : most, err);
     return rc;
 }
 

@@ -11,10 +11,12 @@
 #include "dataset/dataset.h"
 #include "dataset/dictionary.h"
 #include "dataset/texture.h"
+#include "geom/octahedral.h"
 #include "geom/tangent.h"
 #include "render/occupancy.h"
 #include "render/fill.h"
 #include "render/select.h"
+#include "render/wires.h"
 #include "support/reference_fill.h"
 
 struct sample {
@@ -243,8 +245,7 @@ static void project(const struct scene *s, const float p[3], float out[2])
 }
 
 /* `behind`: steps of depth that are added. */
-static void put(struct scene *s, const float place[2], float z, const struct disc *d, uint32_t low_bits,
-                uint32_t behind)
+static void put(struct scene *s, const float place[2], float z, const struct disc *d, uint32_t low_bits)
 {
     if (!(place[0] >= 0 && place[1] >= 0 && place[0] < (float)s->camera.width && place[1] < (float)s->camera.height))
         return;
@@ -252,7 +253,7 @@ static void put(struct scene *s, const float place[2], float z, const struct dis
     uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
     memcpy(&at->word, &z, 4);
     if (s->view->method == SPL_METHOD_FILL) { /* the low bits of the depth say more */
-        at->word = ((at->word & ~SPL_FILL_DEPTH_BITS) | low_bits) + behind * (SPL_FILL_DEPTH_BITS + 1);
+        at->word = (at->word & ~SPL_FILL_DEPTH_BITS) | low_bits;
         memcpy(&z, &at->word, 4);
     }
     if (z > at->first)
@@ -270,15 +271,13 @@ static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
 {
     float place[2];
     project(s, d->p, place);
-    put(s, place, d->p[2], d, low_bits, 0);
+    put(s, place, d->p[2], d, low_bits);
 }
 
-/* From a linear splat to another one, a sample a column or, where the line is upright, a row. */
-static void line(struct scene *s, const struct disc *d, const float to[3], uint32_t low_bits)
+/* From the disc's centre, a sample a column or, where the line is upright, a row. */
+static void line(struct scene *s, const struct disc *d, const float to[3])
 {
-    float a[2], b[2], near = fminf(d->p[2], to[2]), far = fmaxf(d->p[2], to[2]);
-    if (!(near >= (float)s->camera.near && far <= (float)s->camera.far))
-        return;
+    float a[2], b[2];
     project(s, d->p, a);
     project(s, to, b);
     int main_axis = fabsf(b[1] - a[1]) > fabsf(b[0] - a[0]), other = 1 - main_axis;
@@ -290,7 +289,7 @@ static void line(struct scene *s, const struct disc *d, const float to[3], uint3
             continue;
         place[main_axis] = (float)k;
         place[other] = a[other] + t * (b[other] - a[other]);
-        put(s, place, 1 / (w0 + t * (w1 - w0)), d, low_bits, t > 0.5f);
+        put(s, place, 1 / (w0 + t * (w1 - w0)), d, SPL_FILL_LINEAR);
     }
 }
 
@@ -315,22 +314,16 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
     s->coded = chunk;
 }
 
-/* To the linear splats of the chunk that splat `index` is joined with. */
-static void lines(struct scene *s, const struct spl_draw_chunk *draw, const struct spl_chunk *chunk,
-                  const uint32_t *page, uint32_t index, float radius, const struct disc *d, uint32_t low_bits)
+/* Where wires.c has joined points; what is linear has no spacing. */
+static void lines(struct scene *s)
 {
-    struct spl_splat splats[SPL_CHUNK_SPLATS];
-    uint32_t count = draw->count & ((1u << SPL_COUNT_BITS) - 1), next[2];
-    for (uint32_t i = 0; i < count; i++)
-        spl_chunk_decode(chunk, page, i, &splats[i]);
-    reference_fill_join(splats, count, index, radius, next);
-    for (int side = 0; side < 2 && next[side] != index; side++) {
-        float to[3];
-        to_view(&s->camera, splats[next[side]].position, to);
-        to[0] += draw->origin_x;
-        to[1] += draw->origin_y;
-        to[2] += draw->origin_z;
-        line(s, d, to, low_bits);
+    for (size_t i = 0; i < s->list.line_count; i++) {
+        const struct spl_draw_line *l = &s->list.lines[i];
+        struct disc d = {.p = {l->from_x, l->from_y, l->from_z}, .id = l->id};
+        spl_octahedral_decode((float)(l->normal & 0xffff) / 32767 - 1, (float)(l->normal >> 16) / 32767 - 1, d.n);
+        for (int c = 0; c < 3; c++)
+            d.color[c] = l->color >> 8 * c & 255;
+        line(s, &d, (float[3]){l->to_x, l->to_y, l->to_z});
     }
 }
 
@@ -383,8 +376,6 @@ static void for_each_disc(struct scene *s, bool shade)
                 point(s, &d, low_bits);
             else
                 depth_disc(s, &d, shade);
-            if (s->view->method == SPL_METHOD_FILL && splat.linear)
-                lines(s, draw, &local, page, index, radius, &d, low_bits);
         }
     }
 }
@@ -552,6 +543,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                        .points = view->method != SPL_METHOD_SPLAT,
                                        .textured = always,
                                        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
+    struct spl_wires *wires = NULL;
     struct spl_fill_plan plan;
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
@@ -567,6 +559,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     }
     if (!rc)
         rc = spl_select(&params, &s.list, err);
+    if (!rc && view->method == SPL_METHOD_FILL && !(rc = spl_wires_create(dataset, &wires, err)))
+        rc = spl_wires_draw(wires, &s.camera, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
     if (!rc && !s.samples)
@@ -587,6 +581,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for (size_t i = 0; i < count; i++)
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
+        lines(&s);
         if (view->method == SPL_METHOD_SPLAT)
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
@@ -599,6 +594,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     free(s.textures);
     free(s.atoms);
     spl_draw_list_finish(&s.list);
+    spl_wires_destroy(wires);
     if (rc)
         spl_frame_finish(frame);
     return rc;

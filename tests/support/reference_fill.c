@@ -220,33 +220,6 @@ static void finish_sample(const struct filter *f, struct fill_sample *s, int x, 
     memcpy(s->normal, c.normal, sizeof c.normal);
 }
 
-void reference_fill_join(const struct spl_splat *splats, uint32_t count, uint32_t own, float radius, uint32_t next[2])
-{
-    float before[3] = {0};
-    next[0] = next[1] = own;
-    for (int side = 0; side < 2; side++) {
-        float best = powf(radius * (side ? SPL_FILL_LINE_FAR : SPL_FILL_LINE_NEAR), 2);
-        for (uint32_t j = 0; j < count; j++) {
-            float squared = 0, along = 0;
-            for (int c = 0; c < 3; c++) {
-                float d = splats[j].position[c] - splats[own].position[c];
-                squared += d * d;
-                along += d * before[c];
-            }
-            float limit = radius + SPL_FILL_LINE_OFF * sqrtf(squared);
-            if (!splats[j].linear || squared < radius * radius || squared >= best ||
-                (side && (along > 0 || squared - along * along > limit * limit)))
-                continue;
-            best = squared;
-            next[side] = j;
-        }
-        if (next[side] == own)
-            return;
-        for (int c = 0; c < 3; c++)
-            before[c] = (splats[next[0]].position[c] - splats[own].position[c]) / sqrtf(best);
-    }
-}
-
 void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
                     const struct spl_view *view, const struct spl_fill_plan *plan)
 {

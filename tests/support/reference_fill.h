@@ -21,10 +21,6 @@ struct fill_sample {
 uint32_t reference_fill_code(float radius, double median);
 
 /* Filters the samples in place; `focal` in samples. */
-/* The linear splats of a chunk's `count` that splat `own`, of spacing `radius`, is joined with: the nearest one, and
- * one on its other side; `own` where there is none. Positions are of one origin. */
-void reference_fill_join(const struct spl_splat *splats, uint32_t count, uint32_t own, float radius, uint32_t next[2]);
-
 void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
                     const struct spl_view *view, const struct spl_fill_plan *plan);
 

@@ -1,0 +1,29 @@
+/* Points on wires, poles and cables, joined along them. */
+#ifndef SPL_RENDER_WIRE_JOIN_H
+#define SPL_RENDER_WIRE_JOIN_H
+
+#include <stdint.h>
+
+#include "base/error.h"
+
+#define SPL_WIRE_END UINT32_MAX
+
+struct spl_wire_point {
+    double position[3];
+    double spacing;   /* metres, > 0: what lies nearer may lie beside it, off by the scan's noise */
+    uint32_t next[2]; /* the points that it is joined with, SPL_WIRE_END where there is none */
+    uint32_t other;   /* of an end: the chain's other end; itself when alone */
+    double length;    /* of an end: from there to the other */
+};
+
+/* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or
+ * loops. Points that lie beside another one are left alone. Pure function; any thread. SPL_E_NOMEM. */
+int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_error *err);
+
+/* How `point` lies off what it is joined with on the other side of `avoid` (one of its links; SPL_WIRE_END at an end):
+ * the unit vector to it from the chain's point that lies `reach` behind, or its end. Returns the distance of those two,
+ * or 0 where nothing is there. */
+double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
+                         double heading[3]);
+
+#endif
