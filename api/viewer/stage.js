@@ -126,10 +126,11 @@ export class Stage extends EventTarget {
     const ratio = Math.min(devicePixelRatio, 2, Math.sqrt(this.pixels / (width * height)));
     const {layer, budget, ...setting} = this.settings;
     const coarse = COARSE[this.coarse];
-    // A budget chooses the rest, but for the method in motion: one that changes from frame to frame flickers.
+    // A budget chooses the rest, but in motion not the method nor how it fills: what changes from frame to frame flickers.
+    const {lod, supersample, atoms, ...kept} = setting;
     let quality = {...setting, ...(full ? {} : coarse)};
     if (full && budget) quality = {budget};
-    else if (!full && coarse.budget) quality = {...coarse, method: setting.method};
+    else if (!full && coarse.budget) quality = {...kept, ...coarse};
     return {
       ...rounded(this.camera),
       width: Math.max(1, Math.floor(width * ratio)),

@@ -581,6 +581,13 @@ def test_fill_has_its_own_controls():
         for name in FILL:
             tab.choose(f"#{name}", "")
         assert settled(tab, digest) == automatic
+    with page(url) as tab:
+        digest = settled(tab)
+        x, y = middle(tab)
+        tab.drag((x, y), (x + 60, y), steps=10)
+        settled(tab, digest)
+        moving = [v for v, _, _ in tab.run(VIEWS) if "budget=60ms" in v and "kernel=3" in v]
+        assert moving and all(f"{name}={value}" in moving[-1] for name, value in wanted.items()), "looks as at rest"
     with page(url.replace("/#", "/embed/wall#")) as tab:
         view = urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])
         assert {name: view[name][0] for name in FILL} == wanted
