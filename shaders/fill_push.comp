@@ -1,5 +1,6 @@
 /* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to the
- * nearest one's surface. The last run (constant 1) fills the holes among the samples and writes depth and payload as
+ * nearest one's surface, or to that behind it where it has more of the weight: an edge lies half way between the points on
+ * both sides of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
  * method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a linear sample
  * stays where it is nearer than what fills its place. */
 #version 450
@@ -17,6 +18,11 @@ layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint pla
 layout(std430, binding = SPL_BIND_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
 layout(std430, binding = SPL_BIND_ID) writeonly buffer id_buffer { uint payloads[]; };
 
+float share_of(int i)
+{
+    return i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
+}
+
 /* The mean over the level above, whose planes begin at frame.fill_from; word 0 = there is none. */
 uint interpolate(ivec2 at, out uint filled)
 {
@@ -33,13 +39,27 @@ uint interpolate(ivec2 at, out uint filled)
         nearest = nearer ? word[i] : nearest;
         nearest_payload = nearer ? payload[i] : nearest_payload;
     }
-    float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level)));
+    float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level))), most = 1e38;
+    float front = 0.0, behind = 0.0;
+    uint second = 0u, second_payload = 0u;
+    for (int i = 0; i < 4; i++) {
+        bool near = inverse_depth(word[i], SPACING_MASK) >= least, next = !near && word[i] > second;
+        front += near ? share_of(i) : 0.0;
+        behind += !near && word[i] != 0u ? share_of(i) : 0.0;
+        second = next ? word[i] : second;
+        second_payload = next ? payload[i] : second_payload;
+    }
+    if (behind > front) {
+        most = least;
+        nearest = second;
+        nearest_payload = second_payload;
+        least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level)));
+    }
     precise float sum = 0.0;
     float weight = 0.0;
     vec3 vector = vec3(0.0);
     for (int i = 0; i < 4; i++) {
-        float w = inverse_depth(word[i], SPACING_MASK), share = i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
-        share = word[i] != 0u && w >= least ? share : 0.0;
+        float w = inverse_depth(word[i], SPACING_MASK), share = word[i] != 0u && w >= least && w < most ? share_of(i) : 0.0;
         sum += share * w;
         weight += share;
         vector += share * payload_vector(payload[i]);

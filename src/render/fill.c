@@ -16,7 +16,8 @@
 static const double reach_spacings = 3;
 /* Two surfaces less than a spacing apart cannot be told from one that is rough. */
 static const double margin_spacings = 1;
-static const double kernel_most = 64;
+/* Samples: as far as rings reach; in pixels, where every sample of the kernel is looked at, or a pixel has many. */
+static const double kernel_most = 128, kernel_most_px = 64;
 
 static uint32_t round_up(double value, uint32_t align)
 {
@@ -27,7 +28,10 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
 {
     double side = view->supersample;
     double kernel = view->kernel > 0 ? view->kernel * side / 2 : reach_spacings * spacing;
-    kernel = fmin(fmax(kernel, 1.5), kernel_most * (side > 1 ? side : 1));
+    double most = kernel_most_px * (side > 1 ? side : 1);
+    if (view->visibility != SPL_VISIBILITY_CONSTANT)
+        most = fmax(most, kernel_most);
+    kernel = fmin(fmax(kernel, 1.5), most);
     int rings = 1 + (int)floor(log2(kernel) + 0.25);
     rings = rings < 2 ? 2 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
     *plan = (struct spl_fill_plan){.kernel = kernel, .rings = (uint32_t)rings};
@@ -109,10 +113,10 @@ static int record_visibility(struct spl_tile *tile, const struct planes *p, stru
                                         p->nearest[level], p->samples[level]},
                          err);
     return rc ? rc
-              : record_pass(tile, p,
-                            &(struct pass){SPL_KERNEL_FILL_VISIBLE + adaptive, 0, p->states, p->nearest[rings],
-                                           p->samples[0]},
-                            err);
+              : record_pass(
+                    tile, p,
+                    &(struct pass){SPL_KERNEL_FILL_VISIBLE + adaptive, 0, p->states, p->nearest[rings], p->samples[0]},
+                    err);
 }
 
 int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)

@@ -141,22 +141,40 @@ static bool is_visible(const struct filter *f, int x, int y, float z)
     return open >= f->threshold;
 }
 
-/* The mean of `count` cells, weighted, of those on the surface of the nearest, which is `samples` wide. */
-static struct cell mean(const struct filter *f, const struct cell *const cells[4], const float weights[4],
-                        float samples)
+/* The nearest of the cells whose inverse depth is below `most`, NULL = there is none; and the inverse depth from which
+ * on cells belong to its surface, which is `samples` wide. */
+static const struct cell *find_surface(const struct filter *f, const struct cell *const cells[4], float samples,
+                                       float most, float *least)
 {
     const struct cell *near = NULL;
-    struct cell out = {0};
-    float sum = 0, weight = 0;
     for (int i = 0; i < 4; i++)
-        if (cells[i] && cells[i]->w > 0 && !cells[i]->hole && (!near || cells[i]->w > near->w))
+        if (cells[i] && cells[i]->w > 0 && cells[i]->w < most && !cells[i]->hole && (!near || cells[i]->w > near->w))
             near = cells[i];
+    if (near) {
+        float slope = samples * SPL_FILL_SLOPE * (1 / f->focal);
+        *least = near->w / (1 + (slope + f->margin * f->radius * near->w * near->spacing));
+    }
+    return near;
+}
+
+/* The mean of four cells, weighted, of those on the surface of the nearest, or of the next behind it if `either` and
+ * more of the weight is behind. */
+static struct cell mean(const struct filter *f, const struct cell *const cells[4], const float weights[4],
+                        float samples, bool either)
+{
+    struct cell out = {0};
+    float sum = 0, weight = 0, most = INFINITY, least, front = 0, behind = 0;
+    const struct cell *near = find_surface(f, cells, samples, most, &least);
     if (!near)
         return out;
-    float slope = samples * SPL_FILL_SLOPE * (1 / f->focal);
-    float least = near->w / (1 + (slope + f->margin * f->radius * near->w * near->spacing));
+    for (int i = 0; i < 4 && either; i++)
+        *(cells[i]->w >= least ? &front : &behind) += cells[i]->w > 0 ? weights[i] : 0;
+    if (behind > front) {
+        most = least;
+        near = find_surface(f, cells, samples, most, &least);
+    }
     for (int i = 0; i < 4; i++) {
-        if (!cells[i] || cells[i]->hole || !(cells[i]->w > 0) || cells[i]->w < least)
+        if (!cells[i] || cells[i]->hole || !(cells[i]->w > 0) || cells[i]->w < least || cells[i]->w >= most)
             continue;
         sum += weights[i] * cells[i]->w;
         weight += weights[i];
@@ -186,7 +204,8 @@ static void gather(struct filter *f, uint32_t level)
             for (uint32_t i = 0; i < 4; i++)
                 if (2 * x + i % 2 < f->width[level - 1] && 2 * y + i / 2 < f->height[level - 1])
                     children[i] = &f->means[level - 1][(2 * y + i / 2) * f->width[level - 1] + 2 * x + i % 2];
-            f->means[level][y * f->width[level] + x] = mean(f, children, (float[]){1, 1, 1, 1}, (float)(1u << level));
+            f->means[level][y * f->width[level] + x] =
+                mean(f, children, (float[]){1, 1, 1, 1}, (float)(1u << level), false);
         }
     }
 }
@@ -201,7 +220,7 @@ static struct cell above(const struct filter *f, uint32_t level, int x, int y)
         cy = cy < 0 ? 0 : cy < h ? cy : h - 1;
         cells[i] = &f->means[level + 1][cy * w + cx];
     }
-    return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level));
+    return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level), true);
 }
 
 static void finish_sample(const struct filter *f, struct fill_sample *s, int x, int y)

@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "clouds.h"
+#include "dataset/format.h"
 #include "geom/morton.h"
 #include "pack/neighbours.h"
 #include "pack/order.h"
@@ -313,6 +314,36 @@ static void test_radius_of_a_grid(void **state)
 }
 
 /* A point that floats beside a surface, a flock of strays far off, and a wire must not become blobs. */
+/* Bare points: a field of 0.1 m, and beyond it one of 2 m and one of 20 m, which the same cells cannot all measure. */
+static void test_spacing_of_bare_points(void **state)
+{
+    (void)state;
+    enum { near = 100 * 100, middle = 20 * 20, far = 10 * 10, count = near + middle + far };
+    static const double first[3] = {0, 20, 100}, step[3] = {0.1, 2, 20};
+    double(*position)[3] = malloc(count * sizeof *position);
+    uint64_t random = 5;
+    for (size_t i = 0; i < count; i++) {
+        int field = i < near ? 0 : i < near + middle ? 1 : 2;
+        size_t k = i - (size_t[]){0, near, near + middle}[field], side = (size_t[]){100, 20, 10}[field];
+        for (int c = 0; c < 2; c++)
+            position[i][c] = (c ? 0 : first[field]) +
+                             step[field] * ((double)(c ? k / side : k % side) + 0.3 * uniform(&random));
+        position[i][2] = 0.01 * uniform(&random);
+    }
+    for (unsigned threads = 1; threads < 3; threads++) {
+        struct spl_points p = sorted((const double(*)[3])position, count, threads);
+        struct spl_stage stage = quiet_stage(threads);
+        assert_int_equal(spl_bare_points(&p, &stage, NULL), 0);
+        for (size_t i = 0; i < p.count; i++) {
+            double spacing = step[p.axis[0][i] < 15 ? 0 : p.axis[0][i] < 80 ? 1 : 2];
+            double ratio = p.radius[i] / (SPL_RADIUS_SPACING * spacing);
+            assert_true(ratio > 0.5 && ratio < 2.5); /* at a field's corner a quarter of the cells are full */
+        }
+        spl_points_finish(&p);
+    }
+    free(position);
+}
+
 /* Points of several stations fall at random: places that are empty by chance are covered, and at little cost. */
 static void test_random_points_leave_no_holes(void **state)
 {
@@ -476,6 +507,7 @@ int main(void)
         cmocka_unit_test(test_normals_of_a_sphere),
         cmocka_unit_test(test_lines_at_borders),          cmocka_unit_test(test_normals_face_the_station),
         cmocka_unit_test(test_given_normals_stay),           cmocka_unit_test(test_radius_of_a_grid),
+        cmocka_unit_test(test_spacing_of_bare_points),
         cmocka_unit_test(test_random_points_leave_no_holes), cmocka_unit_test(test_no_blobs),
         cmocka_unit_test(test_borders_stay_where_they_are),  cmocka_unit_test(test_leaves_and_noise),
         cmocka_unit_test(test_degenerate_surfaces),          cmocka_unit_test(test_threads_do_not_matter),
