@@ -11,6 +11,7 @@
 #include "base/memory.h"
 
 static const double near = 3;    /* spacings within which a point that is alone is joined */
+static const double far = 100;   /* and beyond which nothing is */
 static const double gap = 4;     /* longest gap, as a multiple of the stretches that it joins */
 static const double shortest = 64; /* and of the shorter of both */
 static const double off = 0.1;   /* a share of a gap that the other end may lie off the direction of this one */
@@ -60,8 +61,10 @@ static int compare_doubles(const void *a, const void *b)
 static uint64_t key_of(const struct join *j, const double position[3], const int shift[3])
 {
     uint64_t key = 0;
-    for (int c = 0; c < 3; c++)
-        key = key << 21 | ((uint64_t)(int64_t)(floor((position[c] - j->low[c]) / j->edge) + shift[c] + 1) & 0x1fffff);
+    for (int c = 0; c < 3; c++) {
+        double cell = fmin(floor((position[c] - j->low[c]) / j->edge), 1e15) + shift[c] + 1;
+        key = key << 21 | ((uint64_t)cell & 0x1fffff);
+    }
     return key;
 }
 
@@ -78,8 +81,8 @@ static size_t find_cell(const struct join *j, uint64_t key)
     return low;
 }
 
-/* A grid of the points [0, count) that have a free link and, with `kept`, are in it, but for ends of chains that are too
- * short for gaps as wide as its cells. */
+/* A grid of the points [0, count) that have a free link and, with `kept`, are in it, but for ends of chains too short
+ * for gaps as wide as its cells. */
 static void lay_grid(struct join *j, uint32_t count, double edge, const uint8_t *kept)
 {
     j->edge = edge;
@@ -141,7 +144,8 @@ static double cost_of(const struct join *j, uint32_t a, uint32_t b)
     double length = distance(p[a].position, p[b].position), spacing = fmax(p[a].spacing, p[b].spacing);
     double aside[2][3] = {{0}}, differ = 0, out = 0;
     bool knows[2];
-    if (p[a].other == b || (length > near * spacing && length > gap * (p[a].length + p[b].length)))
+    if (p[a].other == b || length > spacing * far ||
+        (length > near * spacing && length > gap * (p[a].length + p[b].length)))
         return INFINITY;
     if (!aim(j, a, b, length, spacing, aside[0], &knows[0]) || !aim(j, b, a, length, spacing, aside[1], &knows[1]))
         return INFINITY;
@@ -246,13 +250,11 @@ int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_err
     qsort(spacings, count, sizeof *spacings, compare_doubles);
     double reach = spacings[count / 2];
     thin_out(&j, count, 2 * reach, kept);
-    for (; reach <= fmax(near, 2 * gap) * longest && !rc; reach *= 2) {
+    for (; reach <= 2 * far * longest && !rc; reach *= 2) {
         lay_grid(&j, count, reach, kept);
         rc = find_pairs(&j, reach, err);
         if (!rc)
             join_pairs(&j);
-        for (uint32_t i = 0; i < count; i++)
-            longest = fmax(longest, points[i].length);
     }
 done:
     free(j.pairs);
