@@ -1,6 +1,6 @@
 /* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to the
- * nearest one's surface, or to that behind it where it has more of the weight: an edge lies half way between the points on
- * both sides of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
+ * nearest one's surface, or to that behind it where more of them do: an edge lies half way between the points on both sides
+ * of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
  * method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a linear sample
  * stays where it is nearer than what fills its place. */
 #version 450
@@ -18,9 +18,10 @@ layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint pla
 layout(std430, binding = SPL_BIND_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
 layout(std430, binding = SPL_BIND_ID) writeonly buffer id_buffer { uint payloads[]; };
 
-float share_of(int i)
+/* Of cell i, the cell above being the first; three against it outvote that one, so that edges are not its steps. */
+float vote_of(int i)
 {
-    return i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
+    return i == 0 ? 5.0 : i == 3 ? 1.0 : 3.0;
 }
 
 /* The mean over the level above, whose planes begin at frame.fill_from; word 0 = there is none. */
@@ -44,8 +45,8 @@ uint interpolate(ivec2 at, out uint filled)
     uint second = 0u, second_payload = 0u;
     for (int i = 0; i < 4; i++) {
         bool near = inverse_depth(word[i], SPACING_MASK) >= least, next = !near && word[i] > second;
-        front += near ? share_of(i) : 0.0;
-        behind += !near && word[i] != 0u ? share_of(i) : 0.0;
+        front += near ? vote_of(i) : 0.0;
+        behind += !near && word[i] != 0u ? vote_of(i) : 0.0;
         second = next ? word[i] : second;
         second_payload = next ? payload[i] : second_payload;
     }
@@ -59,7 +60,8 @@ uint interpolate(ivec2 at, out uint filled)
     float weight = 0.0;
     vec3 vector = vec3(0.0);
     for (int i = 0; i < 4; i++) {
-        float w = inverse_depth(word[i], SPACING_MASK), share = word[i] != 0u && w >= least && w < most ? share_of(i) : 0.0;
+        float w = inverse_depth(word[i], SPACING_MASK), share = i == 0 ? 9.0 : i == 3 ? 1.0 : 3.0;
+        share = word[i] != 0u && w >= least && w < most ? share : 0.0;
         sum += share * w;
         weight += share;
         vector += share * payload_vector(payload[i]);

@@ -157,18 +157,18 @@ static const struct cell *find_surface(const struct filter *f, const struct cell
     return near;
 }
 
-/* The mean of four cells, weighted, of those on the surface of the nearest, or of the next behind it if `either` and
- * more of the weight is behind. */
+/* The mean of four cells, weighted, of those on the surface of the nearest, or of the next behind it where there are
+ * `votes` and more of them are for what is behind. */
 static struct cell mean(const struct filter *f, const struct cell *const cells[4], const float weights[4],
-                        float samples, bool either)
+                        float samples, const float *votes)
 {
     struct cell out = {0};
     float sum = 0, weight = 0, most = INFINITY, least, front = 0, behind = 0;
     const struct cell *near = find_surface(f, cells, samples, most, &least);
     if (!near)
         return out;
-    for (int i = 0; i < 4 && either; i++)
-        *(cells[i]->w >= least ? &front : &behind) += cells[i]->w > 0 ? weights[i] : 0;
+    for (int i = 0; i < 4 && votes; i++)
+        *(cells[i]->w >= least ? &front : &behind) += cells[i]->w > 0 ? votes[i] : 0;
     if (behind > front) {
         most = least;
         near = find_surface(f, cells, samples, most, &least);
@@ -205,7 +205,7 @@ static void gather(struct filter *f, uint32_t level)
                 if (2 * x + i % 2 < f->width[level - 1] && 2 * y + i / 2 < f->height[level - 1])
                     children[i] = &f->means[level - 1][(2 * y + i / 2) * f->width[level - 1] + 2 * x + i % 2];
             f->means[level][y * f->width[level] + x] =
-                mean(f, children, (float[]){1, 1, 1, 1}, (float)(1u << level), false);
+                mean(f, children, (float[]){1, 1, 1, 1}, (float)(1u << level), NULL);
         }
     }
 }
@@ -220,7 +220,7 @@ static struct cell above(const struct filter *f, uint32_t level, int x, int y)
         cy = cy < 0 ? 0 : cy < h ? cy : h - 1;
         cells[i] = &f->means[level + 1][cy * w + cx];
     }
-    return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level), true);
+    return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level), (float[]){5, 3, 3, 1});
 }
 
 static void finish_sample(const struct filter *f, struct fill_sample *s, int x, int y)
