@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# From a fresh clone on Debian 12 to pictures over HTTP: installs packages, builds, makes a sample scan, packs it, serves
-# it and fetches view.jpg and depth.png. Runs until Ctrl-C; a second run reuses what the first one made.
+# From a fresh clone on Debian 12 to pictures over HTTP: installs packages, builds, makes a sample scan, packs it,
+# serves it and fetches view.jpg and depth.png. Runs until Ctrl-C; a second run reuses what the first one made.
 set -euo pipefail
 
 usage() {

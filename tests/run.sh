@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything a change must pass, on a bare Debian 12: packages, then one build a row below, each with its suites of tests.
-# The last line is "N passed, N failed, N skipped" over all of them; a build that fails counts as a failed test.
+# Everything a change must pass, on a bare Debian 12: packages, then one build a row below, each with its suites of
+# tests. The last line is "N passed, N failed, N skipped" over all of them; a build that fails counts as a failed test.
 #
 # usage: tests/run.sh [--quick|--full]
 #   --quick   the normal build alone

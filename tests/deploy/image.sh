@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds the container image and uses it as README and deploy/operating.md say: without a token it refuses to start; with
-# a read-only root, no capability and a user without rights it serves a picture; its probe and its stop work. By hand: it
-# needs a registry that has debian:bookworm-slim, and minutes.
+# Builds the container image and uses it as README and deploy/operating.md say: without a token it refuses to start;
+# with a read-only root, no capability and a user without rights it serves a picture; its probe and its stop work. By
+# hand: it needs a registry that has debian:bookworm-slim, and minutes.
 #
 # usage: tests/deploy/image.sh [docker|podman]      BUILD_OPTIONS and RUN_OPTIONS are passed on
 set -euo pipefail
