@@ -1,8 +1,8 @@
 /* A packed dataset (NAME.spld), mapped read-only. api/format.md documents the file byte by byte.
  *
  * Threads: open and close on any one thread; between them every call below may run on any thread at once.
- * A file that is renamed over or removed goes on being what it was. One that is cut or overwritten in place makes frames
- * that need its pages anew fail with SPL_E_CORRUPT. */
+ * A file that is renamed over or removed goes on being what it was. One that is cut or overwritten in place makes
+ * frames that need its pages anew fail with SPL_E_CORRUPT. */
 #ifndef SPLATD_DATASET_H
 #define SPLATD_DATASET_H
 

@@ -96,16 +96,16 @@ struct spl_renderer_options {
 };
 
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err);
-void spl_renderer_destroy(struct spl_renderer *renderer);   /* NULL-safe; datasets must have been removed or are let go */
+void spl_renderer_destroy(struct spl_renderer *renderer); /* NULL-safe; datasets that were not removed are let go */
 const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
 
-/* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the memory
- * limit. Refuses with both sizes when not even one frame's worth fits. */
+/* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the
+ * memory limit. Refuses with both sizes when not even one frame's worth fits. */
 int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
-/* Loads every page that fits, so that the first frame is as fast as the others. Only the first page, which views cannot do
- * without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when it does not fit. */
+/* Loads every page that fits, so that the first frame is as fast as the others. Only the first page, which views cannot
+ * do without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when not. */
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 
 /* The same in steps, for a renderer that has frames to make in between: loads page `page` (0, 1, …; textures

@@ -1,9 +1,9 @@
 /* The golden views: a row is an image in images/, small, and there for one reason that no other row covers.
  *
- * Tolerances say what may differ between machines, never between runs: the drivers compile the kernels for the processor
- * they find, so sums of rounded floats move a fragment across a pixel's border here and there (the share), and what is
- * averaged in fixed point moves by a level (the levels). A pixel that shows something else altogether is counted, too, so
- * shares are kept near what one border row of splats can do. */
+ * Tolerances say what may differ between machines, never between runs: the drivers compile the kernels for the
+ * processor they find, so sums of rounded floats move a fragment across a pixel's border here and there (the share),
+ * and what is averaged in fixed point moves by a level (the levels). A pixel that shows something else altogether is
+ * counted, too, so shares are kept near what one border row of splats can do. */
 #ifndef TESTS_GOLDEN_VIEWS_H
 #define TESTS_GOLDEN_VIEWS_H
 
@@ -28,7 +28,7 @@ static const struct golden goldens[] = {
     /* levels of detail, blending, every material; filtered inner nodes average in fixed point: 1 level */
     {"overview-splat", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}},
-    /* the other method; a pixel takes one splat's colour, so a lost tie changes it altogether: no levels, only a share */
+    /* the other method; a pixel takes one splat's colour, so a lost tie changes it altogether: a share, no levels */
     {"overview-points", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_POINTS, SPL_LAYER_COLOR, 0, 1,
      {32, 64, 96, 255}, 0, {0, 0.002}},
     /* points lie up to eight pixels apart: what is hidden, what is a hole, and what closes it */
@@ -43,12 +43,12 @@ static const struct golden goldens[] = {
     /* orientation of discs; 8 bits of a unit vector: 1 level */
     {"columns-normal", {2, -3, 1.7}, {7.2, 0, 1.8}, 60, SPL_METHOD_SPLAT, SPL_LAYER_NORMAL, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.004}},
-    /* thin things and edges against a transparent sky, sixteen samples a pixel; alpha moves in steps of 16 levels when a
-     * sample does */
+    /* thin things and edges against a transparent sky, sixteen samples a pixel; alpha moves in steps of 16 levels when
+     * a sample does */
     {"sky-transparent", {0, -2, 1.5}, {-1, 3, 6}, 60, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 4, {0, 0, 0, 0}, 0,
      {16, 0.004}},
-    /* textures of smooth random atoms, nearest texels and, in front, interpolated ones; a fragment between two texels may take
-     * either */
+    /* textures of smooth random atoms, nearest texels and, in front, interpolated ones; a fragment between two texels
+     * may take either */
     {"wall-textured", {1.2, 6.9, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 13.25,
      {2, 0.004}, 8},
 };
