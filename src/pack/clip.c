@@ -46,14 +46,16 @@ static bool find_border(const struct lines *l, size_t i, const struct spl_neares
             continue;
         x[count] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
         y[count++] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
-        reach = fmax(reach, near->squared[a]);
+        reach = near->squared[a] > reach ? near->squared[a] : reach;
     }
     if (count < border_points)
         return false;
     for (int k = 0; k < directions; k++) {
         double most = 0;
-        for (unsigned a = 0; a < count && most < least; a++)
-            most = fmax(most, l->turn[k][0] * x[a] + l->turn[k][1] * y[a]);
+        for (unsigned a = 0; a < count && most < least; a++) {
+            double out = l->turn[k][0] * x[a] + l->turn[k][1] * y[a];
+            most = out > most ? out : most;
+        }
         if (most >= least)
             continue;
         least = most;

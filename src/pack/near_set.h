@@ -41,18 +41,22 @@ SPL_INLINE unsigned spl_count_within(const double *values, unsigned n, double li
     return (unsigned)(sum[0] + sum[1] + sum[2] + sum[3]);
 }
 
-/* The least of `n` values above `limit`. */
+/* The least of `n` values, padded like these, above `limit`. */
 SPL_INLINE double spl_next_above(const double *values, unsigned n, double limit)
 {
-    double least = INFINITY;
-    for (unsigned i = 0; i < n; i++)
-        least = values[i] > limit && values[i] < least ? values[i] : least;
-    return least;
+    spl_vec floor = SPL_VEC(limit), least = SPL_VEC(INFINITY);
+    for (unsigned i = 0; i < n; i += SPL_LANES) {
+        spl_vec v = *(const spl_vec *)(values + i);
+        spl_mask less = (v > floor) & (v < least);
+        least = (spl_vec)(((spl_mask)v & less) | ((spl_mask)least & ~less));
+    }
+    double a = least[0] < least[1] ? least[0] : least[1], b = least[2] < least[3] ? least[2] : least[3];
+    return a < b ? a : b;
 }
 
-/* Keeps the `wanted` nearest candidates and tightens the bound to the farthest of them. The threshold that counts just
- * `wanted` is found by false position: on a surface the count grows linearly with the squared distance. Where several
- * are equally far (points on a grid), the first of them are kept. */
+/* Keeps the `wanted` nearest candidates and tightens the bound to just them. The threshold that counts just `wanted`
+ * is found by false position: on a surface the count grows linearly with the squared distance. Where several are
+ * equally far (points on a grid), the first of them are kept. */
 SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
 {
     unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted, ties = 0;
@@ -62,7 +66,7 @@ SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
         c->squared[i] = INFINITY;
     double low = -1, high = c->bound, at_tie = INFINITY;
     for (int step = 0; low_count < wanted && ties == 0; step++) {
-        bool by_value = step >= 4;
+        bool by_value = step >= 6;
         double from = low > 0 ? low : 0;
         double t = by_value
                        ? spl_next_above(c->squared, n, low)
@@ -88,11 +92,8 @@ SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
         ties -= tie;
         kept += (d <= low) | tie;
     }
-    double farthest = 0;
-    for (unsigned i = 0; i < wanted; i++)
-        farthest = c->squared[i] > farthest ? c->squared[i] : farthest;
     c->count = wanted;
-    c->bound = farthest;
+    c->bound = at_tie < INFINITY ? at_tie : low;
 }
 
 #endif

@@ -140,9 +140,10 @@ static struct place place_of(const double nearest[8])
     double quarter[8];
     unsigned empty = 0;
     for (int e = 0; e < 8; e++) {
-        quarter[e] = fmin(nearest[e], nearest[(e + 1) % 8]);
+        double next = nearest[(e + 1) % 8];
+        quarter[e] = nearest[e] < next ? nearest[e] : next;
         if (quarter[e] < INFINITY)
-            place.gap = fmax(place.gap, quarter[e]);
+            place.gap = quarter[e] > place.gap ? quarter[e] : place.gap;
         else
             place.open = true;
         place.filled += nearest[e] < INFINITY ? 0.125 : 0;
@@ -169,20 +170,21 @@ static double roundness(const struct spread *spread)
 /* Eq. 20 over as few neighbours as two, the least of them all: what points of another leaf or wall do not enlarge. */
 static double least_radius(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count)
 {
-    double ascending[SPL_NEIGHBOURS_MAX], least = INFINITY;
+    double squared[SPL_NEIGHBOURS_MAX], least = INFINITY;
     unsigned n = 0;
     for (; n < count && neighbours[n] != UINT32_MAX; n++) {
         uint32_t j = neighbours[n];
-        double squared = 0;
+        squared[n] = 0;
         for (int c = 0; c < 3; c++)
-            squared += (p->axis[c][j] - p->axis[c][i]) * (p->axis[c][j] - p->axis[c][i]);
-        unsigned at = n;
-        for (; at && ascending[at - 1] > squared; at--)
-            ascending[at] = ascending[at - 1];
-        ascending[at] = squared;
+            squared[n] += (p->axis[c][j] - p->axis[c][i]) * (p->axis[c][j] - p->axis[c][i]);
     }
-    for (unsigned k = n < 2 ? n : 2; k && k <= n; k++)
-        least = fmin(least, ascending[k - 1] / k);
+    for (unsigned a = 0; a < n; a++) {
+        double within = 0; /* neighbours as near as this one */
+        for (unsigned b = 0; b < n; b++)
+            within += squared[b] <= squared[a];
+        if (within >= 2 || n < 2)
+            least = squared[a] / within < least ? squared[a] / within : least;
+    }
     return 2 * sqrt(least);
 }
 
@@ -198,8 +200,8 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
     bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
     memcpy(normal, spread.normal, sizeof spread.normal);
     *round = roundness(&spread);
-    *edge = *round > 0;
-    if (*round > 0) {
+    bool flat = *round <= 0;
+    if (!flat) {
         struct spl_moments around = widen(v, i);
         struct spread wide = spread_of(&around);
         double wide_round = roundness(&wide);
@@ -214,6 +216,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
         radius = fmin(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
     eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
+    *edge = !flat && place.open; /* noise alone leaves no quarter empty */
     if (*round > 0.1)
         return radius;
     if (!linear && !place.open)

@@ -22,8 +22,9 @@ struct spl_vicinity {
 };
 
 /* Radius of point i of the run, which has `reach` to its farthest listed neighbour; its normal, of either sign; and how
- * round its surroundings are, from 0 (a surface or a line) to 1 (a volume); `edge` where its
- * surface may end or turn. `near` is scratch for searches in order. */
+ * round its surroundings are, from 0 (a surface or a line) to 1 (a volume); `edge` where its surface may end or turn:
+ * the points around do not lie flat, or are asked for widely, and a quarter of the plane holds none of them. `near` is
+ * scratch for searches in order. */
 double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, double reach, struct spl_nearest *near,
                            double normal[3], double *round, bool *edge);
 

@@ -70,20 +70,19 @@ void spl_unsettled_finish(struct spl_unsettled *unsettled)
 static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned k, float limit,
                    float *radius, float *uncertainty)
 {
-    float around[SPL_NEIGHBOURS_MAX];
-    unsigned n = 0;
+    float around[SPL_NEIGHBOURS_MAX], most = fminf(p->radius[i], limit);
+    unsigned n = 0, bound = 0;
     double sum = 0;
     const float *a = p->normal[i];
     for (; n < k && neighbours[n] != UINT32_MAX; n++) {
         const float *b = p->normal[neighbours[n]];
-        float r = p->radius[neighbours[n]], bend = 2 - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+        float bend = 2 - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
         sum += bend * bend;
-        unsigned at = n;
-        for (; at > 0 && around[at - 1] > r; at--)
-            around[at] = around[at - 1];
-        around[at] = r;
+        around[n] = p->radius[neighbours[n]];
+        bound += stray_limit * around[n] < most;
     }
-    *radius = fminf(p->radius[i], fminf(limit, stray_limit * around[n / 2]));
+    /* only where more than half of the radii bound this one does their median, and is sorted for */
+    *radius = bound > n / 2 ? stray_limit * spl_median(around, n) : most;
     *uncertainty = (float)(*radius * sum / n);
 }
 
