@@ -16,7 +16,8 @@
 static const double reach_spacings = 3;
 /* Two surfaces less than a spacing apart cannot be told from one that is rough. */
 static const double margin_spacings = 1;
-/* Samples: as far as rings reach; in pixels, where every sample of the kernel is looked at, or a pixel has many. */
+/* Samples: as far as rings reach; in pixels, where every sample of the kernel is looked at, or a pixel has many, and
+ * around the image, where a sample costs as much as in it. */
 static const double kernel_most = 128, kernel_most_px = 64;
 
 static uint32_t round_up(double value, uint32_t align)
@@ -28,9 +29,8 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
 {
     double side = view->supersample;
     double kernel = view->kernel > 0 ? view->kernel * side / 2 : reach_spacings * spacing;
-    double most = kernel_most_px * (side > 1 ? side : 1);
-    if (view->visibility != SPL_VISIBILITY_CONSTANT)
-        most = fmax(most, kernel_most);
+    double around = kernel_most_px * (side > 1 ? side : 1);
+    double most = view->visibility == SPL_VISIBILITY_CONSTANT ? around : fmax(around, kernel_most);
     kernel = fmin(fmax(kernel, 1.5), most);
     int rings = 1 + (int)floor(log2(kernel) + 0.25);
     rings = rings < 2 ? 2 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
@@ -39,8 +39,8 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view,
     uint32_t top = plan->levels > plan->rings ? plan->levels : plan->rings;
     double looks = view->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
     plan->align = 1u << top;
-    plan->guard = round_up(kernel, plan->align);
-    plan->apron = round_up(looks + (2u << plan->levels) + 2, plan->align); /* 2: normals look so far */
+    plan->guard = 1u << (uint32_t)ceil(log2(fmin(fmax(kernel, 4), around))); /* 4: of whole groups of lanes */
+    plan->apron = round_up(looks + (2u << plan->levels) + 2, plan->align);   /* 2: normals look so far */
 }
 
 void spl_fill_set_params(struct spl_tile *tile)

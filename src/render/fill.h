@@ -17,8 +17,8 @@ struct spl_fill_plan {
     double kernel;   /* the farthest that a point hides others */
     uint32_t rings;  /* levels of the pyramid that visibility looks at */
     uint32_t levels; /* of the pyramid that holes are filled from */
-    uint32_t align;  /* tiles begin at multiples of it */
-    uint32_t guard;  /* drawn around the image, and looked at; a multiple of align */
+    uint32_t align;  /* tiles begin at multiples of it from where the guard begins */
+    uint32_t guard;  /* drawn around the image, and looked at */
     uint32_t apron;  /* how far samples act on each other: drawn around a tile; a multiple of align */
 };
 

@@ -1,7 +1,7 @@
 /* Tiles of whole pixels, as wide as the image where they fit. A tile is the image's camera shifted: the same sample has
- * the same place in the world in every tile, and cells of the fill pyramid begin at multiples of their size in the
- * image, so a pixel has the same bytes however the image is cut. Supersampling is a larger tile that the resolve pass
- * averages. */
+ * the same place in the world in every tile, and cells of the fill pyramid begin at multiples of their size from
+ * the guard's corner, so a pixel has the same bytes however the image is cut. Supersampling is a larger tile that the
+ * resolve pass averages. */
 #include "render/tiling.h"
 
 #include <math.h>
@@ -50,10 +50,8 @@ int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint
 static void widen(const struct spl_fill_plan *plan, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
                   int64_t *from, int64_t *to)
 {
-    int64_t align = plan->align;
-    *from = (int64_t)begin * side - plan->apron;
-    *from -= (*from % align + align) % align;
-    *from = *from < -(int64_t)plan->guard ? -(int64_t)plan->guard : *from;
+    int64_t guarded = (int64_t)begin * side - plan->apron + plan->guard;
+    *from = (guarded > 0 ? guarded - guarded % plan->align : 0) - plan->guard;
     *to = (int64_t)end * side + plan->apron;
     *to = *to > (int64_t)size * side + plan->guard ? (int64_t)size * side + plan->guard : *to;
 }

@@ -83,16 +83,19 @@ static void pull(struct filter *f, uint32_t level)
     }
 }
 
-static void block(const struct filter *f, const struct cell *c, float z, int dx, int dy, bool constant, float steep[8])
+/* Whether the sample of `c` is nearer than z; then it blocks its sector, where it is near enough. */
+static bool block(const struct filter *f, const struct cell *c, float z, int dx, int dy, bool constant, float steep[8])
 {
     float angle = c->w * c->spacing * f->radius, kernel = (float)f->plan->kernel, squared = (float)(dx * dx + dy * dy);
-    float reach = constant ? kernel : fminf(angle * f->reach, kernel);
-    if (c->w <= 0 || squared > reach * reach)
-        return;
-    float value = (z * c->w - 1 - f->margin * angle) * f->focal / sqrtf(squared);
-    double turn = atan2(dy, dx) / (M_PI / 4);
-    int sector = (int)floor(turn + 8 + 1e-9) % 8;
-    steep[sector] = fmaxf(steep[sector], value);
+    float reach = constant ? kernel : fminf(angle * f->reach, kernel), nearer = z * c->w - 1 - f->margin * angle;
+    if (c->w <= 0 || nearer <= 0)
+        return false;
+    if (squared > 0 && squared <= reach * reach) {
+        double turn = atan2(dy, dx) / (M_PI / 4);
+        int sector = (int)floor(turn + 8 + 1e-9) % 8;
+        steep[sector] = fmaxf(steep[sector], nearer * f->focal / sqrtf(squared));
+    }
+    return true;
 }
 
 static float coarse_reach(const struct filter *f, int x, int y)
@@ -122,15 +125,18 @@ static bool is_visible(const struct filter *f, int x, int y, float z)
                     block(f, &f->nearest[0][cy * (int)f->width[0] + cx], z, cx - x, cy - y, true, steep);
     } else {
         float reach = coarse_reach(f, x, y);
-        for (int level = 0; level < (int)f->plan->rings; level++) {
-            if (level > 1 && (float)(1 << level) > reach)
-                break;
+        int level = 1;
+        while (level + 1 < (int)f->plan->rings && (float)(2 << level) <= reach)
+            level++;
+        for (bool nearer = true; level >= 0 && nearer; level--) {
+            nearer = false;
             for (int i = 0; i < 9; i++) {
                 int cx = (x >> level) + i % 3 - 1, cy = (y >> level) + i / 3 - 1;
-                if (i == 4 || cx < 0 || cy < 0 || cx >= (int)f->width[level] || cy >= (int)f->height[level])
+                if (cx < 0 || cy < 0 || cx >= (int)f->width[level] || cy >= (int)f->height[level])
                     continue;
                 const struct cell *c = &f->nearest[level][cy * (int)f->width[level] + cx];
-                block(f, c, z, (int)c->x - x, (int)c->y - y, false, steep);
+                float none[8] = {0};
+                nearer |= block(f, c, z, (int)c->x - x, (int)c->y - y, false, i == 4 ? none : steep);
             }
         }
     }
