@@ -79,7 +79,9 @@ int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, st
     if (!dataset->path)
         goto done;
     strcpy(dataset->path, path);
-    rc = map_file(dataset, err);
+    rc = spl_late_wires_create(&dataset->wires, err);
+    if (!rc)
+        rc = map_file(dataset, err);
     if (!rc)
         rc = spl_dataset_read_sections(dataset, verify, err);
     if (!rc)
@@ -109,6 +111,7 @@ void spl_dataset_close(struct spl_dataset *dataset)
     if (dataset->fd >= 0)
         close(dataset->fd);
     json_decref(dataset->meta);
+    spl_late_wires_destroy(dataset->wires);
     free(dataset->meta_text);
     free(dataset->nodes);
     free(dataset->chunks);

@@ -34,7 +34,8 @@ struct frame_job {
     const struct spl_view *view;
     struct spl_frame *frame;
     struct spl_tiling tiling;
-    struct spl_error page_error; /* why a page could not be loaded, unless it was only the limit */
+    const struct spl_wires *wires; /* method fill */
+    struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
 };
 
 static bool ask_slot(struct frame_job *job, uint32_t slot)
@@ -84,9 +85,7 @@ static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (job->view->method == SPL_METHOD_FILL)
-        rc = spl_wires_draw(job->resident->wires, &tile->camera, &r->list, err);
-    if (rc)
+    if (job->view->method == SPL_METHOD_FILL && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
         return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
@@ -254,8 +253,8 @@ static int render_view(struct spl_renderer *renderer, const struct spl_dataset *
     frame->stats.complete = true;
     if (view->method == SPL_METHOD_FILL)
         rc = plan_fill(&job, err);
-    if (!rc && view->method == SPL_METHOD_FILL && !job.resident->wires)
-        rc = spl_wires_create(dataset, &job.resident->wires, err);
+    if (!rc && view->method == SPL_METHOD_FILL)
+        rc = spl_dataset_get_wires(dataset, &job.wires, err);
     if (!rc)
         rc = spl_tiling_init(&job.tiling, view, renderer->scratch.samples, err);
     if (!rc)

@@ -7,7 +7,6 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "render/wires.h"
 #include "dataset/dictionary.h"
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
@@ -28,7 +27,6 @@ static void drop_dataset(struct spl_residency *residency, struct spl_resident_da
     for (uint32_t i = 0; i < resident->slot_count; i++)
         drop_page(residency, &resident->pages[i]);
     free(resident->pages);
-    spl_wires_destroy(resident->wires);
 }
 
 void spl_residency_finish(struct spl_residency *residency)

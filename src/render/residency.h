@@ -21,7 +21,6 @@ struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
     uint32_t page_count, slot_count;
-    struct spl_wires *wires; /* NULL until method fill draws the dataset; render/wires.h */
 };
 
 static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)

@@ -1,244 +1,11 @@
-/* Wires of a dataset; see wires.h. Made once, when method fill first draws the dataset: which points belong together
- * depends on no camera. A join of two points is cut into straight pieces, each with the looks of the nearer one; over a
- * gap they follow the arc that the stretches on both sides are parts of. Each tile takes the pieces that it may see,
- * block by block, relative to the eye in doubles. */
+/* Wires as a camera sees them. Each tile takes the pieces that it may see, block by block, relative to the eye in
+ * doubles. */
 #include "render/wires.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "base/memory.h"
-#include "dataset/chunk.h"
 #include "geom/octahedral.h"
 #include "render/frustum.h"
-#include "render/wire_join.h"
-
-enum { block_pieces = 64, halves_most = 16 };
-static const double straight = 8; /* spacings that half a piece over a gap is long */
-
-struct look {
-    float normal[3];
-    uint32_t color, id;
-};
-
-struct piece {
-    double from[3], to[3];
-    struct look look;
-};
-
-struct block {
-    double low[3], high[3];
-};
-
-struct spl_wires {
-    struct piece *pieces;
-    struct block *blocks; /* of block_pieces each */
-    size_t count, capacity;
-};
-
-struct gathered {
-    struct spl_wire_point *points;
-    struct look *looks;
-    size_t count, capacity;
-};
-
-static int add_point(struct gathered *g, const struct spl_node *node, const struct spl_chunk *chunk, uint32_t index,
-                     const struct spl_splat *s, struct spl_error *err)
-{
-    if (g->count == g->capacity) {
-        size_t larger = 2 * g->capacity + 1024;
-        struct spl_wire_point *points = spl_realloc(g->points, larger, sizeof *points, err);
-        if (points)
-            g->points = points;
-        struct look *looks = points ? spl_realloc(g->looks, larger, sizeof *looks, err) : NULL;
-        if (!looks)
-            return SPL_E_NOMEM;
-        g->looks = looks;
-        g->capacity = larger;
-    }
-    struct spl_wire_point *point = &g->points[g->count];
-    struct look *look = &g->looks[g->count++];
-    point->spacing = fminf(s->radius, SPL_FILL_STRAY * chunk->radius_min);
-    look->color = s->color[0] | (uint32_t)s->color[1] << 8 | (uint32_t)s->color[2] << 16;
-    look->id = chunk->first_id + index;
-    for (int c = 0; c < 3; c++) {
-        point->position[c] = node->origin[c] + s->position[c];
-        look->normal[c] = s->normal[c];
-    }
-    return SPL_OK;
-}
-
-static int gather_node(struct gathered *g, const struct spl_dataset *dataset, const struct spl_node *node,
-                       const uint32_t *page, struct spl_error *err)
-{
-    uint32_t chunk_count;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count) + node->first_chunk;
-    for (uint32_t k = 0; k < node->chunk_count; k++)
-        for (uint32_t i = 0; chunks[k].geometry_bits >> SPL_GEOMETRY_LINEAR && i < chunks[k].count; i++) {
-            struct spl_splat splat;
-            spl_chunk_decode(&chunks[k], page, i, &splat);
-            int rc = splat.linear ? add_point(g, node, &chunks[k], i, &splat, err) : SPL_OK;
-            if (rc)
-                return rc;
-        }
-    return SPL_OK;
-}
-
-/* Pages are read once where nodes that follow each other share them. */
-static int gather(struct gathered *g, const struct spl_dataset *dataset, struct spl_error *err)
-{
-    uint32_t node_count, chunk_count, loaded = UINT32_MAX, *page = NULL;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    int rc = SPL_OK;
-    for (uint32_t n = 0; n < node_count && !rc; n++) {
-        const struct spl_node *node = &nodes[n];
-        bool any = false;
-        for (uint32_t k = 0; k < node->chunk_count && !node->child_count; k++)
-            any |= chunks[node->first_chunk + k].geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
-        if (!any)
-            continue;
-        if (loaded != node->page) {
-            size_t bytes;
-            spl_dataset_get_page(dataset, node->page, &bytes);
-            free(page);
-            page = spl_alloc(bytes / sizeof *page + 1, sizeof *page, err); /* a field at the very end loads its word */
-            rc = page ? spl_dataset_read_page(dataset, node->page, page, err) : SPL_E_NOMEM;
-            loaded = node->page;
-        }
-        if (!rc)
-            rc = gather_node(g, dataset, node, page, err);
-    }
-    free(page);
-    return rc;
-}
-
-static int add_piece(struct spl_wires *w, const double from[3], const double to[3], const struct look *look,
-                     struct spl_error *err)
-{
-    if (w->count == w->capacity) {
-        size_t larger = 2 * w->capacity + 1024;
-        struct piece *pieces = spl_realloc(w->pieces, larger, sizeof *pieces, err);
-        if (!pieces)
-            return SPL_E_NOMEM;
-        w->pieces = pieces;
-        w->capacity = larger;
-    }
-    struct piece *piece = &w->pieces[w->count++];
-    memcpy(piece->from, from, sizeof piece->from);
-    memcpy(piece->to, to, sizeof piece->to);
-    piece->look = *look;
-    return SPL_OK;
-}
-
-/* The way from the middle of the straight line between two points to that of the arc on which both and what they are
- * joined with lie: over `length` between stretches of `base` on average, whose directions an end lies `aside` of, its
- * curvature is 2 aside / (length (length + base)), its height length^2 / 8 times that. */
-static double find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, double rise[3])
-{
-    double length = 0, base = 0, aside[3] = {0};
-    uint32_t ends[2] = {a, b};
-    for (int c = 0; c < 3; c++)
-        length += (p[b].position[c] - p[a].position[c]) * (p[b].position[c] - p[a].position[c]);
-    length = sqrt(length);
-    memset(rise, 0, 3 * sizeof *rise);
-    for (int k = 0; k < 2; k++) {
-        uint32_t own = ends[k], far = ends[1 - k];
-        double heading[3], along = 0, behind = spl_wires_heading(p, own, far, length, heading);
-        if (!(behind > 0))
-            return length;
-        base += behind / 2;
-        for (int c = 0; c < 3; c++)
-            along += (p[far].position[c] - p[own].position[c]) * heading[c];
-        for (int c = 0; c < 3; c++)
-            aside[c] += (p[far].position[c] - p[own].position[c] - along * heading[c]) / 2;
-    }
-    for (int c = 0; c < 3; c++)
-        rise[c] = -aside[c] * length / (4 * (length + base));
-    return length;
-}
-
-static int add_join(struct spl_wires *w, const struct gathered *g, uint32_t a, uint32_t b, struct spl_error *err)
-{
-    double rise[3], from[3], to[3], length = find_arc(g->points, a, b, rise);
-    double spacing = fmax(g->points[a].spacing, g->points[b].spacing);
-    int halves = (int)fmin(ceil(length / (2 * straight * spacing)), halves_most), rc = SPL_OK;
-    memcpy(from, g->points[a].position, sizeof from);
-    for (int i = 1; i <= 2 * halves && !rc; i++) {
-        double t = (double)i / (2 * halves);
-        for (int c = 0; c < 3; c++)
-            to[c] = g->points[a].position[c] + t * (g->points[b].position[c] - g->points[a].position[c]) +
-                    4 * t * (1 - t) * rise[c];
-        rc = add_piece(w, from, to, &g->looks[i <= halves ? a : b], err);
-        memcpy(from, to, sizeof from);
-    }
-    return rc;
-}
-
-/* Chain by chain, so that the pieces of a block lie close together. */
-static int add_chains(struct spl_wires *w, const struct gathered *g, struct spl_error *err)
-{
-    const struct spl_wire_point *p = g->points;
-    int rc = SPL_OK;
-    for (uint32_t i = 0; i < g->count && !rc; i++) {
-        if (p[i].next[0] == SPL_WIRE_END || p[i].next[1] != SPL_WIRE_END || p[i].other < i)
-            continue;
-        for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc;) {
-            uint32_t next = p[at].next[p[at].next[0] == before];
-            rc = add_join(w, g, at, next, err);
-            before = at;
-            at = next;
-        }
-    }
-    return rc;
-}
-
-static int bound_blocks(struct spl_wires *w, struct spl_error *err)
-{
-    w->blocks = spl_alloc_raw(w->count / block_pieces + 1, sizeof *w->blocks, err);
-    if (!w->blocks)
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < w->count; i++) {
-        struct block *block = &w->blocks[i / block_pieces];
-        const struct piece *piece = &w->pieces[i];
-        for (int c = 0; c < 3; c++) {
-            double low = fmin(piece->from[c], piece->to[c]), high = fmax(piece->from[c], piece->to[c]);
-            block->low[c] = i % block_pieces ? fmin(block->low[c], low) : low;
-            block->high[c] = i % block_pieces ? fmax(block->high[c], high) : high;
-        }
-    }
-    return SPL_OK;
-}
-
-int spl_wires_create(const struct spl_dataset *dataset, struct spl_wires **out, struct spl_error *err)
-{
-    struct gathered g = {0};
-    struct spl_wires *w = *out = spl_alloc(1, sizeof *w, err);
-    int rc = w ? gather(&g, dataset, err) : SPL_E_NOMEM;
-    if (!rc)
-        rc = spl_wires_join(g.points, (uint32_t)g.count, err);
-    if (!rc)
-        rc = add_chains(w, &g, err);
-    if (!rc)
-        rc = bound_blocks(w, err);
-    free(g.points);
-    free(g.looks);
-    if (rc) {
-        spl_wires_destroy(w);
-        *out = NULL;
-    }
-    return rc;
-}
-
-void spl_wires_destroy(struct spl_wires *wires)
-{
-    if (!wires)
-        return;
-    free(wires->pieces);
-    free(wires->blocks);
-    free(wires);
-}
 
 static void to_view(const struct spl_camera *camera, const double at[3], double out[3])
 {
@@ -273,7 +40,7 @@ static uint32_t pack_normal(const struct spl_camera *camera, const float normal[
     return code;
 }
 
-static void draw_piece(const struct piece *piece, const struct spl_camera *camera, struct spl_draw_list *list)
+static void draw_piece(const struct spl_wire_piece *piece, const struct spl_camera *camera, struct spl_draw_list *list)
 {
     struct spl_draw_line line = {.color = piece->look.color, .id = piece->look.id};
     double ends[2][3];
@@ -299,8 +66,8 @@ static void draw_piece(const struct piece *piece, const struct spl_camera *camer
 int spl_wires_draw(const struct spl_wires *wires, const struct spl_camera *camera, struct spl_draw_list *list,
                    struct spl_error *err)
 {
-    for (size_t first = 0; first < wires->count; first += block_pieces) {
-        const struct block *block = &wires->blocks[first / block_pieces];
+    for (size_t first = 0; first < wires->count; first += SPL_WIRES_BLOCK) {
+        const struct spl_wire_block *block = &wires->blocks[first / SPL_WIRES_BLOCK];
         double least[3], size[3];
         for (int c = 0; c < 3; c++) {
             least[c] = block->low[c] - camera->eye[c];
@@ -309,10 +76,10 @@ int spl_wires_draw(const struct spl_wires *wires, const struct spl_camera *camer
         struct spl_view_box box = spl_view_box(camera, least, size);
         if (!spl_view_box_visible(camera, &box, 1))
             continue;
-        int rc = spl_draw_list_reserve_lines(list, block_pieces, err);
+        int rc = spl_draw_list_reserve_lines(list, SPL_WIRES_BLOCK, err);
         if (rc)
             return rc;
-        for (size_t i = first; i < wires->count && i < first + block_pieces; i++)
+        for (size_t i = first; i < wires->count && i < first + SPL_WIRES_BLOCK; i++)
             draw_piece(&wires->pieces[i], camera, list);
     }
     return SPL_OK;

@@ -543,7 +543,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                        .points = view->method != SPL_METHOD_SPLAT,
                                        .textured = always,
                                        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
-    struct spl_wires *wires = NULL;
+    const struct spl_wires *wires = NULL;
     struct spl_fill_plan plan;
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
@@ -559,7 +559,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     }
     if (!rc)
         rc = spl_select(&params, &s.list, err);
-    if (!rc && view->method == SPL_METHOD_FILL && !(rc = spl_wires_create(dataset, &wires, err)))
+    if (!rc && view->method == SPL_METHOD_FILL && !(rc = spl_dataset_get_wires(dataset, &wires, err)))
         rc = spl_wires_draw(wires, &s.camera, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
@@ -594,7 +594,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     free(s.textures);
     free(s.atoms);
     spl_draw_list_finish(&s.list);
-    spl_wires_destroy(wires);
     if (rc)
         spl_frame_finish(frame);
     return rc;

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "dataset/wires.h"
 
 static void encode_uri(char *out, size_t capacity, const char *id)
 {
@@ -30,7 +31,9 @@ int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_ent
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", path);
         goto done;
     }
-    if ((rc = spl_dataset_open(path, verify, &entry->dataset, err)))
+    const struct spl_wires *wires;
+    if ((rc = spl_dataset_open(path, verify, &entry->dataset, err)) ||
+        (rc = spl_dataset_get_wires(entry->dataset, &wires, err))) /* joined here, or the first frame would wait */
         goto done;
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))

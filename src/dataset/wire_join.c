@@ -3,20 +3,20 @@
  * first: what is joined then says where its wire goes, so that longer gaps ask for longer stretches. Where both sides
  * know their direction they must meet as an arc does, with the same bend at both (a sagging wire), not as an S (two
  * wires beside each other). Distances count in the points' own spacing; there is no length in metres. */
-#include "render/wire_join.h"
+#include "dataset/wire_join.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
 
-static const double near = 3;    /* spacings within which a point that is alone is joined */
-static const double far = 100;   /* and beyond which nothing is */
-static const double gap = 4;     /* longest gap, as a multiple of the stretches that it joins */
+static const double near = 3;      /* spacings within which a point that is alone is joined */
+static const double far = 100;     /* and beyond which nothing is */
+static const double gap = 4;       /* longest gap, as a multiple of the stretches that it joins */
 static const double shortest = 64; /* and of the shorter of both */
-static const double off = 0.1;   /* a share of a gap that the other end may lie off the direction of this one */
-static const double bend = 0.05; /* by which that may differ between both ends */
-enum { looks_most = 256 };       /* ends of a cell that are looked at: noise must not cost more */
+static const double off = 0.1;     /* a share of a gap that the other end may lie off the direction of this one */
+static const double bend = 0.05;   /* by which that may differ between both ends */
+enum { looks_most = 256 };         /* ends of a cell that are looked at: noise must not cost more */
 
 struct cell {
     uint64_t key;

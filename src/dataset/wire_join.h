@@ -1,6 +1,6 @@
 /* Points on wires, poles and cables, joined along them. */
-#ifndef SPL_RENDER_WIRE_JOIN_H
-#define SPL_RENDER_WIRE_JOIN_H
+#ifndef SPL_DATASET_WIRE_JOIN_H
+#define SPL_DATASET_WIRE_JOIN_H
 
 #include <stdint.h>
 
