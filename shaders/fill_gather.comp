@@ -1,6 +1,6 @@
-/* Second pull, of what is visible: a cell holds the mean of those of its 2 x 2 children that belong to the nearest one's
- * surface, inverse depth (linear along a plane's image) and payload (constant 0: its group). The first run (constant 1)
- * takes samples and their states. */
+/* Second pull, of what is visible: a cell holds the mean of those of its 2 x 2 children that belong to the nearest
+ * one's surface, inverse depth (linear along a plane's image) and payload (constant 0: its group). The first run
+ * (constant 1) takes samples and their states. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/fill.glsl"

@@ -1,5 +1,5 @@
-/* Method fill: wires, lines one sample wide between the points that src/render/wires.c joined, an invocation each. They are
- * linear, as their points are. */
+/* Method fill: wires, lines one sample wide between the points that src/dataset/wires.c joined, an invocation each.
+ * They are linear, as their points are. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"

@@ -1,6 +1,6 @@
-/* Normals of the filled depth, for datasets without any: of a plane through the sample that fits those around it, 5 x 5 of the
- * same surface, by least squares. Along a plane's image inverse depth is linear, w = w0 + b x + c y, and the plane's normal is
- * (b fx, c fy, w0 - b (x0 - cx) - c (y0 - cy)). Towards the eye. */
+/* Normals of the filled depth, for datasets without any: of a plane through the sample that fits those around it, 5 x 5
+ * of the same surface, by least squares. Along a plane's image inverse depth is linear, w = w0 + b x + c y, and the
+ * plane's normal is (b fx, c fy, w0 - b (x0 - cx) - c (y0 - cy)). Towards the eye. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/fill.glsl"

@@ -1,6 +1,6 @@
-/* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to the
- * nearest one's surface, or to that behind it where more of them do: an edge lies half way between the points on both sides
- * of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
+/* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to
+ * the nearest one's surface, or to that behind it where more of them do: an edge lies half way between the points on
+ * both sides of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
  * method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a linear sample
  * stays where it is nearer than what fills its place. */
 #version 450
@@ -40,8 +40,8 @@ uint interpolate(ivec2 at, out uint filled)
         nearest = nearer ? word[i] : nearest;
         nearest_payload = nearer ? payload[i] : nearest_payload;
     }
-    float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level))), most = 1e38;
-    float front = 0.0, behind = 0.0;
+    float least = inverse_depth(nearest, SPACING_MASK) / (1.0 + surface_tolerance(nearest, float(2u << level)));
+    float most = 1e38, front = 0.0, behind = 0.0;
     uint second = 0u, second_payload = 0u;
     for (int i = 0; i < 4; i++) {
         bool near = inverse_depth(word[i], SPACING_MASK) >= least, next = !near && word[i] > second;

@@ -1,5 +1,6 @@
-/* Occlusion, step 2: chunks that lie behind everything drawn so far in all of their tiles are dropped by drawing none of
- * their splats. A fragment behind its sample's pushed depth changes neither pass, so the image stays the same to the bit. */
+/* Occlusion, step 2: chunks that lie behind everything drawn so far in all of their tiles are dropped by drawing none
+ * of their splats. A fragment behind its sample's pushed depth changes neither pass, so the image stays the same to the
+ * bit. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/frame.glsl"

@@ -1,5 +1,5 @@
-/* Occlusion, step 1: the greatest pushed depth of every tile of the image. An empty sample's word is the greatest of all,
- * so a tile that is not full occludes nothing. */
+/* Occlusion, step 1: the greatest pushed depth of every tile of the image. An empty sample's word is the greatest of
+ * all, so a tile that is not full occludes nothing. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/frame.glsl"

@@ -81,8 +81,8 @@ uint sample_beside(ivec2 at, int i)
     return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
 }
 
-/* What stands for sample `at`: itself, or, where it is a speck (empty, and at least seven of the eight around it are not),
- * the one of those whose depth is closest to their mean: no disc of the surface around happened to reach it. */
+/* What stands for sample `at`: itself, or, where it is a speck (empty, and at least seven of the eight around it are
+ * not), the one of those whose depth is closest to their mean: no disc of the surface around happened to reach it. */
 uint standing_for(ivec2 at)
 {
     uint own = sample_index(at), found = own;

@@ -1,11 +1,11 @@
 /* Proves at open that a device runs our kernels as we mean them: struct layout of shared.h, specialisation constants,
- * storage bindings 0..7, texel buffers, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c checks
- * every word.
+ * storage bindings 0..7, texel buffers, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c
+ * checks every word.
  *
  * OUTPUT: constants 0..7, then each field of frame, then each field of chunks[1], in the order of shared.h.
  * DRAW[i] -> SUMS[i] = bits of float(DRAW[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of DRAW, [3] or of ~PAGE;
- * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i, plus by how much texels differ from
- * PAGE, which lies SPL_BIND_PAGE times its size into its buffer. */
+ * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i, plus by how much texels differ
+ * from PAGE, which lies SPL_BIND_PAGE times its size into its buffer. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64

@@ -1,5 +1,5 @@
-/* Structs and constants that C and GLSL share; both include this file as it is. Only 4-byte scalars, so that std430 and C
- * agree without padding. Sizes are asserted on the C side here; every device reads each field on the GLSL side in the
+/* Structs and constants that C and GLSL share; both include this file as it is. Only 4-byte scalars, so that std430 and
+ * C agree without padding. Sizes are asserted on the C side here; every device reads each field on the GLSL side in the
  * self-test at open (selftest.comp: a changed struct changes it there too). */
 #ifndef SPL_SHARED_H
 #define SPL_SHARED_H
@@ -19,9 +19,9 @@
 
 /* A chunk: the unit of culling and decoding. Its splats lie in pruning order: the first n are an even subsample. */
 #define SPL_CHUNK_SPLATS 128
-/* A draw-list entry is a run of splats of one chunk: chunk index << 2 | run. SPL_LANES invocations share an entry and draw
- * its splats in steps, so that the chunk's header is loaded once for several splats. Counts are multiples of SPL_LANES:
- * an idle lane costs as much as a busy one on software drivers, whose subgroups have that many. */
+/* A draw-list entry is a run of splats of one chunk: chunk index << 2 | run. SPL_LANES invocations share an entry and
+ * draw its splats in steps, so that the chunk's header is loaded once for several splats. Counts are multiples of
+ * SPL_LANES: an idle lane costs as much as a busy one on software drivers, whose subgroups have that many. */
 #define SPL_RUN_SPLATS 32
 #define SPL_RUN_BITS 2
 #define SPL_LANES 8
@@ -38,7 +38,8 @@
 #define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
 #define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
 #define SPL_BIND_COUNT 8
-/* The occlusion kernels use two of them otherwise, the lines of wires one, and so does the shade pass of splats with textures. */
+/* The occlusion kernels use two of them otherwise, the lines of wires one, and so does the shade pass of splats with
+ * textures. */
 #define SPL_BIND_BOUNDS SPL_BIND_DRAW  /* struct spl_chunk_bounds[], parallel to the chunks */
 #define SPL_BIND_LINES SPL_BIND_CHUNKS /* struct spl_draw_line[] */
 #define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
@@ -78,16 +79,17 @@
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
 
-/* A splat covers the samples within this many sample sizes of its centre, however small it is: half a sample's diagonal, so
- * that any centre covers one, and a thousandth more, for a centre in the corner between four and what floats round. */
+/* A splat covers the samples within this many sample sizes of its centre, however small it is: half a sample's
+ * diagonal, so that any centre covers one, and a thousandth more, for a centre in the corner between four and what
+ * floats round. */
 #define SPL_LOW_PASS 0.7081f
 
-/* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many sample
- * sizes from the centre's depth (a slant of 76 degrees). */
+/* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many
+ * sample sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f
 
-/* Seen at a slant, discs of one surface differ in depth by more than seen square on: by up to 1 / cos for the same error of a
- * normal. The blend margin grows with it, up to this much. */
+/* Seen at a slant, discs of one surface differ in depth by more than seen square on: by up to 1 / cos for the same
+ * error of a normal. The blend margin grows with it, up to this much. */
 #define SPL_MARGIN_SLANT 4.0f
 
 /* The coarsest level of a texture that is drawn has this many texels a side; a splat has so many atoms at most. */
@@ -97,19 +99,19 @@
 /* A chunk in CTEX: 0 where none of its splats has an atom, else the word of its page's TEXP where its codes start, and
  * from this bit on the number of planes, 1..8. */
 #define SPL_CHUNK_TEXTURE_PLANES 28
-/* The same word of a drawn chunk has this bit where texels are interpolated; then the textures are summed first, a splat after
- * the other, since its fragments outnumber its texels. */
+/* The same word of a drawn chunk has this bit where texels are interpolated; then the textures are summed first, a
+ * splat after the other, since its fragments outnumber its texels. */
 #define SPL_CHUNK_TEXTURE_SMOOTH 27
 
-/* Words from a summed texture to the next. A row more than there is: lanes that draw neighbours at a power of two from one
- * another would fight for the same lines of a cache. */
+/* Words from a summed texture to the next. A row more than there is: lanes that draw neighbours at a power of two from
+ * one another would fight for the same lines of a cache. */
 #define SPL_SUMMED_WORDS(size) ((size) * ((size) + 1))
 #define SPL_SUM_LANES(size) ((size) > 8 ? SPL_LANES : 1) /* invocations that share a texture */
 
 /* A chunk's codes in TEXP, a stream of bits that begins on a word; for each plane
  *   a header of SPL_TEXTURE_HEADER_BITS
- *   a mask: a bit for each splat that has the plane before (the first plane: for each of SPL_CHUNK_SPLATS), set where it
- *   has this one too
+ *   a mask: a bit for each splat that has the plane before (the first plane: for each of SPL_CHUNK_SPLATS), set where
+ *   it has this one too
  *   the codes of its splats, in their order, index_bits + weight_bits each, the index in the low bits
  * The weight's code is signed. Header: */
 #define SPL_TEXTURE_HEADER_BITS 16
@@ -119,8 +121,9 @@
 #define SPL_TEXTURE_GAP 14         /* 14..15, of spl_code_gap() */
 #define SPL_TEXTURE_TAIL_WORDS 6   /* zeros that end a TEXP: a mask is read as five words wherever it ends */
 
-/* Method fill. A depth word of its points has, from the low end: whether the point is linear, and its radius as a multiple
- * of frame.fill_radius, a float of one bit of mantissa (the field's word for it here is spacing, which is in proportion). */
+/* Method fill. A depth word of its points has, from the low end: whether the point is linear, and its radius as a
+ * multiple of frame.fill_radius, a float of one bit of mantissa (the field's word for it here is spacing, which is in
+ * proportion). */
 #define SPL_FILL_LINEAR 1u
 #define SPL_FILL_SPACING_BITS 5
 #define SPL_FILL_DEPTH_BITS 63u
@@ -175,30 +178,30 @@ struct spl_draw_chunk {
 #define SPL_COLOR_U 4
 #define SPL_COLOR_V 8
 #define SPL_COLOR_BASE_Y 16
-/* A drawn chunk has in the upper 8 bits how many words after the first of its colours its clip lines start, plus 1; 0 = it has
- * none. */
+/* A drawn chunk has in the upper 8 bits how many words after the first of its colours its clip lines start, plus 1; 0 =
+ * it has none. */
 #define SPL_COLOR_CLIP 24
 
-/* Clip lines: a mask of SPL_LINEAR_WORDS words that says which splats have one, then the codes of these in their order, word by
- * word from the low bits up: direction in the low bits, offset above. The splat ends at offset / 2^SPL_CLIP_OFFSET_BITS of its
- * radius from its centre along that direction of its tangent frame. Directions start at the frame's u, turn to v, and divide
- * the square |u| + |v| = 1 evenly. */
+/* Clip lines: a mask of SPL_LINEAR_WORDS words that says which splats have one, then the codes of these in their order,
+ * word by word from the low bits up: direction in the low bits, offset above. The splat ends at offset /
+ * 2^SPL_CLIP_OFFSET_BITS of its radius from its centre along that direction of its tangent frame. Directions start at
+ * the frame's u, turn to v, and divide the square |u| + |v| = 1 evenly. */
 #define SPL_CLIP_DIRECTION_BITS 5
 #define SPL_CLIP_OFFSET_BITS 3
 #define SPL_CLIP_BITS 8
 
 #define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
 
-/* count: splats 0..7 (1..SPL_CHUNK_SPLATS; 0 = hidden), window 8..31: 0 = the whole tile, else column + 1 (12 bits) and row
- * (12 bits) in a grid of SPL_WINDOW samples a side. A chunk whose discs may be larger than a window is listed once a window:
- * a loop of a software driver's kernel ends after 65535 rounds, whether it is done or not, and one invocation draws
- * SPL_RUN_SPLATS / SPL_LANES discs. */
+/* count: splats 0..7 (1..SPL_CHUNK_SPLATS; 0 = hidden), window 8..31: 0 = the whole tile, else column + 1 (12 bits) and
+ * row (12 bits) in a grid of SPL_WINDOW samples a side. A chunk whose discs may be larger than a window is listed once
+ * a window: a loop of a software driver's kernel ends after 65535 rounds, whether it is done or not, and one invocation
+ * draws SPL_RUN_SPLATS / SPL_LANES discs. */
 #define SPL_COUNT_BITS 8
 #define SPL_WINDOW_BITS 12
 #define SPL_WINDOW 112
 
-/* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many (the
- * same 65535 rounds). */
+/* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
+ * (the same 65535 rounds). */
 #define SPL_OCCLUSION_TILE 8
 #define SPL_OCCLUSION_TILES_MAX 32768
 

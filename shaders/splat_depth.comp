@@ -15,8 +15,8 @@ void draw(splat_run run, splat s)
     disc d = make_disc(s, run.low, run.high);
     clip_line line = load_clip(run.chunk, s);
     ivec2 at = d.first;
-    /* The end is asked for at the end, here and in main(): software drivers leave a loop only there, so that a question at its
-     * start costs every group of lanes another round, with all of them off. */
+    /* The end is asked for at the end, here and in main(): software drivers leave a loop only there, so that a question
+     * at its start costs every group of lanes another round, with all of them off. */
     for (;;) {
         float z;
         vec3 offset;

@@ -1,10 +1,12 @@
 /* Shade pass of method splat: integer sums over the fragments that lie within the blend margin of the first surface.
  * One run per group of layers (constant 0); sums per sample are
  *   color   r g b w
- *   depth   low high - w    of w * offset, where offset counts 2^-18 of the pushed depth in front of it: low = bits 0..8
+ *   depth   low high - w    of w * offset, where offset counts 2^-18 of the pushed depth in front of it: low = bits
+ * 0..8
  *   normal  x y z w         of w * (127 n + 127.5)
  *   id      least dataset index among the discs that set the depth, in the id buffer
- * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture there. */
+ * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture
+ * there. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -27,7 +29,8 @@ layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
-/* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves both. */
+/* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves
+ * both. */
 #ifdef SPL_ATOMICS_64
 layout(std430, binding = SPL_BIND_SUMS) buffer sums_buffer { uint64_t sums[]; };
 void add(uint pair, uint a, uint b)

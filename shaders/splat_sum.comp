@@ -1,8 +1,9 @@
-/* The textures of splats whose texels are interpolated, so that they cover more fragments than texels: each summed once,
- * at the level that it is drawn at, for the shade pass behind. SPL_LANES invocations share a splat and take its texels in
- * turn, so that it costs as many sums as it has atoms, not as its chunk has planes; or one takes them all where a texture
- * is so small that decoding the splat is most of the work. What splat n of the dispatch's runs has starts at word
- * n SPL_SUMMED_WORDS; the buffer is that of the ids, which is free between occlusion and the ids' own pass. */
+/* The textures of splats whose texels are interpolated, so that they cover more fragments than texels: each summed
+ * once, at the level that it is drawn at, for the shade pass behind. SPL_LANES invocations share a splat and take its
+ * texels in turn, so that it costs as many sums as it has atoms, not as its chunk has planes; or one takes them all
+ * where a texture is so small that decoding the splat is most of the work. What splat n of the dispatch's runs has
+ * starts at word n SPL_SUMMED_WORDS; the buffer is that of the ids, which is free between occlusion and the ids' own
+ * pass. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/texture.glsl"
@@ -40,7 +41,8 @@ void main()
         return;
     splat_texture t = load_texture(run.chunk, s, load_color(run.chunk, i));
     uint texels = t.side * t.side, to = place * SPL_SUMMED_WORDS(frame.texture_size);
-    /* A loop for each two atoms more: software drivers leave out rounds of a loop, not what stands behind a condition. */
+    /* A loop for each two atoms more: software drivers leave out rounds of a loop, not what stands behind a
+     * condition. */
     uint pairs = lanes > 1u ? (t.atoms + 1u) / 2u : 9u;
     if (PLANES > 2u)
         write_sums(t, lane, pairs <= 1u ? texels : 0u, lanes, to, 2u);

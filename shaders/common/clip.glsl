@@ -1,5 +1,5 @@
-/* Clip lines: where discs at silhouettes and creases end; src/dataset/chunk_clip.c is the decoding in C. For chunks that have
- * any there is another kernel (constant 2), so that the others do not pay for them. */
+/* Clip lines: where discs at silhouettes and creases end; src/dataset/chunk_clip.c is the decoding in C. For chunks
+ * that have any there is another kernel (constant 2), so that the others do not pay for them. */
 #ifndef SPL_CLIP_GLSL
 #define SPL_CLIP_GLSL
 

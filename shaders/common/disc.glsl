@@ -16,7 +16,8 @@ struct disc {
     float depth;       /* of the centre */
     float margin;      /* metres that the disc is pushed back for blending */
     /* With uv = sample - centre: the plane is hit at depth k, k = 1 / (1 + slope . uv) (never behind the eye: there the
-     * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth / radius. */
+     * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth /
+     * radius. */
     vec2 slope;
     float reach;
     vec2 ray, pitch;   /* the centre's ray, one over the focal lengths; both times scale */
@@ -24,7 +25,8 @@ struct disc {
 };
 
 /* Extent of the disc along one image axis: the tangents s of (p - s q)^2 = r^2 (1 + s^2 - (n_p - s n_q)^2), where p is
- * the position along that axis, q the depth, n_other the normal's remaining component. Returns centre and half width. */
+ * the position along that axis, q the depth, n_other the normal's remaining component. Returns centre and half
+ * width. */
 vec2 disc_extent(float p, float q, float n_p, float n_q, float n_other, float radius)
 {
     precise float a = q * q - radius * radius * (1.0 - n_q * n_q);
@@ -74,8 +76,8 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     return d;
 }
 
-/* Walks the footprint row by row in one flat loop: nested loops cost a lane mask each. A footprint that is empty in x is
- * made empty in y by make_disc(). */
+/* Walks the footprint row by row in one flat loop: nested loops cost a lane mask each. A footprint that is empty in x
+ * is made empty in y by make_disc(). */
 void next_sample(disc d, inout ivec2 at)
 {
     at.x++;
@@ -83,8 +85,8 @@ void next_sample(disc d, inout ivec2 at)
     at = ivec2(wrap ? d.first.x : at.x, at.y + int(wrap));
 }
 
-/* Squared distance to the centre (covered below 1), view depth at sample `at`, and how far it lies off the centre in radii,
- * view space. */
+/* Squared distance to the centre (covered below 1), view depth at sample `at`, and how far it lies off the centre in
+ * radii, view space. */
 float disc_sample(disc d, ivec2 at, out float z, out vec3 offset)
 {
     precise vec2 uv = vec2(at) + (0.5 - d.center);

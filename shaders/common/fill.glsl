@@ -2,8 +2,8 @@
  * its words.
  *
  * A word of level n is the inverse depth of the nearest sample of 2^n x 2^n, whose low bits hold, from bit 0 on, the
- * sample's spacing (SPL_FILL_SPACING_BITS), its column and its row in the cell (n bits each); 0 = no sample. The maximum
- * of words is therefore the nearest sample, whoever writes first. */
+ * sample's spacing (SPL_FILL_SPACING_BITS), its column and its row in the cell (n bits each); 0 = no sample. The
+ * maximum of words is therefore the nearest sample, whoever writes first. */
 #ifndef SPL_FILL_GLSL
 #define SPL_FILL_GLSL
 
@@ -58,7 +58,8 @@ float spacing_of(uint code)
 float surface_tolerance(uint near, float samples)
 {
     float w = inverse_depth(near, SPACING_MASK);
-    return samples * SPL_FILL_SLOPE * frame.inverse_fx + frame.fill_margin * frame.fill_radius * w * spacing_of(near & SPACING_MASK);
+    float slope = samples * SPL_FILL_SLOPE * frame.inverse_fx;
+    return slope + frame.fill_margin * frame.fill_radius * w * spacing_of(near & SPACING_MASK);
 }
 
 #endif

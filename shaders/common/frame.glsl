@@ -6,8 +6,8 @@
 
 layout(std430, binding = SPL_BIND_FRAME) readonly buffer frame_buffer { spl_frame_params frame_in_memory; };
 
-/* A copy in registers: software drivers load once for all lanes only where no lane can be off, else lane by lane. So every
- * main() begins with load_frame(), and nothing reads the parameters from memory in a loop or behind a branch. */
+/* A copy in registers: software drivers load once for all lanes only where no lane can be off, else lane by lane. So
+ * every main() begins with load_frame(), and nothing reads the parameters from memory in a loop or behind a branch. */
 spl_frame_params frame;
 
 void load_frame()

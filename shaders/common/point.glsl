@@ -1,5 +1,5 @@
-/* One sample of a splat as methods points and fill draw it: the nearest wins, the least payload among equals. With 64 bit
- * atomics one pass keeps depth << 32 | payload; without, pass 0 finds the depth and pass 1 the payload. */
+/* One sample of a splat as methods points and fill draw it: the nearest wins, the least payload among equals. With 64
+ * bit atomics one pass keeps depth << 32 | payload; without, pass 0 finds the depth and pass 1 the payload. */
 #ifndef SPL_POINT_GLSL
 #define SPL_POINT_GLSL
 

@@ -68,8 +68,8 @@ spl_draw_chunk load_chunk(uint index)
     return c;
 }
 
-/* Bits from `bit` bits after word `word` on, as many as `words` (2..5, a constant) words hold wherever they start: 33, 65, 97
- * or 128. Loading a word too many costs less than asking, and what a page's end gives is not used. */
+/* Bits from `bit` bits after word `word` on, as many as `words` (2..5, a constant) words hold wherever they start: 33,
+ * 65, 97 or 128. Loading a word too many costs less than asking, and what a page's end gives is not used. */
 bit_run load_run(uint word, uint bit, int words)
 {
     uint at = word + (bit >> 5), shift = bit & 31u;

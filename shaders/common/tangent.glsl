@@ -1,5 +1,5 @@
-/* The frame in which a splat's texture lies; src/geom/tangent.h is this function in C. Rows of texels are level wherever
- * the surface is not. */
+/* The frame in which a splat's texture lies; src/geom/tangent.h is this function in C. Rows of texels are level
+ * wherever the surface is not. */
 #ifndef SPL_TANGENT_GLSL
 #define SPL_TANGENT_GLSL
 

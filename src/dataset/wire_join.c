@@ -215,7 +215,8 @@ static void thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
         kept[i] = 1;
         for (int k = 0; k < 27 && kept[i]; k++) {
             uint64_t key = key_of(j, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1});
-            for (size_t m = find_cell(j, key); m < j->cell_count && j->cells[m].key == key; m++) {
+            size_t first = find_cell(j, key);
+            for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
                 if (b >= i)
                     break;

@@ -313,7 +313,6 @@ static void test_radius_of_a_grid(void **state)
     spl_points_finish(&p);
 }
 
-/* A point that floats beside a surface, a flock of strays far off, and a wire must not become blobs. */
 /* Bare points: a field of 0.1 m, and beyond it one of 2 m and one of 20 m, which the same cells cannot all measure. */
 static void test_spacing_of_bare_points(void **state)
 {
@@ -372,6 +371,7 @@ static void test_random_points_leave_no_holes(void **state)
     spl_points_finish(&p);
 }
 
+/* A point that floats beside a surface, a flock of strays far off, and a wire must not become blobs. */
 static void test_no_blobs(void **state)
 {
     (void)state;
