@@ -325,8 +325,8 @@ static void test_spacing_of_bare_points(void **state)
         int field = i < near ? 0 : i < near + middle ? 1 : 2;
         size_t k = i - (size_t[]){0, near, near + middle}[field], side = (size_t[]){100, 20, 10}[field];
         for (int c = 0; c < 2; c++)
-            position[i][c] = (c ? 0 : first[field]) +
-                             step[field] * ((double)(c ? k / side : k % side) + 0.3 * uniform(&random));
+            position[i][c] =
+                (c ? 0 : first[field]) + step[field] * ((double)(c ? k / side : k % side) + 0.3 * uniform(&random));
         position[i][2] = 0.01 * uniform(&random);
     }
     for (unsigned threads = 1; threads < 3; threads++) {
