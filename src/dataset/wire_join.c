@@ -183,7 +183,8 @@ static int find_pairs(struct join *j, double reach, struct spl_error *err)
             }
         }
     }
-    qsort(j->pairs, j->pair_count, sizeof *j->pairs, compare_pairs);
+    if (j->pair_count)
+        qsort(j->pairs, j->pair_count, sizeof *j->pairs, compare_pairs);
     return SPL_OK;
 }
 
