@@ -115,8 +115,8 @@ def test_budget_and_psnr_choose():
         assert plain.headers["Splatd-Chosen"] is None and plain.headers["Cache-Control"] == "no-cache"
         reply = d.post({"width": 500, "height": 500, "budget": 24, "format": "raw"})
         assert fields(reply.headers["Splatd-Chosen"])["lod"] in ("2", "4")
-        reply = d.post({"width": 500, "height": 500, "budget": "24ms", "psnr": 20, "format": "raw"})
-        assert reply.headers["Splatd-Demand"] in ("met", "missed")
+        reply = d.post({"width": 500, "height": 500, "budget": "1s", "psnr": 20, "format": "raw"})
+        assert reply.headers["Splatd-Demand"] == "met"  # whatever a busy machine has taught it
 
 
 def test_given_parameters_narrow_the_choice():
