@@ -607,6 +607,7 @@ static void coarse_frames_show_the_same_place(void **state)
     free(splats);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     struct spl_view view = looking(origin, 2, 203, 151);
+    view.lod = 0; /* every splat: no specks, for which a neighbour would stand */
     view.background[3] = 0;
     struct spl_frame fine;
     assert_int_equal(spl_renderer_render(renderer, dataset, &view, &fine, NULL), SPL_OK);
@@ -615,7 +616,7 @@ static void coarse_frames_show_the_same_place(void **state)
         assert_int_equal(spl_renderer_render(renderer, dataset, &view, &coarse, NULL), SPL_OK);
         const float *a = fine.images[SPL_LAYER_DEPTH].pixels, *b = coarse.images[SPL_LAYER_DEPTH].pixels;
         const uint8_t *color = coarse.images[SPL_LAYER_COLOR].pixels;
-        size_t pixels = 0, specks = 0;
+        size_t pixels = 0;
         double sum = 0;
         for (uint32_t y = 10; y < 140; y++) {
             for (uint32_t x = 10; x < 190; x++) {
@@ -629,13 +630,11 @@ static void coarse_frames_show_the_same_place(void **state)
                 pixels++;
                 double off = (b[at] - a[at]) / a[at];
                 sum += off;
-                assert_true(fabs(off) <
-                            0.03); /* a neighbour stands for a speck; else half a coarse pixel of this slant */
-                specks += fabs(off) >= 0.02;
+                assert_true(fabs(off) < 0.02); /* half a coarse pixel of this slant */
                 assert_true(color[4 * at] == 90 && color[4 * at + 1] == 160 && color[4 * at + 2] == 30);
             }
         }
-        assert_true(pixels > 10000 && specks < pixels / 200);
+        assert_true(pixels > 10000);
         assert_true(fabs(sum / (double)pixels) < 1e-3); /* a shift by half a coarse pixel would be 1 % */
         assert_int_equal(coarse.images[SPL_LAYER_ID].width, 203);
         spl_frame_finish(&coarse);
