@@ -2,8 +2,10 @@
  * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
  * Bodies past body_max are read and dropped up to drain_max, because a client that is cut off while sending seldom
- * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size. Invariant: a
- * suspended request is in `waiting`, or has a change. Owned by the loop's thread. */
+ * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size. Invariants: a
+ * suspended request is in `waiting`, or has a change; libmicrohttpd 0.9.75 goes on with what lies in its buffer (the
+ * next chunk, the end of the body) though the request was suspended a moment ago, and nothing is taken then: it asks
+ * again once it is resumed. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -84,11 +86,7 @@ static enum MHD_Result send_reply(struct request *request)
 {
     if (!request->response)
         return MHD_NO;
-    // libmicrohttpd 0.9.75 ends a HEAD of unknown length with the last chunk of a body that there is not; without
-    // chunks it closes the connection
-    if (request->head && request->unsized)
-        MHD_set_response_options(request->response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
-    if (request->service->draining)
+    if (request->service->draining || request->closes)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);
     if (request->service->access)
@@ -164,10 +162,11 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
 {
     (void)context;
     (void)url;
-    (void)version;
     struct request *request = *request_context;
     if (!request || request->abandoned)
         return MHD_NO;
+    if (request->suspended)
+        return MHD_YES;
     if (!request->started) {
         request->started = true;
         snprintf(request->method, sizeof request->method, "%s", method);
@@ -175,7 +174,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_refuse_many_headers(request);
         if (request->abandoned)
             return MHD_NO;
-        return answer_headers(request) ? send_reply(request) : MHD_YES;
+        return !spl_check_framing(request, version) || answer_headers(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {
         bool taken = take_body(request, data, *length);
@@ -183,7 +182,6 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         return taken ? MHD_YES : MHD_NO;
     }
     if (request->change) {
-        spl_connection_enter(request->connection, PHASE_WORKING);
         spl_change_end(request);
     } else if (!request->response) {
         spl_connection_enter(request->connection, PHASE_WORKING);
@@ -192,7 +190,23 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         else
             spl_route(request, method);
     }
-    return request->waits || request->change ? MHD_YES : send_reply(request);
+    return request->suspended ? MHD_YES : send_reply(request);
+}
+
+void spl_request_suspend(struct request *request)
+{
+    if (request->suspended)
+        return;
+    request->suspended = true;
+    MHD_suspend_connection(request->handle);
+}
+
+void spl_request_resume(struct request *request)
+{
+    if (!request->suspended)
+        return;
+    request->suspended = false;
+    MHD_resume_connection(request->handle);
 }
 
 static void on_timer(uv_timer_t *timer)

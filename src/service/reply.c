@@ -200,6 +200,17 @@ void spl_reply_not_modified(struct request *request, const struct spl_key *key)
         add_validator(request, key);
 }
 
+void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,
+                      MHD_ContentReaderFreeCallback destroy)
+{
+    request->status = MHD_HTTP_OK;
+    request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, block, read, context, destroy);
+    // libmicrohttpd 0.9.75 ends a HEAD of unknown length with the last chunk of a body that there is not; without
+    // chunks it closes the connection
+    if (request->response && request->head)
+        MHD_set_response_options(request->response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
+}
+
 static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
 {
     (void)context;
@@ -216,9 +227,7 @@ void spl_reply_view_head(struct request *request, const struct spl_view_request 
     spl_headers_add_view(&headers, view, NULL);
     if (!spl_headers_close(&headers))
         return;
-    request->status = MHD_HTTP_OK; // of unknown length: a GET's Content-Length is known only once it is rendered
-    request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 16, read_nothing, NULL, NULL);
-    request->unsized = true;
+    spl_reply_stream(request, 16, read_nothing, NULL, NULL); // a GET's length is known only once it is rendered
     if (request->response) {
         add_headers(request, headers.text);
         add_validator(request, key);

@@ -69,8 +69,9 @@ struct request {
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     bool started;
     bool head;      /* the method is HEAD */
-    bool unsized;   /* the reply's length is not known when it begins */
+    bool closes;    /* the connection ends with the reply */
     bool abandoned; /* the client has left: close without a reply */
+    bool suspended; /* libmicrohttpd does not go on with it */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     uint64_t deadline_ns;
     struct batch *batch;           // may be NULL: it waits for one view
@@ -144,6 +145,12 @@ int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
 void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
+/* The one way to have libmicrohttpd leave a request alone, and take it up again; both idempotent. */
+void spl_request_suspend(struct request *request);
+void spl_request_resume(struct request *request);
+
+/* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. */
+bool spl_check_framing(struct request *request, const char *version);
 
 /* connections.c: every connection, and how long its phases may take. */
 void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
@@ -179,17 +186,20 @@ int spl_service_go_on(struct spl_service *service, struct spl_error *err);
 /* library.c: datasets that come, change and go while the service runs. */
 void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
+void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry); /* takes the resident `entry` */
 void spl_library_stop(struct spl_service *service);         /* waits for the thread pool; idempotent */
 
-/* change_route.c: PUT and DELETE of a dataset. */
+/* change_route.c, change.c: PUT and DELETE of a dataset. */
 void spl_put_dataset(struct request *request, const struct spl_call *call);
 void spl_delete_dataset(struct request *request, const struct spl_call *call);
 bool spl_change_take(struct request *request, const char *data, size_t length); /* of the body; false: no memory */
 void spl_change_end(struct request *request);                                   /* of the body */
 void spl_change_abandon(struct request *request);                               /* its client has left; idempotent */
 void spl_change_refuse_all(struct spl_service *service);
-/* `entry` is resident, or `refused` says why not. */
-void spl_change_settle(struct spl_service *service, struct spl_catalog_entry *entry, const struct spl_error *refused);
+void spl_change_forget_all(struct spl_service *service); /* once no thread has one, and no request */
+/* `entry` is resident, or refused: if it is a client's, it is taken. */
+bool spl_change_take_resident(struct spl_service *service, struct spl_catalog_entry *entry);
+bool spl_change_take_refused(struct spl_service *service, struct spl_catalog_entry *entry);
 
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);
@@ -239,6 +249,10 @@ void spl_reply_error(struct request *request, const struct spl_error *err); /* s
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
 void spl_reply_empty(struct request *request, unsigned status);
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
+/* 200, of a length that nobody knows when it begins; `destroy` gets `context` with the last of the reply, not after failure.
+ * The only way to such a reply, HEAD included. */
+void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,
+                      MHD_ContentReaderFreeCallback destroy);
 
 /* The same for views. `origin` is Splatd-Cache's value. */
 void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin);

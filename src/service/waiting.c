@@ -24,7 +24,7 @@ void spl_waiting_add(struct request *request, uint64_t deadline_ns)
     LIST_INSERT_HEAD(&service->waiting, request, link);
     if (!service->waiting_count++)
         uv_timer_start(&service->wait_timer, on_timer, sweep_ms, sweep_ms);
-    MHD_suspend_connection(request->handle);
+    spl_request_suspend(request);
 }
 
 void spl_waiting_resume(struct request *request)
@@ -34,7 +34,7 @@ void spl_waiting_resume(struct request *request)
     request->waits = false;
     if (!--service->waiting_count)
         uv_timer_stop(&service->wait_timer);
-    MHD_resume_connection(request->handle);
+    spl_request_resume(request);
 }
 
 static void let_go(struct request *request)

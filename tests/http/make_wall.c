@@ -1,27 +1,32 @@
-/* make_wall [--small | --textured] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two levels,
- * in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. */
+/* make_wall [--small | --large | --textured] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half;
+ * --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. */
 #include <math.h>
-#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "support/make_dataset.h"
 #include "support/make_textures.h"
 
-enum { side = 40 };
+enum { side_usual = 40, side_large = 600 };
 
 int main(int argc, char **argv)
 {
-    static struct make_splat splats[side * side];
+    const char *kind = argc > 1 ? argv[1] : "";
+    int small = !strcmp(kind, "--small"), textured = !strcmp(kind, "--textured"), large = !strcmp(kind, "--large");
+    int side = large ? side_large : side_usual;
+    struct make_splat *splats = calloc((size_t)side * (size_t)side, sizeof *splats);
+    if (!splats)
+        return 1;
+    double step = 2.0 / side;
     for (int i = 0; i < side * side; i++) {
-        double y = (i % side - side / 2) * 0.05, z = (i / side) * 0.05;
+        double y = (i % side - side / 2) * step, z = (i / side) * step;
         splats[i] = (struct make_splat){
             .position = {0.2 * sin(y), y, z},
             .normal = {1, 0, 0},
-            .radius = 0.05f,
-            .color = {(uint8_t)(i % side * 6), (uint8_t)(i / side * 6), 90},
+            .radius = (float)step,
+            .color = {(uint8_t)(i % side * 240 / side), (uint8_t)(i / side * 240 / side), 90},
         };
     }
-    int small = argc > 1 && !strcmp(argv[1], "--small"), textured = argc > 1 && !strcmp(argv[1], "--textured");
     if (textured) {
         struct spl_dataset *plain = make_dataset(splats, side * side);
         struct spl_dictionary dictionary = make_dictionary(16, 8, 1);
@@ -29,9 +34,11 @@ int main(int argc, char **argv)
             make_textured_file(plain, &dictionary, 8, 1, argv[i]);
         spl_dictionary_finish(&dictionary);
         spl_dataset_close(plain);
+        free(splats);
         return 0;
     }
-    for (int i = 1 + small; i < argc; i++)
-        make_dataset_file(argv[i], splats, side * side / (1 + small), 2);
+    for (int i = 1 + (small | large); i < argc; i++)
+        make_dataset_file(argv[i], splats, (size_t)(side * side / (1 + small)), 2);
+    free(splats);
     return 0;
 }

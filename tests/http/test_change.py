@@ -12,7 +12,8 @@ from harness import FAKE, REAL, WALL, Daemon, eventually, run, together
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/octet-stream"}
-WALL_1, WALL_2 = pathlib.Path(WALL).read_bytes(), pathlib.Path(os.environ["SPLATD_WALL_2"]).read_bytes()
+WALL_1, WALL_2, LARGE = (
+    pathlib.Path(path).read_bytes() for path in (WALL, os.environ["SPLATD_WALL_2"], os.environ["SPLATD_WALL_LARGE"]))
 
 
 @contextlib.contextmanager
@@ -78,6 +79,70 @@ def test_put_get_replace_delete():
         assert listed(d) == {}, "a look from before brought it back"
 
 
+def pieces(body, size, pause=0.0):
+    """`body` for a chunked request, with a pause after some of the chunks, so that both sides wait for each other."""
+    for at in range(0, len(body), size):
+        yield body[at:at + size]
+        if pause and at // size % 97 == 0:
+            time.sleep(pause)
+
+
+def test_bodies_in_chunks_of_any_size():
+    """libmicrohttpd goes on to the next chunk in its buffer though the connection was suspended with this one."""
+    assert len(LARGE) > 2 << 20  # several steps of the pool
+    with serving() as d:
+        for name, body, status in (("good", LARGE, 201), ("bad", LARGE[:-1] + b"x" + b"y" * 99, 422)):
+            for size in (700, 1000, 4096, 8192, 65536, 1 << 20):
+                for pause in (0, 0.002):
+                    reply = put(d, name, pieces(body, size, pause))
+                    assert reply.status == status, (name, size, pause, reply.status, reply.body)
+                    if status == 201:
+                        assert (d.home / f"{name}.spld").read_bytes() == body
+                        assert delete(d, name).status == 204
+        assert put(d, "bytes", pieces(WALL_2, 1)).status == 201
+        assert left_over(d) == []
+
+
+def test_whoever_leaves_in_a_chunk_leaves_nothing():
+    with serving() as d:
+        for cut in (1 << 20, (1 << 20) + 1, 1500000, 2 << 20):
+            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n"
+                          f"Authorization: Bearer {ADMIN}\r\n\r\n".encode())
+                s.sendall(b"".join(b"3e8\r\n" + LARGE[at:at + 1000] + b"\r\n" for at in range(0, cut, 1000)))
+                eventually(lambda: "gone" in listed(d))
+            eventually(lambda: "gone" not in listed(d) and left_over(d) == [])
+        assert put(d, "gone", pieces(LARGE, 1000)).status == 201
+
+
+def test_what_the_device_refuses_changes_no_file():
+    """Whatever may refuse a version is asked before its file takes the place of the one before."""
+    with serving(binary=REAL) as d:
+        assert put(d, "a", WALL_1).status == 201 and small(d, "a").status == 200
+        least = d.ask("/v1/status", headers=AUTH).json()["memory"]["device_bytes"]
+    with serving("--memory-limit", str(least + (1 << 20)), binary=REAL) as d:
+        assert put(d, "a", WALL_1).status == 201
+        version = listed(d)["a"]["version"]
+        for name in ("a", "new"):
+            reply = put(d, name, LARGE)
+            assert reply.status == 413 and "memory" in reply.json()["detail"], reply.body
+        assert (d.home / "a.spld").read_bytes() == WALL_1 and not (d.home / "new.spld").exists()
+        eventually(lambda: left_over(d) == [])
+        after = listed(d)
+        assert list(after) == ["a"] and after["a"]["version"] == version and "reason" not in after["a"], after
+        assert small(d, "a").status == 200 and put(d, "a", WALL_2).status == 200 and small(d, "a").status == 200
+
+
+def test_what_cannot_be_put_in_place_changes_nothing():
+    with serving() as d:
+        (d.home / "a.spld").mkdir()
+        (d.home / "a.spld" / "x").write_text("")
+        reply = put(d, "a", WALL_1)
+        assert reply.status >= 400 and (d.home / "a.spld").is_dir(), (reply.status, reply.body)
+        assert small(d, "a").status != 200
+        eventually(lambda: left_over(d) == [])
+
+
 def test_names_that_are_no_ids_make_no_files():
     with serving() as d:
         outside = set(d.home.parent.iterdir())
@@ -116,7 +181,8 @@ def test_sizes_are_capped_and_large_bodies_only_go_here():
             for _ in range(200):
                 yield b"x" * 1000
         reply = d.ask("/v1/datasets/b", "PUT", chunks(), AUTH)
-        assert reply.status == 413 and list(listed(d)) == ["a"] and left_over(d) == []
+        assert reply.status == 413 and list(listed(d)) == ["a"]
+        eventually(lambda: left_over(d) == [])
         reply = d.ask("/v1/datasets/a/view", "POST", b" " * 2_000_000, AUTH)
         assert reply.status == 413
         head = (f"PUT /v1/datasets/b HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999\r\nExpect: 100-continue\r\n"

@@ -23,6 +23,15 @@ bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file
            a->changed_ns == b->changed_ns;
 }
 
+struct spl_file_mark spl_file_mark_of(const struct stat *status)
+{
+    return (struct spl_file_mark){.device = status->st_dev,
+                                  .inode = status->st_ino,
+                                  .bytes = (uint64_t)status->st_size,
+                                  .changed_s = status->st_mtim.tv_sec,
+                                  .changed_ns = status->st_mtim.tv_nsec};
+}
+
 const char *spl_catalog_id_of(const char *path, size_t *length)
 {
     const char *slash = strrchr(path, '/'), *stem = slash ? slash + 1 : path, *dot = strrchr(stem, '.');
@@ -52,13 +61,8 @@ static int add_file(struct spl_catalog_files *files, const char *directory, cons
         goto done;
     }
     files->items = grown;
-    grown[files->count++] = (struct spl_catalog_file){.path = path,
-                                                      .in_directory = *directory,
-                                                      .mark = {.device = status.st_dev,
-                                                               .inode = status.st_ino,
-                                                               .bytes = (uint64_t)status.st_size,
-                                                               .changed_s = status.st_mtim.tv_sec,
-                                                               .changed_ns = status.st_mtim.tv_nsec}};
+    grown[files->count++] =
+        (struct spl_catalog_file){.path = path, .in_directory = *directory, .mark = spl_file_mark_of(&status)};
     path = NULL;
 done:
     free(path);
@@ -213,8 +217,8 @@ static void open_range(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     struct opening *opening = context;
     for (size_t i = begin; i < end; i++)
-        spl_catalog_entry_open(opening->files->items[i].path, opening->verify, &opening->entries[i],
-                               &opening->errors[i]);
+        spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->verify,
+                               &opening->entries[i], &opening->errors[i]);
 }
 
 /* Puts one opened file into its slot; takes the entry. */

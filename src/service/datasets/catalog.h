@@ -12,6 +12,8 @@ struct spl_file_mark {
     int64_t changed_s, changed_ns;
 };
 
+struct stat;
+struct spl_file_mark spl_file_mark_of(const struct stat *status);
 bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file_mark *b);
 
 struct spl_catalog_slot {

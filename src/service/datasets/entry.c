@@ -19,7 +19,8 @@ static void encode_uri(char *out, size_t capacity, const char *id)
         used += (size_t)snprintf(out + used, capacity - used, strchr(plain, *id) ? "%c" : "%%%02X", (unsigned char)*id);
 }
 
-int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_entry **out, struct spl_error *err)
+int spl_catalog_entry_open(const char *path, const char *place, bool verify, struct spl_catalog_entry **out,
+                           struct spl_error *err)
 {
     struct spl_catalog_entry *entry = *out = NULL;
     struct spl_camera camera = {0};
@@ -27,10 +28,6 @@ int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_ent
     if (!(entry = spl_alloc(1, sizeof *entry, err)))
         return rc;
     atomic_init(&entry->references, 1);
-    if (!(entry->path = strdup(path))) {
-        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", path);
-        goto done;
-    }
     const struct spl_wires *wires;
     if ((rc = spl_dataset_open(path, verify, &entry->dataset, err)) ||
         (rc = spl_dataset_get_wires(entry->dataset, &wires, err))) /* joined here, or the first frame would wait */
@@ -45,7 +42,7 @@ int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_ent
     memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
     memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
     encode_uri(entry->uri, sizeof entry->uri, info->id);
-    rc = spl_plan_create(path, info, &entry->plan, err);
+    rc = spl_plan_create(place, info, &entry->plan, err);
 done:
     if (rc)
         spl_catalog_entry_destroy(entry);
@@ -77,7 +74,6 @@ void spl_catalog_entry_destroy(struct spl_catalog_entry *entry)
         return;
     spl_plan_destroy(entry->plan);
     spl_dataset_close(entry->dataset);
-    free(entry->path);
     free(entry);
 }
 

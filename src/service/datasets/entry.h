@@ -25,7 +25,6 @@ enum spl_entry_state {
 };
 
 struct spl_catalog_entry {
-    char *path;
     struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
     struct spl_camera_defaults defaults;
@@ -46,9 +45,10 @@ struct spl_catalog_entry {
     bool loading;                            // owned by: gpu
 };
 
-/* Maps and checks the dataset at `path`; `verify` hashes every section. Blocks on disk, any thread. The caller owns the
- * one reference to *out. */
-int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_entry **out, struct spl_error *err);
+/* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. `verify`
+ * hashes every section. Blocks on disk, any thread. The caller owns the one reference to *out. */
+int spl_catalog_entry_open(const char *path, const char *place, bool verify, struct spl_catalog_entry **out,
+                           struct spl_error *err);
 
 /* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */
 struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry);

@@ -54,7 +54,7 @@ static void free_opening(struct opening *opening)
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
-    spl_catalog_entry_open(opening->path, opening->verify, &opening->entry, &opening->err);
+    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->entry, &opening->err);
 }
 
 static void after_opening(uv_work_t *work, int status)
@@ -128,7 +128,7 @@ static void close_entry(struct spl_service *service, struct spl_catalog_entry *e
     spl_catalog_entry_destroy(entry);
 }
 
-static void put_in_place(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry)
+void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry)
 {
     const struct spl_dataset_info *info = entry->info;
     spl_log_info("dataset %s: version %016llx %s, %llu splats, %llu bytes", slot->id, (unsigned long long)info->version,
@@ -149,14 +149,15 @@ void spl_library_take_changes(struct spl_service *service)
             continue;
         }
         struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, entry->info->id);
-        if (slot && slot->next == entry && entry->state == SPL_ENTRY_RESIDENT) {
-            put_in_place(slot, entry);
-            spl_change_settle(service, entry, NULL);
+        bool resident = entry->state == SPL_ENTRY_RESIDENT;
+        if (resident ? spl_change_take_resident(service, entry) : spl_change_take_refused(service, entry))
+            continue;
+        if (slot && slot->next == entry && resident) {
+            spl_library_serve(slot, entry);
             continue;
         }
         if (slot && slot->next == entry)
             refuse(slot, &entry->err);
-        spl_change_settle(service, entry, &entry->err);
         spl_catalog_entry_unref(entry);
     }
 }
@@ -268,4 +269,5 @@ void spl_library_stop(struct spl_service *service)
     uv_timer_stop(&service->library.timer);
     while (service->library.tasks)
         uv_run(&service->loop, UV_RUN_ONCE);
+    spl_change_forget_all(service);
 }

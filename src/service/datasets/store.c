@@ -123,32 +123,32 @@ int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t 
     return 0;
 }
 
-int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
-                        struct spl_file_mark *mark, struct spl_error *err)
+int spl_incoming_check(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
+                       struct spl_error *err)
 {
-    *entry = NULL;
     if (fsync(incoming->fd))
         return fail(incoming, err, "sync");
-    struct spl_catalog_entry *checked = NULL;
     struct spl_error why = {0};
-    int rc = spl_catalog_entry_open(incoming->path, true, &checked, &why);
-    spl_catalog_entry_unref(checked);
-    if (rc) {
-        char message[sizeof why.message];
-        spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
-        spl_incoming_abort(incoming);
-        return spl_fail(err, rc, "%s", message);
-    }
+    int rc = spl_catalog_entry_open(incoming->path, target, true, entry, &why);
+    if (!rc)
+        return 0;
+    char message[sizeof why.message];
+    spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
+    spl_incoming_abort(incoming);
+    return spl_fail(err, rc, "%s", message);
+}
+
+int spl_incoming_place(struct spl_incoming *incoming, const char *target, struct spl_file_mark *mark,
+                       struct spl_error *err)
+{
     if (rename(incoming->path, target) || spl_file_sync_folder(target))
         return fail(incoming, err, "put in place");
+    struct stat status;
+    if (fstat(incoming->fd, &status))
+        return fail(incoming, err, "examine");
+    *mark = spl_file_mark_of(&status);
     spl_incoming_abort(incoming); // what is left: the folder
-    struct spl_catalog_files files = {0};
-    char *const paths[] = {(char *)target};
-    rc = spl_catalog_entry_open(target, false, entry, err);
-    if (!rc && !spl_catalog_list(paths, 1, &files, NULL) && files.count)
-        *mark = files.items[0].mark;
-    spl_catalog_files_finish(&files);
-    return rc;
+    return 0;
 }
 
 void spl_incoming_abort(struct spl_incoming *incoming)
@@ -173,6 +173,8 @@ int spl_stored_remove(const char *path, struct spl_error *err)
     int rc = unlink(path) && errno != ENOENT ? spl_fail_errno(err, errno, "cannot remove the dataset's file") : 0;
     if (!rc)
         unlink(profile);
+    if (!rc && spl_file_sync_folder(path))
+        rc = spl_fail_errno(err, errno, "cannot sync the folder of the dataset's file");
     free(profile);
     return rc;
 }

@@ -21,10 +21,15 @@ int spl_store_check_room(const char *path, uint64_t bytes, struct spl_error *err
 int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct spl_error *err);
 int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err);
 
-/* Syncs and verifies the file, renames it to `target` and opens it there: the caller owns *entry. SPL_E_INPUT or
- * SPL_E_CORRUPT for what is no dataset. Ends `incoming`. */
-int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
-                        struct spl_file_mark *mark, struct spl_error *err);
+/* Syncs, verifies and opens the file as what will lie at `target`: the caller owns *entry. SPL_E_INPUT or SPL_E_CORRUPT
+ * for what is no dataset. */
+int spl_incoming_check(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
+                       struct spl_error *err);
+
+/* Renames the file to `target`, whatever lies there, and ends `incoming`. After a failure `target` is as it was, but
+ * where its folder could not be synced: then the file is there, perhaps not after a power cut. */
+int spl_incoming_place(struct spl_incoming *incoming, const char *target, struct spl_file_mark *mark,
+                       struct spl_error *err);
 
 /* Removes it; idempotent. */
 void spl_incoming_abort(struct spl_incoming *incoming);

@@ -223,9 +223,7 @@ static void begin(struct request *request, struct spl_tour *tour, bool pictures)
     s->connection = request->connection;
     s->pictures = pictures;
     s->told_ns = s->looked_ns = spl_now_ns();
-    request->status = MHD_HTTP_OK;
-    request->unsized = true;
-    request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 64 << 10, on_read, s, on_free);
+    spl_reply_stream(request, 64 << 10, on_read, s, on_free);
     if (!request->response) {
         free(s);
         return;

@@ -105,8 +105,7 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour)
         zip_free(zip);
         return;
     }
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 64 << 10, on_read, zip, on_free);
+    spl_reply_stream(request, 64 << 10, on_read, zip, on_free);
     if (!request->response) {
         zip_free(zip);
         return;

@@ -1,0 +1,83 @@
+/* Where a request ends. A proxy in front and libmicrohttpd 0.9.75 behind it must not see two ends, or the rest of one
+ * client's request becomes the beginning of another's (RFC 9112, 6.3 and 11.2): libmicrohttpd takes the first of
+ * several lengths, a coding before a length, and a name with a space in it as one it has never heard of. Such a request
+ * is refused once its headers are there, and the connection ends, so that nothing behind them is read.
+ *
+ * What cannot be done here, since libmicrohttpd acts before it asks: a value is cut at a NUL; a single length that is
+ * no number gets libmicrohttpd's own 400, an HTML page after two heads, and then the connection ends; a bare LF ends a
+ * line. Owned by the loop's thread. */
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "service/state.h"
+
+struct framing {
+    unsigned lengths, codings;
+    const char *coding;
+    char fault[160]; /* "" while there is none */
+    const char *field;
+};
+
+static bool is_token(const char *text, size_t length)
+{
+    static const char others[] = "!#$%&'*+-.^_`|~";
+    for (size_t i = 0; i < length; i++) {
+        char c = text[i], letter = (char)(c | 0x20);
+        if (!((c >= '0' && c <= '9') || (letter >= 'a' && letter <= 'z') || (c && strchr(others, c))))
+            return false;
+    }
+    return length > 0;
+}
+
+static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *name, size_t name_length,
+                            const char *value, size_t value_length)
+{
+    (void)kind;
+    (void)value_length;
+    struct framing *framing = context;
+    if (!is_token(name, name_length)) {
+        framing->field = "headers";
+        snprintf(framing->fault, sizeof framing->fault,
+                 "a header's name holds a space or another character that none has");
+    } else if (!strcasecmp(name, MHD_HTTP_HEADER_CONTENT_LENGTH)) {
+        framing->lengths++;
+    } else if (!strcasecmp(name, MHD_HTTP_HEADER_TRANSFER_ENCODING)) {
+        framing->codings++;
+        framing->coding = value;
+    }
+    return framing->fault[0] ? MHD_NO : MHD_YES;
+}
+
+static void judge(struct framing *framing, const char *version)
+{
+    const char *why = NULL;
+    framing->field = MHD_HTTP_HEADER_CONTENT_LENGTH;
+    if (framing->lengths > 1)
+        why = "the request has several Content-Length headers";
+    else if (framing->lengths && framing->codings)
+        why = "the request has both Content-Length and Transfer-Encoding";
+    else if (framing->codings)
+        framing->field = MHD_HTTP_HEADER_TRANSFER_ENCODING;
+    if (framing->codings > 1)
+        why = "the request has several Transfer-Encoding headers";
+    else if (!why && framing->codings && (!framing->coding || strcasecmp(framing->coding, "chunked")))
+        why = "the body's coding can only be 'chunked'";
+    else if (!why && framing->codings && strcmp(version, MHD_HTTP_VERSION_1_1))
+        why = "a body in chunks needs HTTP/1.1";
+    if (why)
+        snprintf(framing->fault, sizeof framing->fault, "%s", why);
+}
+
+bool spl_check_framing(struct request *request, const char *version)
+{
+    struct framing framing = {0};
+    MHD_get_connection_values_n(request->handle, MHD_HEADER_KIND, look, &framing);
+    if (!framing.fault[0])
+        judge(&framing, version);
+    if (!framing.fault[0])
+        return true;
+    request->closes = true;
+    spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", framing.field, framing.fault);
+    return false;
+}
