@@ -42,7 +42,10 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 static int map_file(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct stat status;
-    int fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), rc = SPL_OK;
+    int fd, rc = SPL_OK;
+    if (!stat(dataset->path, &status) && !S_ISREG(status.st_mode)) /* opening a device or a FIFO is seen at its other end */
+        return spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
+    fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0 && errno == ENOENT)
         return spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", dataset->path);
     if (fd < 0)

@@ -1,10 +1,11 @@
-/* make_wall [--small | --textured] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two levels,
- * in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. */
+/* make_wall [--small | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two
+ * levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. --knot makes what takes long to open. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "support/make_dataset.h"
+#include "support/make_knot.h"
 #include "support/make_textures.h"
 
 enum { side = 40 };
@@ -29,6 +30,10 @@ int main(int argc, char **argv)
             make_textured_file(plain, &dictionary, 8, 1, argv[i]);
         spl_dictionary_finish(&dictionary);
         spl_dataset_close(plain);
+        return 0;
+    }
+    if (argc > 2 && !strcmp(argv[1], "--knot")) {
+        make_knot_file(argv[2], 500000);
         return 0;
     }
     for (int i = 1 + small; i < argc; i++)

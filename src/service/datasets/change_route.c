@@ -109,7 +109,8 @@ static void run_step(uv_work_t *work)
     if (!incoming->path)
         spl_incoming_begin(incoming, change->target, err);
     if (!err->code && !spl_incoming_append(incoming, change->buffer, change->filled, err) && change->ended)
-        spl_incoming_commit(incoming, change->target, &change->entry, &change->mark, err);
+        spl_incoming_commit(incoming, change->target, &change->service->library.cancelled, &change->entry,
+                            &change->mark, err);
     change->filled = 0;
 }
 

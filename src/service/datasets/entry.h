@@ -46,9 +46,11 @@ struct spl_catalog_entry {
     bool loading;                            // owned by: gpu
 };
 
-/* Maps and checks the dataset at `path`; `verify` hashes every section. Blocks on disk, any thread. The caller owns the
- * one reference to *out. */
-int spl_catalog_entry_open(const char *path, bool verify, struct spl_catalog_entry **out, struct spl_error *err);
+/* Maps and checks the dataset at `path`; `verify` hashes every section. Ends with SPL_E_CANCELLED soon after *cancelled
+ * (borrowed for the entry's life; may be NULL) is set. Blocks on disk, any thread. The caller owns the one reference to
+ * *out. */
+int spl_catalog_entry_open(const char *path, bool verify, const atomic_bool *cancelled, struct spl_catalog_entry **out,
+                           struct spl_error *err);
 
 /* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */
 struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry);

@@ -123,15 +123,15 @@ int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t 
     return 0;
 }
 
-int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
-                        struct spl_file_mark *mark, struct spl_error *err)
+int spl_incoming_commit(struct spl_incoming *incoming, const char *target, const atomic_bool *cancelled,
+                        struct spl_catalog_entry **entry, struct spl_file_mark *mark, struct spl_error *err)
 {
     *entry = NULL;
     if (fsync(incoming->fd))
         return fail(incoming, err, "sync");
     struct spl_catalog_entry *checked = NULL;
     struct spl_error why = {0};
-    int rc = spl_catalog_entry_open(incoming->path, true, &checked, &why);
+    int rc = spl_catalog_entry_open(incoming->path, true, cancelled, &checked, &why);
     spl_catalog_entry_unref(checked);
     if (rc) {
         char message[sizeof why.message];
@@ -144,7 +144,7 @@ int spl_incoming_commit(struct spl_incoming *incoming, const char *target, struc
     spl_incoming_abort(incoming); // what is left: the folder
     struct spl_catalog_files files = {0};
     char *const paths[] = {(char *)target};
-    rc = spl_catalog_entry_open(target, false, entry, err);
+    rc = spl_catalog_entry_open(target, false, cancelled, entry, err);
     if (!rc && !spl_catalog_list(paths, 1, &files, NULL) && files.count)
         *mark = files.items[0].mark;
     spl_catalog_files_finish(&files);
