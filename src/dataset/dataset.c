@@ -42,7 +42,10 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 static int map_file(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct stat status;
-    int fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), rc = SPL_OK;
+    int fd, rc = SPL_OK;
+    if (!stat(dataset->path, &status) && !S_ISREG(status.st_mode)) /* opening a device or a FIFO is seen at its other end */
+        return spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
+    fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0 && errno == ENOENT)
         return spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", dataset->path);
     if (fd < 0)
@@ -69,12 +72,19 @@ static int map_file(struct spl_dataset *dataset, struct spl_error *err)
 
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
+    return spl_dataset_open_until(path, verify, NULL, out, err);
+}
+
+int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
+                           struct spl_error *err)
+{
     *out = NULL;
     struct spl_dataset *dataset = spl_alloc(1, sizeof *dataset, err);
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
     dataset->fd = -1;
+    dataset->cancelled = cancelled;
     dataset->path = spl_alloc_raw(strlen(path) + 1, 1, err);
     if (!dataset->path)
         goto done;
@@ -116,6 +126,8 @@ void spl_dataset_close(struct spl_dataset *dataset)
     free(dataset->nodes);
     free(dataset->chunks);
     free(dataset->textures);
+    free(dataset->page_nodes);
+    free(dataset->page_first);
     free(dataset->atoms);
     spl_dictionary_finish(&dataset->dictionary);
     free(dataset->chunk_textures);
@@ -172,10 +184,17 @@ int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *o
     return SPL_OK;
 }
 
+int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err)
+{
+    return spl_is_cancelled(dataset->cancelled)
+               ? spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", name_of(dataset))
+               : SPL_OK;
+}
+
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err)
 {
-    enum { block = 1 << 20 };
+    const size_t block = section->bytes < 1 << 20 ? (size_t)section->bytes : 1 << 20; /* a file may have many small ones */
     void *buffer = spl_alloc_raw(block, 1, err);
     XXH3_state_t *state = buffer ? XXH3_createState() : NULL;
     int rc = state ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory for checksums");
@@ -183,7 +202,8 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
         XXH3_64bits_reset(state);
     for (uint64_t done = 0; !rc && done < section->bytes;) {
         size_t bytes = section->bytes - done < block ? (size_t)(section->bytes - done) : block;
-        if ((rc = spl_dataset_read(dataset, section->offset + done, buffer, bytes, err)))
+        if ((rc = spl_dataset_check_cancelled(dataset, err)) ||
+            (rc = spl_dataset_read(dataset, section->offset + done, buffer, bytes, err)))
             break;
         XXH3_64bits_update(state, buffer, bytes);
         done += bytes;

@@ -4,10 +4,17 @@
 
 #include <splatd/dataset.h>
 
+#include <stdatomic.h>
+
 #include <jansson.h>
 
 #include "dataset/format.h"
 #include "sparse/dictionary.h"
+
+/* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL) with
+ * SPL_E_CANCELLED, as later does whatever else takes long with the dataset. */
+int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
+                           struct spl_error *err);
 
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);

@@ -4,11 +4,13 @@
 #define SPL_DATASET_OPEN_H
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stddef.h>
 
 #include <jansson.h>
 
 #include "base/error.h"
+#include "base/work.h"
 #include "dataset/dataset.h"
 #include "dataset/wires.h"
 #include "sparse/dictionary.h"
@@ -19,6 +21,7 @@ struct spl_dataset {
     int fd;             /* -1 = none */
     const uint8_t *map; /* the whole file; only for spl_dataset_get_page() */
     size_t map_bytes;
+    const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
     bool verified; /* every page had its checksum when the dataset was opened */
     struct spl_section *sections;
     uint32_t section_count;
@@ -29,6 +32,8 @@ struct spl_dataset {
     struct spl_node *nodes;
     struct spl_chunk *chunks;
     const struct spl_section **textures; /* by page; all NULL where there are none */
+    uint32_t *page_nodes;                /* with textures: nodes by page, those of page p from page_first[p] on */
+    uint32_t *page_first;                /* pages + 1 of them */
     void *atoms;                         /* section ATOM, which `dictionary` is read from */
     struct spl_dictionary dictionary;    /* count 0 = no textures */
     uint32_t *chunk_textures;            /* by chunk; NULL = no textures */
@@ -50,6 +55,9 @@ void spl_late_wires_destroy(struct spl_late_wires *late);
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,
                      struct spl_error *err);
 
+/* SPL_E_CANCELLED once nobody waits for the dataset any more: for each step that may take some milliseconds. */
+int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err);
+
 /* XXH3 of a section as it is in the file now, read block by block. Any thread. */
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err);
@@ -67,7 +75,8 @@ int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *er
 /* Parses META and fills info from it. */
 int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err);
 
-/* Checks nodes and chunks against each other, the pages and META; fills info's sums. */
+/* Checks nodes and chunks against each other, the pages and META; fills info's sums and, with textures, the nodes by
+ * page. */
 int spl_dataset_check_structure(struct spl_dataset *dataset, struct spl_error *err);
 
 #endif

@@ -124,10 +124,15 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
 /* A section as it is in the file, malloc'd; NULL and `err` when it cannot be read. */
 static void *copy_section(const struct spl_dataset *dataset, const struct spl_section *section, struct spl_error *err)
 {
-    void *copy = spl_alloc_raw(section->bytes, 1, err);
-    if (copy && spl_dataset_read(dataset, section->offset, copy, section->bytes, err)) {
-        free(copy);
-        return NULL;
+    const uint64_t block = 16 << 20;
+    char *copy = spl_alloc_raw(section->bytes, 1, err);
+    for (uint64_t done = 0; copy && done < section->bytes; done += block) {
+        uint64_t left = section->bytes - done;
+        if (spl_dataset_check_cancelled(dataset, err) ||
+            spl_dataset_read(dataset, section->offset + done, copy + done, left < block ? left : block, err)) {
+            free(copy);
+            return NULL;
+        }
     }
     return copy;
 }
@@ -263,6 +268,8 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
     struct hashing hashing = {.dataset = dataset, .verify = verify, .failed = UINT32_MAX};
     spl_parallel_for(verify ? 0 : 1, dataset->section_count, 1, hash_sections, &hashing);
     char name[40];
+    if ((rc = spl_dataset_check_cancelled(dataset, err)))
+        return rc;
     if (hashing.code)
         return spl_fail(err, hashing.code, "%s cannot be read for its checksums: %s", dataset->path,
                         spl_code_get_info(hashing.code)->name);

@@ -186,6 +186,23 @@ static int check_nodes(struct spl_dataset *dataset, uint8_t *claimed, struct spl
     return SPL_OK;
 }
 
+/* A counting sort, so that whoever goes through the pages meets each node once, however many pages there are. */
+static int sort_nodes_by_page(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const struct spl_dataset_info *info = &dataset->info;
+    uint32_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
+    dataset->page_nodes = first ? spl_alloc_raw(info->nodes, sizeof *dataset->page_nodes, err) : NULL;
+    if (!dataset->page_nodes)
+        return SPL_E_NOMEM;
+    for (uint32_t n = 0; n < info->nodes; n++)
+        first[dataset->nodes[n].page + 2]++;
+    for (uint32_t p = 2; p <= info->pages; p++)
+        first[p] += first[p - 1];
+    for (uint32_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
+        dataset->page_nodes[first[dataset->nodes[n].page + 1]++] = n;
+    return SPL_OK;
+}
+
 int spl_dataset_check_structure(struct spl_dataset *dataset, struct spl_error *err)
 {
     int rc = check_chunks(dataset, err);
@@ -196,5 +213,5 @@ int spl_dataset_check_structure(struct spl_dataset *dataset, struct spl_error *e
         return SPL_E_NOMEM;
     rc = check_nodes(dataset, claimed, err);
     free(claimed);
-    return rc;
+    return rc || !dataset->chunk_textures ? rc : sort_nodes_by_page(dataset, err);
 }

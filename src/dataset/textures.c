@@ -61,10 +61,8 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
 static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
 {
     size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_TEXTURE_TAIL_WORDS;
-    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
-        const struct spl_node *node = &dataset->nodes[n];
-        if (node->page != index)
-            continue;
+    for (uint32_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
+        const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
         for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
             uint32_t texture = dataset->chunk_textures[c], first = spl_texture_word(texture);
             if (!texture)
@@ -126,7 +124,8 @@ static int for_each_page(const struct spl_dataset *dataset,
     uint32_t *words = spl_alloc_raw(most, 1, err);
     int rc = words ? SPL_OK : SPL_E_NOMEM;
     for (uint32_t page = 0; page < dataset->info.pages && !rc; page++) {
-        rc = spl_dataset_read_textures(dataset, page, words, err);
+        if (!(rc = spl_dataset_check_cancelled(dataset, err)))
+            rc = spl_dataset_read_textures(dataset, page, words, err);
         if (!rc)
             rc = visit(dataset, page, words, context, err);
     }
@@ -151,9 +150,9 @@ static int count_page(const struct spl_dataset *dataset, uint32_t index, const u
 {
     (void)err;
     uint64_t *histogram = context;
-    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
-        const struct spl_node *node = &dataset->nodes[n];
-        for (uint32_t c = node->first_chunk; node->page == index && c < node->first_chunk + node->chunk_count; c++) {
+    for (uint32_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
+        const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
+        for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
             uint32_t texture = dataset->chunk_textures[c];
             spl_texture_count(words + spl_texture_word(texture), spl_texture_planes(texture), dataset->chunks[c].count,
                               histogram);

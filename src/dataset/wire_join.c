@@ -2,7 +2,10 @@
  * noise. Ends of chains, which at first are points, are paired within a reach that doubles, the best aligned near ones
  * first: what is joined then says where its wire goes, so that longer gaps ask for longer stretches. Where both sides
  * know their direction they must meet as an arc does, with the same bend at both (a sagging wire), not as an S (two
- * wires beside each other). Distances count in the points' own spacing; there is no length in metres. */
+ * wires beside each other). Distances count in the points' own spacing; there is no length in metres.
+ *
+ * Points that a file only claims to lie on wires may be looked at by all others and walked along for ever, so each look
+ * and each point on a walk is a step of `work`, and where they end, so does joining. */
 #include "dataset/wire_join.h"
 
 #include <math.h>
@@ -17,6 +20,7 @@ static const double shortest = 64; /* and of the shorter of both */
 static const double off = 0.1;     /* a share of a gap that the other end may lie off the direction of this one */
 static const double bend = 0.05;   /* by which that may differ between both ends */
 enum { looks_most = 256 };         /* ends of a cell that are looked at: noise must not cost more */
+enum { cell_steps = 16, pair_steps = 256 }; /* for being sorted, and for its memory: a scan has one for each end */
 
 struct cell {
     uint64_t key;
@@ -35,6 +39,7 @@ struct join {
     double low[3], edge;
     struct pair *pairs;
     size_t pair_count, pair_capacity;
+    struct spl_work *work;
 };
 
 static int compare_cells(const void *a, const void *b)
@@ -87,10 +92,11 @@ static void lay_grid(struct join *j, uint32_t count, double edge, const uint8_t 
 {
     j->edge = edge;
     j->cell_count = 0;
-    for (uint32_t i = 0; i < count; i++)
+    for (uint32_t i = 0; i < count && spl_work_step(j->work); i++)
         if (j->points[i].next[1] == SPL_WIRE_END &&
             (!kept || (kept[i] && edge <= fmax(shortest * j->points[i].length, 2 * near * j->points[i].spacing))))
             j->cells[j->cell_count++] = (struct cell){key_of(j, j->points[i].position, (int[3]){0}), i};
+    spl_work_take(j->work, cell_steps * j->cell_count);
     qsort(j->cells, j->cell_count, sizeof *j->cells, compare_cells);
 }
 
@@ -100,11 +106,11 @@ static double distance(const double a[3], const double b[3])
 }
 
 double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
-                         double heading[3])
+                         double heading[3], struct spl_work *work)
 {
     uint32_t before = point, at = points[point].next[points[point].next[0] == avoid];
     double length = 0;
-    while (at != SPL_WIRE_END) {
+    while (at != SPL_WIRE_END && spl_work_step(work)) {
         length = distance(points[point].position, points[at].position);
         for (int c = 0; c < 3; c++)
             heading[c] = (points[point].position[c] - points[at].position[c]) / length;
@@ -123,7 +129,7 @@ static bool aim(const struct join *j, uint32_t a, uint32_t b, double length, dou
 {
     const struct spl_wire_point *p = j->points;
     double heading[3], along = 0, squared = 0;
-    *knows = spl_wires_heading(p, a, SPL_WIRE_END, fmax(length, 4 * spacing), heading) > 0;
+    *knows = spl_wires_heading(p, a, SPL_WIRE_END, fmax(length, 4 * spacing), heading, j->work) > 0;
     if (!*knows)
         return true;
     for (int c = 0; c < 3; c++)
@@ -161,11 +167,15 @@ static int find_pairs(struct join *j, double reach, struct spl_error *err)
     j->pair_count = 0;
     for (size_t i = 0; i < j->cell_count; i++) {
         uint32_t a = j->cells[i].point;
+        int rc = spl_work_check(j->work);
+        if (rc)
+            return rc;
         for (int k = 0; k < 27; k++) {
             uint64_t key = key_of(j, j->points[a].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1});
             size_t first = find_cell(j, key);
             for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
+                spl_work_step(j->work);
                 if (b <= a || distance(j->points[a].position, j->points[b].position) > reach)
                     continue;
                 double cost = cost_of(j, a, b);
@@ -180,6 +190,7 @@ static int find_pairs(struct join *j, double reach, struct spl_error *err)
                     j->pair_capacity = larger;
                 }
                 j->pairs[j->pair_count++] = (struct pair){cost, a, b};
+                spl_work_take(j->work, pair_steps);
             }
         }
     }
@@ -189,11 +200,14 @@ static int find_pairs(struct join *j, double reach, struct spl_error *err)
 }
 
 /* Pairs the best first; what an earlier one has changed is judged anew. */
-static void join_pairs(struct join *j)
+static int join_pairs(struct join *j)
 {
     struct spl_wire_point *p = j->points;
     for (size_t i = 0; i < j->pair_count; i++) {
         uint32_t a = j->pairs[i].a, b = j->pairs[i].b, ends[2] = {p[a].other, p[b].other};
+        int rc = spl_work_check(j->work);
+        if (rc)
+            return rc;
         if (p[a].next[1] != SPL_WIRE_END || p[b].next[1] != SPL_WIRE_END || cost_of(j, a, b) == INFINITY)
             continue;
         double length = p[a].length + p[b].length + distance(p[a].position, p[b].position);
@@ -204,21 +218,26 @@ static void join_pairs(struct join *j)
             p[ends[k]].length = length;
         }
     }
+    return SPL_OK;
 }
 
 /* Keeps points that lie apart from those kept before, in the order given. */
-static void thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
+static int thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
 {
     struct spl_wire_point *p = j->points;
     lay_grid(j, count, edge, NULL);
     for (uint32_t i = 0; i < count; i++) {
         double limit = fmin(p[i].spacing, edge);
+        int rc = spl_work_check(j->work);
+        if (rc)
+            return rc;
         kept[i] = 1;
         for (int k = 0; k < 27 && kept[i]; k++) {
             uint64_t key = key_of(j, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1});
             size_t first = find_cell(j, key);
             for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
+                spl_work_step(j->work);
                 if (b >= i)
                     break;
                 if (kept[b] && distance(p[i].position, p[b].position) < limit) {
@@ -228,11 +247,12 @@ static void thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
             }
         }
     }
+    return SPL_OK;
 }
 
-int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_error *err)
+int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_work *work, struct spl_error *err)
 {
-    struct join j = {.points = points};
+    struct join j = {.points = points, .work = work};
     double *spacings = spl_alloc_raw(count + 1, sizeof *spacings, err);
     uint8_t *kept = spl_alloc(count + 1, sizeof *kept, err);
     j.cells = spl_alloc_raw(count + 1, sizeof *j.cells, err);
@@ -251,12 +271,12 @@ int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_err
         goto done;
     qsort(spacings, count, sizeof *spacings, compare_doubles);
     double reach = spacings[count / 2];
-    thin_out(&j, count, 2 * reach, kept);
+    rc = thin_out(&j, count, 2 * reach, kept);
     for (; reach <= 2 * far * longest && !rc; reach *= 2) {
         lay_grid(&j, count, reach, kept);
         rc = find_pairs(&j, reach, err);
         if (!rc)
-            join_pairs(&j);
+            rc = join_pairs(&j);
     }
 done:
     free(j.pairs);

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "base/work.h"
 
 #define SPL_WIRE_END UINT32_MAX
 
@@ -17,13 +18,14 @@ struct spl_wire_point {
 };
 
 /* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or
- * loops. Points that lie beside another one are left alone. Pure function; any thread. SPL_E_NOMEM. */
-int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_error *err);
+ * loops. Points that lie beside another one are left alone. SPL_E_NOMEM; as spl_work_check() when no step is left or
+ * somebody wants it to stop: the links hold then, but are not all. Pure function but for `work`; any thread. */
+int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_work *work, struct spl_error *err);
 
 /* How `point` lies off what it is joined with on the other side of `avoid` (one of its links; SPL_WIRE_END at an end):
  * the unit vector to it from the chain's point that lies `reach` behind, or its end. Returns the distance of those two,
- * or 0 where nothing is there. */
+ * or 0 where nothing is there. Takes a step of `work` for each point on the way, and goes no farther than they last. */
 double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
-                         double heading[3]);
+                         double heading[3], struct spl_work *work);
 
 #endif

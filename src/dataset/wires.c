@@ -1,7 +1,10 @@
 /* Making a dataset's wires: its linear splats are gathered and joined (wire_join.c). A join of two points is cut into
  * straight pieces, each with the looks of the nearer one; over a gap they follow the arc that the stretches on both
  * sides are parts of. Pieces are never changed once they are there: under the mutex they come, without it they are
- * read. */
+ * read.
+ *
+ * All of it is bounded by the file's size, not by what the file says of itself, and ends early where nobody waits for it
+ * any more. */
 #include "dataset/wires.h"
 
 #include <math.h>
@@ -14,6 +17,10 @@
 #include "dataset/wire_join.h"
 
 enum { block_pieces = SPL_WIRES_BLOCK, halves_most = 16 };
+/* What a file may cost by its size, whatever it says about itself: several times what scans of nothing but wires do. */
+enum { point_bytes = 2 };                     /* more points than that are not gathered */
+enum { byte_steps = 512, piece_steps = 512 }; /* 10 to 20 ns each; a piece's are for its memory */
+static const uint64_t steps_most = 1ull << 33; /* of any file: some two minutes */
 static const double straight = 8; /* spacings that half a piece over a gap is long */
 
 struct gathered {
@@ -48,49 +55,42 @@ static int add_point(struct gathered *g, const struct spl_node *node, const stru
     return SPL_OK;
 }
 
-static int gather_node(struct gathered *g, const struct spl_dataset *dataset, const struct spl_node *node,
-                       const uint32_t *page, struct spl_error *err)
+/* The linear points of chunk `index`, of which only its own words are read: nodes may name the same page in any order,
+ * and pages are large. */
+static int gather_chunk(struct gathered *g, const struct spl_dataset *dataset, const struct spl_node *node,
+                        uint32_t index, struct spl_error *err)
 {
-    uint32_t chunk_count;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count) + node->first_chunk;
-    for (uint32_t k = 0; k < node->chunk_count; k++)
-        for (uint32_t i = 0; chunks[k].geometry_bits >> SPL_GEOMETRY_LINEAR && i < chunks[k].count; i++) {
-            struct spl_splat splat;
-            spl_chunk_decode(&chunks[k], page, i, &splat);
-            int rc = splat.linear ? add_point(g, node, &chunks[k], i, &splat, err) : SPL_OK;
-            if (rc)
-                return rc;
-        }
-    return SPL_OK;
+    struct spl_chunk chunk = dataset->chunks[index];
+    uint32_t words[SPL_CHUNK_WORDS_MAX + SPL_PAGE_TAIL_WORDS], count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS;
+    uint64_t offset = dataset->pages[node->page]->offset + (uint64_t)chunk.geometry_word * sizeof *words;
+    spl_assert(count <= sizeof words / sizeof *words); // opening has checked that the page has them
+    int rc = spl_dataset_read(dataset, offset, words, count * sizeof *words, err);
+    chunk.geometry_word = 0;
+    for (uint32_t i = 0; !rc && i < chunk.count; i++) {
+        struct spl_splat splat;
+        spl_chunk_decode(&chunk, words, i, &splat);
+        rc = splat.linear ? add_point(g, node, &chunk, i, &splat, err) : SPL_OK;
+    }
+    return rc;
 }
 
-/* Pages are read once where nodes that follow each other share them. */
+/* SPL_E_LIMIT where more points lie on wires than a file of this size can have of any use. */
 static int gather(struct gathered *g, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint32_t node_count, chunk_count, loaded = UINT32_MAX, *page = NULL;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    int rc = SPL_OK;
-    for (uint32_t n = 0; n < node_count && !rc; n++) {
-        const struct spl_node *node = &nodes[n];
-        bool any = false;
-        for (uint32_t k = 0; k < node->chunk_count && !node->child_count; k++)
-            any |= chunks[node->first_chunk + k].geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
-        if (!any)
-            continue;
-        if (loaded != node->page) {
-            size_t bytes;
-            spl_dataset_get_page(dataset, node->page, &bytes);
-            free(page);
-            page = spl_alloc(bytes / sizeof *page + 1, sizeof *page, err); /* a field at the very end loads its word */
-            rc = page ? spl_dataset_read_page(dataset, node->page, page, err) : SPL_E_NOMEM;
-            loaded = node->page;
+    for (uint32_t n = 0; n < dataset->info.nodes; n++) {
+        const struct spl_node *node = &dataset->nodes[n];
+        for (uint32_t k = 0; k < node->chunk_count && !node->child_count; k++) {
+            uint32_t index = node->first_chunk + k;
+            if (!(dataset->chunks[index].geometry_bits >> SPL_GEOMETRY_LINEAR))
+                continue;
+            int rc = spl_dataset_check_cancelled(dataset, err);
+            if (!rc && g->count > dataset->info.file_bytes / point_bytes)
+                rc = SPL_E_LIMIT;
+            if (rc || (rc = gather_chunk(g, dataset, node, index, err)))
+                return rc;
         }
-        if (!rc)
-            rc = gather_node(g, dataset, node, page, err);
     }
-    free(page);
-    return rc;
+    return SPL_OK;
 }
 
 static int add_piece(struct spl_wires *w, const double from[3], const double to[3], const struct spl_wire_look *look,
@@ -114,7 +114,7 @@ static int add_piece(struct spl_wires *w, const double from[3], const double to[
 /* The way from the middle of the straight line between two points to that of the arc on which both and what they are
  * joined with lie: over `length` between stretches of `base` on average, whose directions an end lies `aside` of, its
  * curvature is 2 aside / (length (length + base)), its height length^2 / 8 times that. */
-static double find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, double rise[3])
+static double find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, double rise[3], struct spl_work *work)
 {
     double length = 0, base = 0, aside[3] = {0};
     uint32_t ends[2] = {a, b};
@@ -124,7 +124,7 @@ static double find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, d
     memset(rise, 0, 3 * sizeof *rise);
     for (int k = 0; k < 2; k++) {
         uint32_t own = ends[k], far = ends[1 - k];
-        double heading[3], along = 0, behind = spl_wires_heading(p, own, far, length, heading);
+        double heading[3], along = 0, behind = spl_wires_heading(p, own, far, length, heading, work);
         if (!(behind > 0))
             return length;
         base += behind / 2;
@@ -138,12 +138,14 @@ static double find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, d
     return length;
 }
 
-static int add_join(struct spl_wires *w, const struct gathered *g, uint32_t a, uint32_t b, struct spl_error *err)
+static int add_join(struct spl_wires *w, const struct gathered *g, uint32_t a, uint32_t b, struct spl_work *work,
+                    struct spl_error *err)
 {
-    double rise[3], from[3], to[3], length = find_arc(g->points, a, b, rise);
+    double rise[3], from[3], to[3], length = find_arc(g->points, a, b, rise, work);
     double spacing = fmax(g->points[a].spacing, g->points[b].spacing);
-    int halves = (int)fmin(ceil(length / (2 * straight * spacing)), halves_most), rc = SPL_OK;
+    int halves = (int)fmin(ceil(length / (2 * straight * spacing)), halves_most), rc = spl_work_check(work);
     memcpy(from, g->points[a].position, sizeof from);
+    spl_work_take(work, 2 * (uint64_t)halves * piece_steps);
     for (int i = 1; i <= 2 * halves && !rc; i++) {
         double t = (double)i / (2 * halves);
         for (int c = 0; c < 3; c++)
@@ -156,7 +158,7 @@ static int add_join(struct spl_wires *w, const struct gathered *g, uint32_t a, u
 }
 
 /* Chain by chain, so that the pieces of a block lie close together. */
-static int add_chains(struct spl_wires *w, const struct gathered *g, struct spl_error *err)
+static int add_chains(struct spl_wires *w, const struct gathered *g, struct spl_work *work, struct spl_error *err)
 {
     const struct spl_wire_point *p = g->points;
     int rc = SPL_OK;
@@ -165,7 +167,7 @@ static int add_chains(struct spl_wires *w, const struct gathered *g, struct spl_
             continue;
         for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc;) {
             uint32_t next = p[at].next[p[at].next[0] == before];
-            rc = add_join(w, g, at, next, err);
+            rc = add_join(w, g, at, next, work, err);
             before = at;
             at = next;
         }
@@ -190,16 +192,23 @@ static int bound_blocks(struct spl_wires *w, struct spl_error *err)
     return SPL_OK;
 }
 
+/* What is there when the steps end is kept. */
 static int make(struct spl_wires *w, const struct spl_dataset *dataset, struct spl_error *err)
 {
     struct gathered g = {0};
+    uint64_t bytes = dataset->info.file_bytes, most = bytes < steps_most / byte_steps ? byte_steps * bytes : steps_most;
+    struct spl_work joining = {most, dataset->cancelled}, cutting = joining;
     int rc = gather(&g, dataset, err);
     if (!rc)
-        rc = spl_wires_join(g.points, (uint32_t)g.count, err);
-    if (!rc)
-        rc = add_chains(w, &g, err);
-    if (!rc)
+        rc = spl_wires_join(g.points, (uint32_t)g.count, &joining, err);
+    if (!rc || (rc == SPL_E_LIMIT && !joining.left))
+        rc = add_chains(w, &g, &cutting, err);
+    w->cut_short = rc == SPL_E_LIMIT || !joining.left;
+    w->steps = 2 * most - joining.left - cutting.left;
+    if (!rc || rc == SPL_E_LIMIT)
         rc = bound_blocks(w, err);
+    if (rc == SPL_E_CANCELLED)
+        spl_dataset_check_cancelled(dataset, err);
     free(g.points);
     free(g.looks);
     return rc;

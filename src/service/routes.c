@@ -46,7 +46,10 @@ static void list_datasets(struct request *request, const struct spl_call *call)
     for (size_t i = 0; i < catalog->count; i++)
         if (spl_access_may_see(request, catalog->slots[i].id))
             json_array_append_new(list, spl_describe_slot(&catalog->slots[i]));
-    spl_reply_json(request, json_pack("{s:o}", "datasets", list));
+    json_t *json = json_pack("{s:o}", "datasets", list);
+    if (catalog->left_out)
+        json_object_set_new(json, "left_out", json_integer((json_int_t)catalog->left_out));
+    spl_reply_json(request, json);
 }
 
 static void show_dataset(struct request *request, const struct spl_call *call)

@@ -25,7 +25,8 @@
 enum {
     drain_check_ms = 20,
     drain_least_ms = 250,  /* clients whose next request is on its way already are still served */
-    drain_grace_ms = 5000, /* beyond the deadline of the last view */
+    drain_grace_ms = 4000, /* beyond the deadline of the last view */
+    end_s = 1,             /* and for what is left to end after that */
 };
 
 static void on_drain_timer(uv_timer_t *timer)
@@ -54,6 +55,28 @@ static void drain(struct spl_service *service)
     spl_http_quiesce(service);
     spl_tours_end_streams(service->tours);
     uv_timer_start(&service->drain_timer, on_drain_timer, drain_check_ms, drain_check_ms);
+}
+
+/* A thread that waits for a disk that does not answer, or hangs in a driver, can be neither woken nor left behind while
+ * what it uses is freed. By then every request has its reply. */
+static volatile sig_atomic_t end_code;
+
+static void end_now(int number)
+{
+    static const char line[] = "splatd: a disk or a driver does not answer; ended without waiting for it\n";
+    (void)number;
+    if (write(STDERR_FILENO, line, sizeof line - 1) < 0) {
+        // nobody reads it
+    }
+    _exit(end_code);
+}
+
+static void end_in(const struct spl_service *service, unsigned seconds)
+{
+    end_code = service->failure.code ? spl_code_get_info(service->failure.code)->exit_code : 0;
+    if (seconds)
+        signal(SIGALRM, end_now);
+    alarm(seconds);
 }
 
 static void on_leave(uv_timer_t *timer)
@@ -111,6 +134,7 @@ static void on_wake(uv_async_t *handle)
 {
     struct spl_service *service = handle->data;
     enum spl_pipeline_state state = spl_pipeline_get_state(service->pipeline);
+    spl_library_take_changes(service); // first, so that what does not fit is not announced
     if (state == SPL_PIPELINE_READY && !service->daemon && !service->draining) {
         if (spl_http_start(service, &service->failure))
             drain(service);
@@ -118,7 +142,6 @@ static void on_wake(uv_async_t *handle)
             announce(service);
         spl_library_start(service);
     }
-    spl_library_take_changes(service);
     spl_waiting_complete(service);
     spl_tours_pump(service->tours);
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
@@ -136,7 +159,7 @@ static void wake(void *context)
 /* Every connection is a descriptor. */
 static void raise_descriptor_limit(const struct spl_service_options *options)
 {
-    enum { others = 512 };
+    enum { others = 512 + SPL_CATALOG_MAX };
     struct rlimit limit;
     rlim_t wanted = (rlim_t)options->connections + others;
     if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= wanted)
@@ -257,6 +280,9 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
         goto done;
     spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);
+    uint64_t drained_ms = service->draining ? (spl_now_ns() - service->drain_began_ns) / SPL_NS_PER_MS : 0;
+    uint64_t most_ms = options->deadline_ms + drain_grace_ms;
+    end_in(service, end_s + (unsigned)(drained_ms < most_ms ? (most_ms - drained_ms) / 1000 : 0));
     spl_http_stop(service);
     if ((rc = service->failure.code) && err)
         *err = service->failure;
@@ -273,6 +299,7 @@ done:
         close(service->listen_fd);
     finish_loop(service);
     spl_tours_close(service->tours);
+    end_in(service, 0);
 free_service:
     free(service);
     return rc;

@@ -89,6 +89,8 @@ struct library {
     size_t tasks;                /* in the thread pool */
     bool looking;                /* one of them is a look */
     bool stopped;                /* nothing new is begun, what comes back is thrown away */
+    atomic_bool cancelled;       /* what is being opened is given up; read by every thread that opens */
+    uint64_t looks;              /* so far */
     struct spl_error last;       /* of the last look, so that it is logged once */
     const char *directory;       // may be NULL; where clients' datasets go: the first directory served
     LIST_HEAD(, change) changes; /* of clients, in progress */

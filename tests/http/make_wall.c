@@ -1,10 +1,12 @@
-/* make_wall [--small | --large | --textured] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half;
- * --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. */
+/* make_wall [--small | --large | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
+ * half; --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16
+ * atoms. --knot makes what takes long to open. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "support/make_dataset.h"
+#include "support/make_knot.h"
 #include "support/make_textures.h"
 
 enum { side_usual = 40, side_large = 600 };
@@ -34,6 +36,11 @@ int main(int argc, char **argv)
             make_textured_file(plain, &dictionary, 8, 1, argv[i]);
         spl_dictionary_finish(&dictionary);
         spl_dataset_close(plain);
+        free(splats);
+        return 0;
+    }
+    if (argc > 2 && !strcmp(kind, "--knot")) {
+        make_knot_file(argv[2], 500000);
         free(splats);
         return 0;
     }

@@ -3,6 +3,8 @@ import json
 import os
 import pathlib
 import shutil
+import socket
+import subprocess
 import tempfile
 import threading
 import time
@@ -140,7 +142,9 @@ def test_partial_files_and_foreign_names_are_left_alone():
         os.mkdir(os.path.join(home, "folder.spld"))
         os.symlink("/nowhere", os.path.join(home, "dangling.spld"))
         eventually(lambda: listed(d).get("folder", {}).get("state") == "failed")
-        assert set(listed(d)) == {"slow", "folder"}, listed(d)
+        eventually(lambda: listed(d).get("dangling", {}).get("state") == "failed")
+        assert set(listed(d)) == {"slow", "folder", "dangling"}, listed(d)
+        assert any("4 files are left out: their names" in line for line in d.lines), d.lines
 
 
 def test_a_directory_that_cannot_be_listed_drops_nothing():
@@ -208,6 +212,152 @@ def test_pages_of_who_was_seen_last_make_room():
             eventually(lambda: listed(d).get("c", {}).get("state") == "failed")
             reply = small(d, "c")
             assert reply.status == 404 and too_small in reply.json()["detail"], reply.body
+
+
+ODD = {  # what a name may stand for that is no dataset, and a part of what is said of it
+    "loop": (lambda path: os.symlink(path, path), "symbolic links"),
+    "dangling": (lambda path: os.symlink("/nowhere", path), "no such file"),
+    "folder": (os.mkdir, "not a regular file"),
+    "pipe": (os.mkfifo, "not a regular file"),
+    "socket": (lambda path: socket.socket(socket.AF_UNIX).bind(path), "not a regular file"),
+    "device": (lambda path: os.symlink("/dev/zero", path), "not a regular file"),
+    "empty": (lambda path: pathlib.Path(path).touch(), "empty"),
+}
+
+
+def make_odd(home):
+    for name, (make, _) in ODD.items():
+        make(os.path.join(home, name + ".spld"))
+    os.mkfifo(os.path.join(home, "good.profile.json"))
+
+
+def check_odd(d):
+    for name, (_, reason) in ODD.items():
+        dataset = listed(d)[name]
+        assert dataset["state"] == "failed" and reason in dataset["reason"], dataset
+
+
+def test_one_bad_entry_is_its_own_state_at_start_and_later():
+    with folder() as home:
+        make_odd(home)
+        put(home, "good", wall())
+        with Daemon(FAKE, *WATCH, datasets=[home]) as d:
+            check_odd(d)
+            assert small(d, "good").status == 200
+            put(home, "late", other())  # the listing is not frozen
+            eventually(lambda: listed(d).get("late", {}).get("state") == "ready")
+            os.unlink(os.path.join(home, "loop.spld"))
+            put(home, "loop", wall())
+            eventually(lambda: listed(d)["loop"]["state"] == "ready")
+            time.sleep(0.3)
+            for name in ODD:
+                said = [line for line in d.lines if f"dataset {name} " in line and "warning" in line]
+                assert len(said) == 1, said
+    with folder() as home, Daemon(FAKE, *WATCH, datasets=[home]) as d:
+        put(home, "good", wall())
+        make_odd(home)
+        eventually(lambda: len([x for x in listed(d).values() if x["state"] == "failed"]) == len(ODD))
+        check_odd(d)
+        eventually(lambda: listed(d)["good"]["state"] == "ready")
+
+
+def test_what_may_pass_is_tried_again():
+    with folder() as home, folder() as away, Daemon(FAKE, *WATCH, datasets=[home]) as d:
+        target = os.path.join(away, "real.spld")
+        os.symlink(target, os.path.join(home, "a.spld"))
+        eventually(lambda: listed(d).get("a", {}).get("state") == "failed")
+        shutil.copy(WALL, target)
+        eventually(lambda: listed(d)["a"]["state"] == "ready")
+        os.rename(target, target + ".away")
+        eventually(lambda: "reason" in listed(d)["a"])
+        assert small(d, "a").status == 200  # the version that was there
+
+
+def test_more_files_than_are_served():
+    with folder() as home:
+        for i in range(1030):
+            pathlib.Path(home, f"n{i:04}.spld").touch()
+        put(home, "a", wall())
+        put(home, "z", other())
+        with Daemon(FAKE, *WATCH, datasets=[home]) as d:
+            reply = d.ask("/v1/datasets").json()
+            ids = [dataset["id"] for dataset in reply["datasets"]]
+            assert len(ids) == 1024 and ids[0] == "a" and ids[-1] == "n1022" and reply["left_out"] == 8, reply["left_out"]
+            assert small(d, "a").status == 200 and small(d, "z").status == 404
+            for i in range(10):
+                os.unlink(os.path.join(home, f"n{i:04}.spld"))
+            eventually(lambda: listed(d).get("z", {}).get("state") == "ready")
+            assert "left_out" not in d.ask("/v1/datasets").json()
+            assert len([line for line in d.lines if "datasets are left out" in line]) == 1
+
+
+def test_a_directory_that_cannot_be_listed_freezes_no_other():
+    with folder() as top:
+        one, two = os.path.join(top, "one"), os.path.join(top, "two")
+        for home in (one, two):
+            os.mkdir(home)
+            put(home, os.path.basename(home), wall())
+        with Daemon(FAKE, *WATCH, datasets=[one, two]) as d:
+            assert set(listed(d)) == {"one", "two"}
+            os.rename(one, one + ".away")
+            eventually(lambda: any("left as they are" in line for line in d.lines))
+            put(two, "more", wall())
+            os.unlink(os.path.join(two, "two.spld"))
+            eventually(lambda: set(listed(d)) == {"one", "more"})
+            os.rename(one + ".away", one)
+            put(one, "back", wall())
+            eventually(lambda: set(listed(d)) == {"one", "more", "back"})
+
+
+def test_one_name_in_two_directories_is_served_once():
+    with folder() as one, folder() as two:
+        put(one, "a", wall())
+        put(two, "a", other())
+        with Daemon(FAKE, *WATCH, datasets=[one, two]) as d:
+            before = listed(d)["a"]["version"]
+            assert any("two datasets are called 'a'" in line for line in d.lines)
+            os.unlink(os.path.join(one, "a.spld"))
+            eventually(lambda: listed(d).get("a", {}).get("version", before) != before)
+
+
+def test_what_does_not_fit_at_start_is_not_served():
+    with folder() as home:
+        put(home, "a", wall())
+        with Daemon(REAL, *WATCH, datasets=[home]) as d:
+            small(d, "a")
+            memory, page = d.status()["memory"], listed(d)["a"]["resident_bytes"]
+        with Daemon(REAL, *WATCH, "--memory-limit", str(memory["device_bytes"] - page + 4096), datasets=[home]) as d:
+            assert listed(d)["a"]["state"] == "failed" and "memory" in listed(d)["a"]["reason"], listed(d)
+            reply = small(d, "a")
+            assert reply.status == 404, reply.body
+            assert not any("bytes, /v1/datasets/a/view" in line for line in d.lines), d.lines
+        named = os.path.join(home, "a.spld")
+        with Daemon(REAL, *WATCH, "--memory-limit", str(memory["device_bytes"] - page + 4096), datasets=[named]) as d:
+            assert listed(d)["a"]["state"] == "failed"
+
+
+def test_sigterm_while_a_share_hangs():
+    """An opening in the pool that never comes back keeps nobody."""
+    with folder() as home:
+        preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_SLOW_DISK"]]))
+        with Daemon(FAKE, *WATCH, "--deadline", "1000", datasets=[home], LD_PRELOAD=preload,
+                    SLOW_DISK_GATE=os.path.join(home, "never")) as d:
+            put(home, "a", wall())
+            eventually(lambda: listed(d).get("a", {}).get("state") == "loading")
+            time.sleep(0.3)  # two looks more, and it is being opened
+            assert d.stop() == 0
+
+
+def test_sigterm_while_a_knot_is_opened():
+    with folder() as home, Daemon(FAKE, *WATCH, datasets=[home]) as d:
+        subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--knot", os.path.join(home, ".knot")], check=True)
+        os.rename(os.path.join(home, ".knot"), os.path.join(home, "knot.spld"))
+        eventually(lambda: listed(d).get("knot", {}).get("state") == "loading")
+        time.sleep(0.5)
+        assert listed(d)["knot"]["state"] == "loading"
+        began = time.monotonic()
+        assert d.stop() == 0
+        assert time.monotonic() - began < 20 and not any("does not answer" in line for line in d.lines), d.lines
 
 
 def test_sigterm_while_datasets_are_opened():

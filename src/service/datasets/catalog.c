@@ -1,10 +1,9 @@
-/* The table of datasets, and which files stand behind it.
+/* The table of datasets, and how it is filled at start.
  *
  * Invariant: ids are unique and sorted, so that a lookup is a binary search and a listing is the same every time. An id
  * is compared with names that are here already; only PUT makes a path of one, after spl_catalog_id_is_valid(). */
 #include "service/datasets/catalog.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,8 +13,6 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-
-enum { datasets_max = 1024 };
 
 bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file_mark *b)
 {
@@ -37,79 +34,6 @@ const char *spl_catalog_id_of(const char *path, size_t *length)
     const char *slash = strrchr(path, '/'), *stem = slash ? slash + 1 : path, *dot = strrchr(stem, '.');
     *length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
     return spl_catalog_id_is_valid(stem, *length) ? stem : NULL;
-}
-
-static int add_file(struct spl_catalog_files *files, const char *directory, const char *name, struct spl_error *err)
-{
-    struct stat status;
-    char *path = NULL;
-    if (asprintf(&path, "%s%s%s", directory, *directory ? "/" : "", name) < 0)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", name);
-    int rc = 0;
-    if (stat(path, &status)) {
-        if (errno != ENOENT && errno != ENOTDIR)
-            rc = spl_fail_errno(err, errno, "cannot examine '%s'", path);
-        goto done;
-    }
-    if (files->count == datasets_max) {
-        rc = spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)datasets_max);
-        goto done;
-    }
-    struct spl_catalog_file *grown = spl_realloc(files->items, files->count + 1, sizeof *grown, err);
-    if (!grown) {
-        rc = SPL_E_NOMEM;
-        goto done;
-    }
-    files->items = grown;
-    grown[files->count++] =
-        (struct spl_catalog_file){.path = path, .in_directory = *directory, .mark = spl_file_mark_of(&status)};
-    path = NULL;
-done:
-    free(path);
-    return rc;
-}
-
-static bool is_dataset_name(const char *name)
-{
-    size_t length = strlen(name);
-    return length > 5 && !strcmp(name + length - 5, ".spld");
-}
-
-static int add_directory(struct spl_catalog_files *files, const char *directory, struct spl_error *err)
-{
-    DIR *dir = opendir(directory);
-    if (!dir)
-        return spl_fail_errno(err, errno, "cannot list '%s'", directory);
-    int rc = 0;
-    for (struct dirent *item; !rc && (item = readdir(dir));) {
-        size_t ignored;
-        if (is_dataset_name(item->d_name) && spl_catalog_id_of(item->d_name, &ignored))
-            rc = add_file(files, directory, item->d_name, err);
-    }
-    closedir(dir);
-    return rc;
-}
-
-int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_files *files, struct spl_error *err)
-{
-    *files = (struct spl_catalog_files){0};
-    int rc = 0;
-    for (size_t i = 0; !rc && i < path_count; i++) {
-        struct stat status;
-        bool there = !stat(paths[i], &status), directory = there && S_ISDIR(status.st_mode);
-        if (!there && !is_dataset_name(paths[i]))
-            return spl_fail(err, SPL_E_IO, "cannot list '%s': %s", paths[i], strerror(errno));
-        rc = directory ? add_directory(files, paths[i], err) : add_file(files, "", paths[i], err);
-    }
-    return rc;
-}
-
-void spl_catalog_files_finish(struct spl_catalog_files *files)
-{
-    for (size_t i = 0; i < files->count; i++)
-        free(files->items[i].path);
-    free(files->items);
-    *files = (struct spl_catalog_files){0};
 }
 
 /* Where `id` is, or would be. */
@@ -151,8 +75,8 @@ struct spl_catalog_slot *spl_catalog_add_slot(struct spl_catalog *catalog, const
     bool found;
     size_t at = place_of(catalog, id, &found);
     spl_assert(!found);
-    if (catalog->count == datasets_max) {
-        spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)datasets_max);
+    if (catalog->count == SPL_CATALOG_MAX) {
+        spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)SPL_CATALOG_MAX);
         return NULL;
     }
     struct spl_catalog_slot *grown = spl_realloc(catalog->slots, catalog->count + 1, sizeof *grown, err);
@@ -189,6 +113,23 @@ void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
     spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, slot->path);
 }
 
+bool spl_catalog_may_pass(const struct spl_error *why)
+{
+    return why->code == SPL_E_IO || why->code == SPL_E_NOMEM || why->code == SPL_E_NOT_FOUND;
+}
+
+void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, size_t nameless)
+{
+    if (left_out && left_out != catalog->left_out)
+        spl_log_warn("%zu datasets are left out: the first %d by name are served", left_out, (int)SPL_CATALOG_MAX);
+    if (nameless && nameless != catalog->nameless)
+        spl_log_warn("%zu files are left out: their names cannot be ids, which have at most %zu letters, digits, '.', "
+                     "'_' and '-'",
+                     nameless, sizeof((struct spl_dataset_info *)0)->id - 1);
+    catalog->left_out = left_out;
+    catalog->nameless = nameless;
+}
+
 void spl_catalog_remove_slot(struct spl_catalog *catalog, struct spl_catalog_slot *slot)
 {
     size_t at = (size_t)(slot - catalog->slots);
@@ -208,6 +149,7 @@ void spl_catalog_finish(struct spl_catalog *catalog)
 struct opening {
     const struct spl_catalog_files *files;
     bool verify;
+    const atomic_bool *cancelled;
     struct spl_catalog_entry **entries; /* one a file, as are the errors, so that nothing depends on who was first */
     struct spl_error *errors;
 };
@@ -218,7 +160,7 @@ static void open_range(void *context, size_t begin, size_t end, unsigned worker)
     struct opening *opening = context;
     for (size_t i = begin; i < end; i++)
         spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->verify,
-                               &opening->entries[i], &opening->errors[i]);
+                               opening->cancelled, &opening->entries[i], &opening->errors[i]);
 }
 
 /* Puts one opened file into its slot; takes the entry. */
@@ -228,17 +170,25 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     size_t length;
     const char *stem = spl_catalog_id_of(file->path, &length);
-    if (why->code && (!file->in_directory || !stem || why->code == SPL_E_NOMEM))
+    if (why->code && (!file->in_directory || !stem))
         return spl_fail(err, why->code, "%s", why->message);
     snprintf(id, sizeof id, "%.*s", (int)length, stem);
     struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, id);
-    if (slot)
-        return spl_fail(err, SPL_E_USAGE, "two datasets are called '%.100s': '%.150s' and '%.150s'; rename one", id,
-                        slot->path, file->path);
+    if (slot) {
+        struct spl_error twice = {0};
+        spl_fail(&twice, SPL_E_USAGE, "two datasets are called '%.100s': '%.150s' and '%.150s'; rename one", id,
+                 slot->path, file->path);
+        if (!file->in_directory)
+            return spl_fail(err, twice.code, "%s", twice.message);
+        spl_log_warn("%s; the second is not served", twice.message);
+        return 0;
+    }
     if (!(slot = spl_catalog_add_slot(catalog, id, file->path, err)))
         return SPL_E_NOMEM;
     slot->in_directory = file->in_directory;
-    slot->opened = slot->seen = file->mark;
+    slot->seen = file->mark;
+    if (!spl_catalog_may_pass(why))
+        slot->opened = file->mark;
     slot->current = *entry;
     *entry = NULL;
     if (why->code) {
@@ -246,12 +196,6 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
         spl_log_warn("dataset %s is not served: %s", id, why->message);
     }
     return 0;
-}
-
-static int by_path(const void *a, const void *b)
-{
-    const struct spl_catalog_file *left = a, *right = b;
-    return strcmp(left->path, right->path);
 }
 
 /* What a command line may get wrong and a later look may not. */
@@ -266,11 +210,11 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
 }
 
 int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count, bool verify,
-                     struct spl_error *err)
+                     const atomic_bool *cancelled, struct spl_error *err)
 {
     *catalog = (struct spl_catalog){0};
     struct spl_catalog_files files = {0};
-    struct opening opening = {.files = &files, .verify = verify};
+    struct opening opening = {.files = &files, .verify = verify, .cancelled = cancelled};
     int rc = check_paths(paths, path_count, err);
     if (rc || (rc = spl_catalog_list(paths, path_count, &files, err)))
         goto done;
@@ -280,8 +224,9 @@ int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t pat
         rc = SPL_E_NOMEM;
         goto done;
     }
-    if (files.count)
-        qsort(files.items, files.count, sizeof *files.items, by_path);
+    if (files.why.code)
+        spl_log_warn("%s; its datasets are not served", files.why.message);
+    spl_catalog_say_left_out(catalog, files.left_out, files.nameless);
     spl_parallel_for(0, files.count, 1, open_range, &opening);
     for (size_t i = 0; !rc && i < files.count; i++)
         rc = place(catalog, &files.items[i], &opening.entries[i], &opening.errors[i], err);

@@ -6,6 +6,8 @@
 #include "base/error.h"
 #include "service/datasets/entry.h"
 
+enum { SPL_CATALOG_MAX = 1024 }; /* datasets */
+
 /* Which bytes a path named when it was looked at; zero = none yet. */
 struct spl_file_mark {
     uint64_t device, inode, bytes;
@@ -21,7 +23,9 @@ struct spl_catalog_slot {
     char *path;
     bool in_directory;                    /* of a served directory, which PUT and DELETE may change */
     struct spl_file_mark opened, seen;    /* what was opened or refused last; what lay there at the last look */
-    unsigned missed;                      /* looks in a row that did not find it */
+    uint64_t met;                         /* the last look that found it */
+    unsigned missed;                      /* looks in a row that did not */
+    unsigned failures, rest;              /* openings in a row that failed for what may pass; looks until the next */
     bool busy;                            /* a thread has it: being opened, uploaded, removed or made resident */
     struct spl_catalog_entry *current;    // may be NULL; one reference
     const struct spl_catalog_entry *next; // may be NULL; on its way to the device
@@ -31,32 +35,50 @@ struct spl_catalog_slot {
 struct spl_catalog {
     struct spl_catalog_slot *slots; /* sorted by id */
     size_t count;
+    size_t left_out, nameless; /* files that are not served: beyond SPL_CATALOG_MAX; with names that are no ids */
 };
 
 /* A file that a path stands for. */
 struct spl_catalog_file {
     char *path; // owned
     bool in_directory;
+    size_t place; /* of the path that stands for it */
     struct spl_file_mark mark;
 };
 
 struct spl_catalog_files {
-    struct spl_catalog_file *items;
-    size_t count;
+    struct spl_catalog_file *items; /* named files first, then by id; SPL_CATALOG_MAX at most */
+    size_t count, left_out, nameless;
+    const char **unlisted; /* paths that could not be listed, borrowed */
+    size_t unlisted_count;
+    struct spl_error why; /* of the first of them */
 };
 
-/* Lists what `paths` stand for now: each a file, or a directory whose *.spld files are meant; names that cannot be an
- * id are left out. Files that are not there are left out too; a directory that is not there, say because its disk was
- * unmounted, is an error, as is a path that cannot be examined. Any thread; blocks on disk. The caller finishes *files,
- * also after an error. */
+/* Lists what `paths` stand for now (listing.c): each a file, or a directory whose *.spld files are meant, the first
+ * SPL_CATALOG_MAX of all by name; hidden ones and names that cannot be an id are left out, as are files that are not
+ * there. A directory that is not there, say because its disk was unmounted, or cannot be read is `unlisted`; the others
+ * are listed all the same. What cannot be examined is listed: opening it says why. SPL_E_NOMEM. Any thread; blocks on
+ * disk. The caller finishes *files, also after an error. */
 int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_files *files, struct spl_error *err);
 void spl_catalog_files_finish(struct spl_catalog_files *files);
 
-/* Opens everything at start, one dataset a core. A path that is not there, a broken file that was named itself, two
- * files with one id are refused; a broken file of a directory gets a slot with the reason. On failure *catalog is
- * empty. */
+/* Does the file at `path` lie in a directory that could not be listed? */
+bool spl_catalog_is_unlisted(const struct spl_catalog_files *files, const char *path);
+
+/* Borrowed from `paths`; NULL when none is a directory. Blocks on disk. */
+const char *spl_catalog_first_directory(char *const *paths, size_t path_count);
+
+/* Opens everything at start, one dataset a core, until *cancelled (may be NULL) is set. A path that is not there, a
+ * broken file that was named itself, two of these with one id are refused; a broken file of a directory gets a slot
+ * with the reason. On failure *catalog is empty. */
 int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count, bool verify,
-                     struct spl_error *err);
+                     const atomic_bool *cancelled, struct spl_error *err);
+
+/* May the file open the next time though it has not changed? */
+bool spl_catalog_may_pass(const struct spl_error *why);
+
+/* Notes how many files a listing has left out; logs it when that is news. */
+void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, size_t nameless);
 
 /* Gives the references back. */
 void spl_catalog_finish(struct spl_catalog *catalog);

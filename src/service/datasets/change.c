@@ -95,7 +95,7 @@ static void run_step(uv_work_t *work)
     case SPL_CHANGE_CHECK:
         if ((incoming->path || !spl_incoming_begin(incoming, change->target, err)) &&
             !spl_incoming_append(incoming, change->buffer, change->filled, err) && change->step == SPL_CHANGE_CHECK)
-            spl_incoming_check(incoming, change->target, &change->entry, err);
+            spl_incoming_check(incoming, change->target, &change->service->library.cancelled, &change->entry, err);
         change->filled = 0;
         break;
     case SPL_CHANGE_PLACE:

@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "base/memory.h"
+#include "dataset/dataset.h"
 #include "dataset/wires.h"
 
 static void encode_uri(char *out, size_t capacity, const char *id)
@@ -19,8 +21,8 @@ static void encode_uri(char *out, size_t capacity, const char *id)
         used += (size_t)snprintf(out + used, capacity - used, strchr(plain, *id) ? "%c" : "%%%02X", (unsigned char)*id);
 }
 
-int spl_catalog_entry_open(const char *path, const char *place, bool verify, struct spl_catalog_entry **out,
-                           struct spl_error *err)
+int spl_catalog_entry_open(const char *path, const char *place, bool verify, const atomic_bool *cancelled,
+                           struct spl_catalog_entry **out, struct spl_error *err)
 {
     struct spl_catalog_entry *entry = *out = NULL;
     struct spl_camera camera = {0};
@@ -29,9 +31,11 @@ int spl_catalog_entry_open(const char *path, const char *place, bool verify, str
         return rc;
     atomic_init(&entry->references, 1);
     const struct spl_wires *wires;
-    if ((rc = spl_dataset_open(path, verify, &entry->dataset, err)) ||
+    if ((rc = spl_dataset_open_until(path, verify, cancelled, &entry->dataset, err)) ||
         (rc = spl_dataset_get_wires(entry->dataset, &wires, err))) /* joined here, or the first frame would wait */
         goto done;
+    if (wires->cut_short)
+        spl_log_warn("%s: its wires take more steps to join than those of a scan; the rest of them stays open", path);
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))
         goto done;

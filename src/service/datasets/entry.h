@@ -46,9 +46,10 @@ struct spl_catalog_entry {
 };
 
 /* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. `verify`
- * hashes every section. Blocks on disk, any thread. The caller owns the one reference to *out. */
-int spl_catalog_entry_open(const char *path, const char *place, bool verify, struct spl_catalog_entry **out,
-                           struct spl_error *err);
+ * hashes every section. Ends with SPL_E_CANCELLED soon after *cancelled (borrowed for the entry's life; may be NULL) is
+ * set. Blocks on disk, any thread. The caller owns the one reference to *out. */
+int spl_catalog_entry_open(const char *path, const char *place, bool verify, const atomic_bool *cancelled,
+                           struct spl_catalog_entry **out, struct spl_error *err);
 
 /* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */
 struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry);

@@ -8,13 +8,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/state.h"
 
-enum { looks_before_drop = 2 };
+enum { looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
 
 /* One listing of the served paths; belongs to the pool while it runs. */
 struct look {
@@ -37,12 +36,17 @@ struct opening {
     struct spl_error err;
 };
 
+/* Said once, however often it is tried again. */
 static void refuse(struct spl_catalog_slot *slot, const struct spl_error *err)
 {
+    char before[sizeof slot->reason];
+    memcpy(before, slot->reason, sizeof before);
     slot->busy = false;
     slot->next = NULL;
     spl_catalog_set_reason(slot, err->message);
-    spl_log_warn("dataset %s %s: %s", slot->id, slot->current ? "keeps its version" : "is not served", err->message);
+    if (strcmp(before, slot->reason))
+        spl_log_warn("dataset %s %s: %s", slot->id, slot->current ? "keeps its version" : "is not served",
+                     err->message);
 }
 
 static void free_opening(struct opening *opening)
@@ -54,7 +58,8 @@ static void free_opening(struct opening *opening)
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
-    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->entry, &opening->err);
+    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->service->library.cancelled,
+                           &opening->entry, &opening->err);
 }
 
 static void after_opening(uv_work_t *work, int status)
@@ -65,7 +70,10 @@ static void after_opening(uv_work_t *work, int status)
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, opening->id);
     service->library.tasks--;
     if (slot && opening->err.code && !service->library.stopped) {
-        slot->opened = opening->mark;
+        if (spl_catalog_may_pass(&opening->err))
+            slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
+        else
+            slot->opened = opening->mark;
         refuse(slot, &opening->err);
     } else if (slot && opening->entry && !service->library.stopped) {
         slot->opened = opening->mark;
@@ -156,39 +164,47 @@ void spl_library_take_changes(struct spl_service *service)
             spl_library_serve(slot, entry);
             continue;
         }
-        if (slot && slot->next == entry)
+        if (slot && (slot->next == entry || slot->current == entry)) {
+            if (slot->current == entry) // at start: there is no version before it
+                slot->current = NULL;
             refuse(slot, &entry->err);
+        }
         spl_catalog_entry_unref(entry);
     }
 }
 
-/* One file of a look, which makes its slot or brings it up to date. */
-static void meet(struct spl_service *service, const struct spl_catalog_file *file)
+/* One file of a look, which makes its slot or brings it up to date. False when there is no room for one. */
+static bool meet(struct spl_service *service, const struct spl_catalog_file *file)
 {
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     size_t length;
     const char *stem = spl_catalog_id_of(file->path, &length);
     struct spl_error err = {0};
     if (!stem)
-        return;
+        return true;
     snprintf(id, sizeof id, "%.*s", (int)length, stem);
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, id);
     if (!slot) {
-        if (!(slot = spl_catalog_add_slot(&service->catalog, id, file->path, &err))) {
-            spl_log_warn("dataset %s is not served: %s", id, err.message);
-            return;
-        }
+        if (!(slot = spl_catalog_add_slot(&service->catalog, id, file->path, &err)))
+            return false;
         slot->in_directory = file->in_directory;
         slot->seen = file->mark;
-        return; // opened when the next look finds the same
+        slot->met = service->library.looks;
+        return true; // opened when the next look finds the same
     }
     if (strcmp(slot->path, file->path))
-        return; // the same id elsewhere waits until this file is gone
+        return true; // the same id elsewhere waits until this file is gone
     slot->missed = 0;
+    slot->met = service->library.looks;
     bool settled = spl_file_mark_is_equal(&slot->seen, &file->mark);
     slot->seen = file->mark;
-    if (settled && !slot->busy && !spl_file_mark_is_equal(&slot->opened, &file->mark))
+    if (!settled)
+        slot->failures = slot->rest = 0;
+    else if (slot->rest)
+        slot->rest--;
+    else if (!slot->busy && !spl_file_mark_is_equal(&slot->opened, &file->mark))
         open_slot(service, slot);
+    return true;
 }
 
 static void drop_missing(struct spl_service *service, const struct spl_catalog_files *files)
@@ -196,10 +212,8 @@ static void drop_missing(struct spl_service *service, const struct spl_catalog_f
     struct spl_catalog *catalog = &service->catalog;
     for (size_t i = catalog->count; i-- > 0;) {
         struct spl_catalog_slot *slot = &catalog->slots[i];
-        bool found = false;
-        for (size_t f = 0; f < files->count && !found; f++)
-            found = !strcmp(slot->path, files->items[f].path);
-        if (found || slot->busy || ++slot->missed < looks_before_drop)
+        if (slot->met == service->library.looks || slot->busy || spl_catalog_is_unlisted(files, slot->path) ||
+            ++slot->missed < looks_before_drop)
             continue;
         spl_log_info("dataset %s: its file is gone, no longer served", slot->id);
         spl_catalog_remove_slot(catalog, slot);
@@ -221,14 +235,18 @@ static void after_look(uv_work_t *work, int status)
     struct library *library = &service->library;
     library->tasks--;
     library->looking = false;
-    if (look->err.code && strcmp(library->last.message, look->err.message))
-        spl_log_warn("datasets are left as they are: %s", look->err.message);
-    library->last = look->err;
-    bool good = !look->err.code && !library->stopped && look->changes == library->changes_made;
-    for (size_t i = 0; i < look->files.count && good; i++)
-        meet(service, &look->files.items[i]);
-    if (good)
+    const struct spl_error *why = look->err.code ? &look->err : &look->files.why;
+    if (why->code && strcmp(library->last.message, why->message))
+        spl_log_warn("datasets are left as they are: %s", why->message);
+    library->last = *why;
+    if (!look->err.code && !library->stopped && look->changes == library->changes_made) {
+        size_t left_out = look->files.left_out;
+        library->looks++;
+        for (size_t i = 0; i < look->files.count; i++)
+            left_out += !meet(service, &look->files.items[i]);
         drop_missing(service, &look->files);
+        spl_catalog_say_left_out(&service->catalog, left_out, look->files.nameless);
+    }
     spl_catalog_files_finish(&look->files);
     free(look);
 }
@@ -253,12 +271,7 @@ static void on_timer(uv_timer_t *timer)
 void spl_library_start(struct spl_service *service)
 {
     uint64_t interval_ms = service->options->watch_ms;
-    const struct spl_text_list *paths = &service->options->datasets;
-    struct stat status;
     service->library.timer.data = service;
-    for (size_t i = 0; i < paths->count && !service->library.directory; i++)
-        if (!stat(paths->items[i], &status) && S_ISDIR(status.st_mode))
-            service->library.directory = paths->items[i];
     if (interval_ms)
         uv_timer_start(&service->library.timer, on_timer, interval_ms, interval_ms);
 }
@@ -266,6 +279,7 @@ void spl_library_start(struct spl_service *service)
 void spl_library_stop(struct spl_service *service)
 {
     service->library.stopped = true;
+    atomic_store(&service->library.cancelled, true);
     uv_timer_stop(&service->library.timer);
     while (service->library.tasks)
         uv_run(&service->loop, UV_RUN_ONCE);

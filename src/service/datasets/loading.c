@@ -13,6 +13,7 @@ struct loading {
     uv_work_t work;
     struct spl_service *service;
     struct spl_catalog catalog;
+    const char *directory; // may be NULL
     struct spl_error err;
 };
 
@@ -20,8 +21,9 @@ static void run(uv_work_t *work)
 {
     struct loading *loading = work->data;
     const struct spl_service_options *options = loading->service->options;
+    loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
     spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
-                     &loading->err);
+                     &loading->service->library.cancelled, &loading->err);
 }
 
 static void after(uv_work_t *work, int status)
@@ -31,6 +33,7 @@ static void after(uv_work_t *work, int status)
     (void)status;
     service->loading = false;
     service->catalog = loading->catalog;
+    service->library.directory = loading->directory;
     service->failure = loading->err;
     free(loading);
     if (service->failure.code || spl_service_go_on(service, &service->failure))

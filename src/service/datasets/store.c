@@ -123,13 +123,13 @@ int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t 
     return 0;
 }
 
-int spl_incoming_check(struct spl_incoming *incoming, const char *target, struct spl_catalog_entry **entry,
-                       struct spl_error *err)
+int spl_incoming_check(struct spl_incoming *incoming, const char *target, const atomic_bool *cancelled,
+                       struct spl_catalog_entry **entry, struct spl_error *err)
 {
     if (fsync(incoming->fd))
         return fail(incoming, err, "sync");
     struct spl_error why = {0};
-    int rc = spl_catalog_entry_open(incoming->path, target, true, entry, &why);
+    int rc = spl_catalog_entry_open(incoming->path, target, true, cancelled, entry, &why);
     if (!rc)
         return 0;
     char message[sizeof why.message];

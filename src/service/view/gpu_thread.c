@@ -54,60 +54,22 @@ static void publish_residency(struct gpu *gpu)
     gpu->pages_evicted = info.pages_evicted;
 }
 
-/* A file that was cut or overwritten in place costs its own views only. */
+/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place costs its own
+ * views only. */
 static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
 {
     struct spl_error why = {0};
-    int rc = spl_renderer_preload(gpu->renderer, entry->dataset, &why);
+    bool more = true;
+    int rc = 0;
+    for (uint32_t page = 0; more && !rc && !spl_queue_is_closed(gpu->pipeline->render); page++) {
+        rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, page, &more, &why);
+        spl_pipeline_touch(gpu->pipeline);
+    }
     if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
         spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
         return 0;
     }
     return rc ? spl_fail(err, rc, "%s", why.message) : 0;
-}
-
-static int build(struct gpu *gpu, struct spl_error *err)
-{
-    struct spl_pipeline *pipeline = gpu->pipeline;
-    struct spl_catalog_entry *entry;
-    int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
-    spl_pipeline_touch(pipeline);
-    if (rc)
-        return rc;
-    gpu->pages_evicted = 0;
-    pthread_mutex_lock(&pipeline->mutex);
-    pipeline->device = *spl_renderer_get_device(gpu->renderer);
-    pthread_mutex_unlock(&pipeline->mutex);
-    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    {
-        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
-        entry->pages_wanted = 0;
-        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
-            return rc;
-    }
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    {
-        if (spl_queue_is_closed(pipeline->render))
-            break;
-        if (!entry->loading && (rc = preload(gpu, entry, err)))
-            return rc;
-        spl_pipeline_touch(pipeline);
-    }
-    publish_residency(gpu);
-    return 0;
-}
-
-static void tear_down(struct gpu *gpu)
-{
-    struct spl_catalog_entry *entry;
-    if (!gpu->renderer)
-        return;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    spl_renderer_remove(gpu->renderer, entry->dataset);
-    spl_renderer_destroy(gpu->renderer);
-    gpu->renderer = NULL;
-    atomic_store(&gpu->pipeline->device_bytes, 0);
 }
 
 static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
@@ -124,6 +86,63 @@ static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const
     entry->loading = false;
     entry->release = NULL;
     spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
+}
+
+/* What the device has no room for is refused at start, when nobody has asked for it yet; not in a device that is
+ * reopened, where requests refer to it: there its views fail, and say why. */
+static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int rc, struct spl_error *err)
+{
+    if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
+        return rc;
+    if (spl_pipeline_get_state(gpu->pipeline) == SPL_PIPELINE_STARTING) {
+        let_entry_go(gpu, entry);
+        refuse_entry(gpu, entry, err);
+    } else {
+        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, err->message);
+    }
+    *err = (struct spl_error){0};
+    return 0;
+}
+
+static int build(struct gpu *gpu, struct spl_error *err)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_catalog_entry *entry, *next;
+    int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
+    spl_pipeline_touch(pipeline);
+    if (rc)
+        return rc;
+    gpu->pages_evicted = 0;
+    pthread_mutex_lock(&pipeline->mutex);
+    pipeline->device = *spl_renderer_get_device(gpu->renderer);
+    pthread_mutex_unlock(&pipeline->mutex);
+    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        entry->pages_wanted = 0;
+        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
+            return rc;
+    }
+    for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
+        next = TAILQ_NEXT(entry, resident);
+        if (!entry->loading && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
+            return rc;
+    }
+    publish_residency(gpu);
+    return 0;
+}
+
+static void tear_down(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    if (!gpu->renderer)
+        return;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    spl_renderer_destroy(gpu->renderer);
+    gpu->renderer = NULL;
+    atomic_store(&gpu->pipeline->device_bytes, 0);
 }
 
 /* Takes up what the loop wants added and lets go of what nobody refers to any more. */

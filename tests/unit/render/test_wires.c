@@ -44,7 +44,8 @@ static uint32_t join(struct row *row)
 {
     uint32_t ends = 0;
     struct spl_wire_point *p = row->points;
-    assert_int_equal(spl_wires_join(p, row->count, NULL), SPL_OK);
+    struct spl_work work = {UINT64_MAX, NULL};
+    assert_int_equal(spl_wires_join(p, row->count, &work, NULL), SPL_OK);
     for (uint32_t i = 0; i < row->count; i++) {
         for (int k = 0; k < 2; k++) {
             uint32_t next = p[i].next[k];

@@ -1,0 +1,40 @@
+/* How far a loop over outside input may go: what steps are left of those that its size allows, and whether somebody has
+ * asked it to stop. Owned by the thread that works; only `cancelled` may change meanwhile. */
+#ifndef SPL_BASE_WORK_H
+#define SPL_BASE_WORK_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/error.h"
+
+struct spl_work {
+    uint64_t left;                /* steps */
+    const atomic_bool *cancelled; // may be NULL
+};
+
+static inline bool spl_is_cancelled(const atomic_bool *cancelled)
+{
+    return cancelled && atomic_load_explicit(cancelled, memory_order_relaxed);
+}
+
+/* Takes a step; false when none is left. */
+static inline bool spl_work_step(struct spl_work *work)
+{
+    return work->left && work->left--;
+}
+
+/* Takes as many of `steps` as are left. */
+static inline void spl_work_take(struct spl_work *work, uint64_t steps)
+{
+    work->left -= steps < work->left ? steps : work->left;
+}
+
+/* SPL_E_CANCELLED, SPL_E_LIMIT when no step is left, or 0. Without a message: what stops is for the caller to say. */
+static inline int spl_work_check(const struct spl_work *work)
+{
+    return spl_is_cancelled(work->cancelled) ? SPL_E_CANCELLED : work->left ? SPL_OK : SPL_E_LIMIT;
+}
+
+#endif
