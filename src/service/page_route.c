@@ -40,7 +40,6 @@ static const char *get_header(struct request *request, const char *name)
 static void reply_with(struct request *request, const struct asset *asset, const char *const (*headers)[2])
 {
     static const char *const always[][2] = {{MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache"},
-                                            {"X-Content-Type-Options", "nosniff"},
                                             {"Referrer-Policy", "no-referrer"},
                                             {NULL, NULL}};
     const char *held = get_header(request, MHD_HTTP_HEADER_IF_NONE_MATCH);

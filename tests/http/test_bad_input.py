@@ -109,7 +109,7 @@ def test_sizes_are_capped():
             reply = d.ask(VIEW + "?" + "a" * length)
             assert reply.status == 414 and reply.json()["field"] == "url", length
         for length in (20000, 60000):  # libmicrohttpd's own
-            assert raw(d, f"GET {VIEW}?{'a' * length} HTTP/1.1\r\nHost: x\r\n\r\n".encode())[:12] == b"HTTP/1.1 414"
+            assert raw(d, f"GET {VIEW}?{'a' * length} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())[:12] == b"HTTP/1.1 414"
         for pairs in (100, 300, 4000):
             reply = d.ask(VIEW + "?" + "a&" * pairs)
             assert reply.status == 414 and reply.json()["field"] == "url", pairs
@@ -135,7 +135,7 @@ def test_headers_of_every_size_are_answered():
             said = []
             for length in range(0, 16000, 400):
                 headers = "".join(f"X-{i}: {'y' * (length // count)}\r\n" for i in range(count))
-                answer = raw(d, f"GET {VIEW}?width=8&height=8&layer=depth HTTP/1.1\r\nHost: x\r\n"
+                answer = raw(d, f"GET {VIEW}?width=8&height=8&layer=depth HTTP/1.1\r\nHost: localhost\r\n"
                              f"Connection: close\r\n{headers}\r\n".encode())
                 kind = "problem" if b"problem+json" in answer else "plain" if b"<html>" in answer else "view"
                 said += [(answer[:12], kind)]
@@ -149,7 +149,7 @@ def test_large_bodies_are_refused():
         assert d.post(b'{"lod":1' + b" " * (1024 * 1024 - 9) + b"}").status == 200
         reply = d.post(b'{"lod":1' + b" " * (1024 * 1024 - 8) + b"}")
         assert reply.status == 413 and reply.json()["field"] == "body"
-        head = f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n".encode()
+        head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode()
         assert b" 413 " in raw(d, head + b"Content-Length: 2000000\r\nExpect: 100-continue\r\n\r\n")
         assert b" 413 " in raw(d, head + b"Content-Length: 99999999999\r\n\r\n")
         chunk = b"10000\r\n" + b"x" * 65536 + b"\r\n"
@@ -162,11 +162,11 @@ def test_broken_http_is_survived():
     with Daemon(FAKE) as d:
         for data in [b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n",
                      b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\n\n",
-                     b"GET / HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
+                     b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
                      b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 50000 + b"\r\n",
                      b"GET " + b"a" * 300000 + b" HTTP/1.1\r\n\r\n",
                      b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
-                     b"GET /\x01 HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"]:
+                     b"GET /\x01 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"]:
             try:
                 with socket.create_connection(("127.0.0.1", d.port), 15) as s:  # half a request is cut after 10 s
                     s.sendall(data)

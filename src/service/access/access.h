@@ -1,4 +1,4 @@
-/* Who may do what: bearer tokens, signed URLs, how often, from which pages. Owned by the loop's thread. */
+/* Who may do what: bearer tokens, signed URLs, how often; door.h has names and pages. Owned by the loop's thread. */
 #ifndef SPL_SERVICE_ACCESS_H
 #define SPL_SERVICE_ACCESS_H
 
@@ -28,8 +28,4 @@ void spl_access_charge(struct request *request, unsigned count);
 
 /* May listings that answer `request` show dataset `id`? */
 bool spl_access_may_see(struct request *request, const char *id);
-
-/* Adds what lets pages of other origins read the reply. */
-void spl_access_add_cors(struct request *request);
-
 #endif

@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "service/access/buckets.h"
 #include "service/access/secret.h"
+#include "service/access/host.h"
 #include "service/access/sign.h"
 #include "service/access/tokens.h"
 
@@ -272,6 +273,39 @@ static void a_table_full_of_addresses_still_works(void **state)
     spl_buckets_destroy(buckets);
 }
 
+static void a_host_is_an_address_or_a_name_that_is_listed(void **state)
+{
+    (void)state;
+    char *items[] = {"Scans.example.", "[2001:db8::1]", "*", "not a name"};
+    const struct spl_text_list none = {0}, some = {items, 2}, any = {items, 4};
+    static const char *const bad[] = {"", ":80", ".", "..", "a..", "[", "[]", "[::1", "[::1]x", "[::1]:x", "[a]", "::1",
+                                      "a b", "a/b", "a@b", "a:1:2", "a:80x", "a,b", "\xc3\xa4.example", "a%2e", "a#b"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_false(spl_host_is_name(bad[i]));
+        assert_false(spl_host_is_ours(bad[i], &any));
+    }
+    char longest[300];
+    memset(longest, 'a', sizeof longest);
+    longest[254] = '\0';
+    assert_false(spl_host_is_ours(longest, &any));
+    longest[253] = '\0';
+    assert_true(spl_host_is_ours(longest, &any) && !spl_host_is_ours(longest, &some));
+    static const char *const ours[] = {"127.0.0.1", "1.2.3.4:80", "1.2.3.4.", "[::]", "[::1]:8080", "LOCALHOST.:1"};
+    for (size_t i = 0; i < sizeof ours / sizeof *ours; i++)
+        assert_true(spl_host_is_ours(ours[i], &none));
+    assert_false(spl_host_is_ours("scans.example", &none));
+    assert_true(spl_host_is_ours("scans.EXAMPLE:1", &some) && !spl_host_is_ours("x.scans.example", &some));
+    assert_true(spl_host_is_name("a.b-c_d") && spl_host_is_name("[::1]") && spl_host_is_name("10.0.0.1"));
+    assert_false(spl_host_is_name("a:80") || spl_host_is_name("[::1]:80"));
+
+    assert_true(spl_origin_is_ours("https://a:1", "A:1", &none) && spl_origin_is_ours("http://[::1]:8", "[::1]:8", &none));
+    assert_true(spl_origin_is_ours("http://scans.example:8443", "127.0.0.1", &some));
+    static const char *const foreign[] = {"null", "", "https://b", "https://a:2", "https://a", "a:1", "https://a:1/",
+                                          "https://x@a:1", "file://", "https://a:1.evil"};
+    for (size_t i = 0; i < sizeof foreign / sizeof *foreign; i++)
+        assert_false(spl_origin_is_ours(foreign[i], "a:1", &any) || spl_origin_is_ours(foreign[i], NULL, &some));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -283,6 +317,7 @@ int main(void)
         cmocka_unit_test(keys_that_are_too_short_are_refused),
         cmocka_unit_test(buckets_empty_and_fill_again),
         cmocka_unit_test(a_table_full_of_addresses_still_works),
+        cmocka_unit_test(a_host_is_an_address_or_a_name_that_is_listed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
