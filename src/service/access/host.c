@@ -33,7 +33,7 @@ static bool split(const char *text, char name[name_max + 3], bool *address)
     if (name[length - 1] == '.')
         name[--length] = '\0';
     *address = inet_pton(AF_INET, name, &six) == 1;
-    return length && name[length - 1] != '.';
+    return length && length <= name_max && name[length - 1] != '.';
 }
 
 static bool is_among(const struct spl_text_list *names, const char *name)
