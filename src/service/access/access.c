@@ -248,8 +248,8 @@ bool spl_access_check(struct request *request, enum spl_scope scope, const struc
     request->token = find_token(request, &shown);
     if (scope == SPL_SCOPE_NONE)
         return true;
-    if (access->key.bytes && scope == SPL_SCOPE_VIEW && call->method == SPL_GET && *call->id &&
-        spl_sign_is_signed(request->query))
+    if (access->key.bytes && call->method == SPL_GET && spl_sign_is_signed(request->query) &&
+        spl_sign_covers(request->uri, strlen(request->uri)))
         return check_signature(request);
     if (!shown)
         return (request->service->options->allow_anonymous && scope != SPL_SCOPE_ADMIN) ||
