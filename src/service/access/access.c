@@ -20,6 +20,7 @@
 #include "service/access/buckets.h"
 #include "service/access/door.h"
 #include "service/access/sign.h"
+#include "service/listen.h"
 #include "service/state.h"
 
 struct spl_access {
@@ -29,18 +30,16 @@ struct spl_access {
     struct spl_buckets *all;       // may be NULL
 };
 
-/* Only this machine can reach it. */
-static bool is_local(int fd)
+/* Can only this machine reach the main listener, a socket that was passed or the address that is to be opened? */
+static int find_local(const struct spl_service *service, bool *local, struct spl_error *err)
 {
     struct sockaddr_storage bound;
     socklen_t length = sizeof bound;
-    if (getsockname(fd, (struct sockaddr *)&bound, &length))
-        return false;
-    if (bound.ss_family == AF_INET)
-        return ntohl(((struct sockaddr_in *)&bound)->sin_addr.s_addr) >> 24 == 127;
-    if (bound.ss_family == AF_INET6)
-        return IN6_IS_ADDR_LOOPBACK(&((struct sockaddr_in6 *)&bound)->sin6_addr);
-    return bound.ss_family == AF_UNIX;
+    if (service->listen_fd < 0)
+        return spl_listen_is_local("listen", service->options->listen, local, err);
+    *local = !getsockname(service->listen_fd, (struct sockaddr *)&bound, &length) &&
+             spl_sockaddr_is_local((const struct sockaddr *)&bound);
+    return 0;
 }
 
 static int read_secrets(const struct spl_service_options *options, struct spl_tokens **tokens, struct spl_sign_key *key,
@@ -48,10 +47,15 @@ static int read_secrets(const struct spl_service_options *options, struct spl_to
 {
     *tokens = NULL;
     *key = (struct spl_sign_key){0};
-    int rc = *options->tokens ? spl_tokens_read(options->tokens, tokens, err) : 0;
-    if (!rc && *options->url_key)
-        rc = spl_sign_key_read(options->url_key, key, err);
+    struct spl_error why = {0};
+    const char *field = "tokens";
+    int rc = *options->tokens ? spl_tokens_read(options->tokens, tokens, &why) : 0;
+    if (!rc && *options->url_key) {
+        field = "url-key";
+        rc = spl_sign_key_read(options->url_key, key, &why);
+    }
     if (rc) {
+        spl_fail_field(err, rc, field, "%s", why.message);
         spl_tokens_destroy(*tokens);
         *tokens = NULL;
     }
@@ -61,19 +65,20 @@ static int read_secrets(const struct spl_service_options *options, struct spl_to
 int spl_access_init(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_service_options *options = service->options;
-    if (*options->url_key && !*options->tokens)
-        return spl_fail(err, SPL_E_USAGE, "--url-key without --tokens: everybody may view anyway");
-    if (!*options->tokens && !options->allow_anonymous && !is_local(service->listen_fd))
-        return spl_fail(err, SPL_E_USAGE,
-                        "--listen %.100s can be reached from elsewhere; give --tokens FILE, or --allow-anonymous if "
-                        "everybody there may use the service",
-                        options->listen);
+    bool local;
+    int rc = find_local(service, &local, err);
+    if (rc)
+        return rc;
+    if (!*options->tokens && !options->allow_anonymous && !local)
+        return spl_fail_field(err, SPL_E_USAGE, "listen",
+                              "--listen %.100s can be reached from elsewhere; give --tokens FILE, or --allow-anonymous "
+                              "if everybody there may use the service", options->listen);
     if (!*options->tokens && !options->rate_limit && !options->rate_limit_total)
         return 0;
     struct spl_access *access = service->access = spl_alloc(1, sizeof *access, err);
     if (!access)
         return SPL_E_NOMEM;
-    int rc = read_secrets(options, &access->tokens, &access->key, err);
+    rc = read_secrets(options, &access->tokens, &access->key, err);
     if (!rc && options->rate_limit)
         rc = spl_buckets_create(options->rate_limit, &access->addresses, err);
     if (!rc && options->rate_limit_total)
