@@ -1,17 +1,21 @@
 // The page inside a frame: the picture and navigation, nothing else. The path names the dataset, the fragment camera
 // and settings. Tells the page around it {splatd: "camera", eye, target, up, fov} when the camera has come to rest, and
-// asks it for {splatd: "token", token} where the service wants one: tokens do not belong into addresses.
+// asks it for {splatd: "token", token} where the service wants one: tokens do not belong into addresses. What `splatd
+// sign` has added to its own address lets it look at its dataset without one; it passes that on to what it asks.
 
 import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {notices} from "./notice.js";
-import {askJson, setToken} from "./service.js";
+import {askJson, setPass, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 
 const id = decodeURIComponent(location.pathname.split("/").pop());
 const stage = new Stage(document.getElementById("stage"));
 stage.drag = "orbit";
 attach(stage);
+
+const signature = location.search.match(/^\?(exp=\d+)&sig=([\w-]+)$/);
+if (signature) setPass(`${signature[1]}&embed=${signature[2]}`);
 
 let asked = false;
 

@@ -9,10 +9,14 @@ export class Problem extends Error {
   }
 }
 
+let pass = ""; // what a signed page adds to its requests
+export const setPass = (parameters) => (pass = parameters);
+
 const TOKEN = "splatd-token";
 export const setToken = (token) => sessionStorage.setItem(TOKEN, token);
 
 function kindOf(status, problem) {
+  if (problem.field === "exp" || problem.field === "sig") return "refused"; // a token would not mend it
   if (status === 401 || status === 403) return "token";
   if (status === 404) return "gone";
   if (problem.type?.endsWith(":device-lost") || problem.type?.endsWith(":no-device")) return "rebuilding";
@@ -29,7 +33,7 @@ export async function ask(path, options = {}) {
   };
   let reply;
   try {
-    reply = await fetch(path, {...options, headers});
+    reply = await fetch(pass ? `${path}${path.includes("?") ? "&" : "?"}${pass}` : path, {...options, headers});
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Problem("offline", "The service cannot be reached");

@@ -93,8 +93,10 @@ struct spl_renderer_options {
     bool debug;                 /* validation layers, GL debug output */
     uint64_t memory_limit;      /* bytes of device memory, 0 = 3/4 of what the device reports */
     uint64_t scratch_samples;   /* largest tile in samples, 0 = 4 Mi */
+    uint64_t first_page_bytes;  /* most of what the datasets to come cannot do without, for the least limit; 0 = unknown */
 };
 
+/* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err);
 void spl_renderer_destroy(struct spl_renderer *renderer); /* NULL-safe; datasets that were not removed are let go */
 const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
+
 static const struct spl_code_info table[] = {
     [-SPL_OK] = {"ok", 200, 0, false},
     [-SPL_E_NOMEM] = {"out-of-memory", 503, 1, true},
@@ -74,6 +76,9 @@ int spl_fail_errno(struct spl_error *err, int errno_value, const char *format, .
 
 void spl_assert_failed(const char *condition, const char *file, int line)
 {
-    fprintf(stderr, "splatd: bug: %s does not hold at %s:%d\n", condition, file, line);
+    if (spl_log_get_format() == SPL_LOG_JSON)
+        spl_log_error("bug: %s does not hold at %s:%d", condition, file, line);
+    else
+        fprintf(stderr, "splatd: bug: %s does not hold at %s:%d\n", condition, file, line);
     abort();
 }

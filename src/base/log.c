@@ -42,6 +42,11 @@ void spl_log_set_format(enum spl_log_format format)
     atomic_store(&log_format, (int)format);
 }
 
+enum spl_log_format spl_log_get_format(void)
+{
+    return (enum spl_log_format)atomic_load(&log_format);
+}
+
 static void add_char(struct line *line, char c)
 {
     if (line->used < line_max - end_room)

@@ -20,6 +20,7 @@ bool spl_log_is_on(enum spl_log_level level);
 
 /* SPL_LOG_TEXT at start. */
 void spl_log_set_format(enum spl_log_format format);
+enum spl_log_format spl_log_get_format(void);
 
 void spl_log(enum spl_log_level level, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

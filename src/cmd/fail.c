@@ -4,11 +4,15 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/log.h"
+
 int spl_cmd_fail(const struct spl_error *err)
 {
-    if (err->field[0] && !strstr(err->message, err->field))
-        fprintf(stderr, "splatd: %s: %s\n", err->field, err->message);
+    bool named = !err->field[0] || strstr(err->message, err->field);
+    const char *field = named ? "" : err->field, *colon = named ? "" : ": ";
+    if (spl_log_get_format() == SPL_LOG_JSON)
+        spl_log_error("%s%s%s", field, colon, err->message);
     else
-        fprintf(stderr, "splatd: %s\n", err->message);
+        fprintf(stderr, "splatd: %s%s%s\n", field, colon, err->message);
     return spl_code_get_info(err->code)->exit_code;
 }

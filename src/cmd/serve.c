@@ -86,9 +86,10 @@ static int set(struct spl_service_options *o, size_t index, const char *text, st
     return spl_service_options_set(o, index, text, SPL_FROM_FLAG, "--", err);
 }
 
-/* One flag of the command line; SPL_E_USAGE with an empty `err` where getopt has said why. */
-static int apply(struct spl_service_options *o, int option, struct spl_error *err)
+/* One flag of the command line, `text` of it. */
+static int apply(struct spl_service_options *o, int option, const char *text, struct spl_error *err)
 {
+    char letter[] = {'-', (char)optopt, '\0'};
     switch (option) {
     case 'l':
         return set(o, SPL_PARAMETER_listen, optarg, err);
@@ -98,8 +99,13 @@ static int apply(struct spl_service_options *o, int option, struct spl_error *er
         return set(o, SPL_PARAMETER_log_level, "warning", err);
     case 'c':
         return spl_service_options_read(o, optarg, err);
-    case '?':
-        return SPL_E_USAGE;
+    case ':':
+    case '?': // optopt: the letter, or what a known name stands for
+        if (optopt && optopt < opt_manual)
+            text = letter;
+        return spl_fail(err, SPL_E_USAGE, "'%.80s' %s; 'splatd serve --help' shows how", text,
+                        option == ':' ? "needs a value" : optopt && optopt >= opt_manual ? "takes no value"
+                                                                                          : "is no option of serve");
     default:
         return option >= first_no ? set(o, (size_t)(option - first_no), "false", err)
                                   : set(o, (size_t)(option - first_parameter), optarg ? optarg : "true", err);
@@ -110,7 +116,8 @@ static int apply(struct spl_service_options *o, int option, struct spl_error *er
 static int parse(struct spl_service_options *o, int argc, char **argv, const struct option *options,
                  struct spl_error *err)
 {
-    for (int c; (c = getopt_long(argc, argv, "l:d:c:qh", options, NULL)) >= 0;) {
+    opterr = 0; // said by apply(), in the log's format
+    for (int c; (c = getopt_long(argc, argv, ":l:d:c:qh", options, NULL)) >= 0;) {
         if (c == 'h') {
             usage(stdout);
             return 1;
@@ -119,7 +126,7 @@ static int parse(struct spl_service_options *o, int argc, char **argv, const str
             spl_parameters_print_manual(stdout);
             return 1;
         }
-        int rc = apply(o, c, err);
+        int rc = apply(o, c, argv[optind - 1], err);
         if (rc)
             return rc;
     }
@@ -132,6 +139,20 @@ static int parse(struct spl_service_options *o, int argc, char **argv, const str
                              : spl_fail(err, SPL_E_USAGE, "serve needs at least one NAME.spld or a directory of them");
 }
 
+/* Puts before an error's message where the parameter at fault was set, unless it says so itself. */
+static void locate(const struct spl_service_options *o, struct spl_error *err)
+{
+    struct spl_error bare = *err;
+    char where[300];
+    spl_service_options_locate(o, bare.field, where, sizeof where);
+    if (!*where || !strncmp(bare.message, where, strlen(where)))
+        return;
+    bool named = strstr(bare.message, bare.field);
+    *err = (struct spl_error){0};
+    spl_fail_field(err, bare.code, bare.field, "%s%s%s%s", where, named ? "" : bare.field, named ? "" : ": ",
+                   bare.message);
+}
+
 int spl_cmd_serve(int argc, char **argv)
 {
     struct spl_service_options o;
@@ -142,16 +163,13 @@ int spl_cmd_serve(int argc, char **argv)
         rc = make_flags(&flags, &err);
     if (!rc)
         rc = parse(&o, argc, argv, flags.options, &err);
-    if (!rc) {
-        spl_log_set_level((enum spl_log_level)o.log_level);
-        spl_log_set_format((enum spl_log_format)o.log_format);
+    spl_log_set_level((enum spl_log_level)o.log_level);
+    spl_log_set_format((enum spl_log_format)o.log_format); // also for what parse() has found wrong after it
+    if (!rc)
         rc = spl_service_run(&o, &err);
-    }
+    if (rc < 0)
+        locate(&o, &err);
     free_flags(&flags);
     spl_service_options_finish(&o);
-    if (rc < 0 && !err.code) {
-        fprintf(stderr, "'splatd serve --help' shows how\n");
-        return 2;
-    }
     return rc < 0 ? spl_cmd_fail(&err) : 0;
 }

@@ -19,19 +19,22 @@ static void usage(FILE *out)
         "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
         "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
         "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
-        "dataset, its profile, its views and picks can be signed.\n\n"
+        "dataset, its profile, its views and picks can be signed, and the page /embed/ID: whoever has that URL may look\n"
+        "at this dataset from wherever they like until it expires, and do nothing else.\n\n"
         "Make a key, once:\n"
         "  openssl rand -hex 32 >url.key; chmod 600 url.key\n"
         "A picture for a dashboard, for a day:\n"
         "  splatd sign 'https://scans.example/v1/datasets/vault/view?eye=8,0,2&target=0,0,1' --key url.key "
         "--expires 1d\n"
         "The path alone will do, for a page on the same host:\n"
-        "  splatd sign '/v1/datasets/vault/view?width=640' --key url.key\n\n"
+        "  splatd sign '/v1/datasets/vault/view?width=640' --key url.key\n"
+        "A view to move in, for an <iframe>; camera and settings stand behind '#' and may be changed:\n"
+        "  splatd sign 'https://scans.example/embed/vault#eye=8,0,2&target=0,0,1' --key url.key --expires 7d\n\n"
         "  -k, --key FILE        the key, 32 bytes or more; newlines at its end do not count\n"
         "  -e, --expires TIME    from now, with s, m, h or d (default 1h)\n"
         "  -h, --help\n\n"
         "The signature is base64url(HMAC-SHA-256(key, path?query&exp=UNIX-SECONDS)), without padding, so any program\n"
-        "that knows the key can make such URLs.\n");
+        "that knows the key can make such URLs; of a page it is /embed/ID?exp=UNIX-SECONDS, without the fragment.\n");
 }
 
 /* "90s", "15m", "1h", "7d" to seconds. */

@@ -90,14 +90,15 @@ static int open_device(const struct spl_gpu_backend *backend, uint32_t index, co
     if (code < 0)
         return code;
     struct spl_gpu_limits *limits = &gpu->limits;
-    limits->memory_bytes = options->memory_limit ? options->memory_limit : limits->memory_bytes / 4 * 3;
     limits->buffer_bytes &= ~UINT64_C(15); /* buffers are rounded up to 16 */
-    if (limits->buffer_bytes > limits->memory_bytes)
-        limits->buffer_bytes = limits->memory_bytes;
     if ((code = spl_gpu_selftest(gpu, err)) < 0) {
         spl_gpu_close(gpu);
         return code;
     }
+    // after the test, which says what the device can do and not what it may take
+    limits->memory_bytes = options->memory_limit ? options->memory_limit : limits->memory_bytes / 4 * 3;
+    if (limits->memory_bytes < spl_gpu_get_memory(gpu))
+        limits->memory_bytes = spl_gpu_get_memory(gpu);
     *out = gpu;
     return 0;
 }

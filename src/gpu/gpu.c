@@ -85,9 +85,9 @@ int spl_gpu_buffer_create(struct spl_gpu *gpu, enum spl_gpu_buffer_kind kind, ui
     bytes = (bytes + 15) / 16 * 16;
     if (bytes > gpu->limits.memory_bytes - gpu->memory)
         return spl_fail(err, SPL_E_LIMIT,
-                        "a %s buffer of %" PRIu64 " bytes exceeds the memory limit of device '%s': %" PRIu64
-                        " of %" PRIu64 " bytes are taken", kinds[kind], bytes, gpu->info.name, gpu->memory,
-                        gpu->limits.memory_bytes);
+                        "a %s buffer of %" PRIu64 " bytes exceeds the memory limit: %" PRIu64 " of %" PRIu64
+                        " bytes are taken on device '%s'", kinds[kind], bytes, gpu->memory, gpu->limits.memory_bytes,
+                        gpu->info.name);
     int code = gpu->backend->buffer_create(gpu, kind, bytes, out, err);
     if (code < 0)
         return code;

@@ -74,7 +74,8 @@ struct spl_tile {
 
 enum spl_stage { SPL_STAGE_BEGIN, SPL_STAGE_CLEAR, SPL_STAGE_DEPTH, SPL_STAGE_SHADE, SPL_STAGE_RESOLVE };
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, struct spl_error *err);
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
+                     struct spl_error *err);
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
 /* Copies the draw list into the mapped buffers, growing them where it does not fit, at the cost of pages of others. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,

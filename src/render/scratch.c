@@ -1,6 +1,7 @@
 /* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's buffers may grow. */
 #include "render/renderer.h"
 
+#include <inttypes.h>
 #include <string.h>
 
 enum {
@@ -10,7 +11,14 @@ enum {
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, struct spl_error *err)
+/* What the account of device memory takes for a buffer. */
+static uint64_t taken(uint64_t bytes)
+{
+    return (bytes + 15) / 16 * 16;
+}
+
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
+                     struct spl_error *err)
 {
     const struct spl_gpu_limits *limits = spl_gpu_get_limits(gpu);
     if (samples * 16 > limits->binding_bytes)
@@ -35,6 +43,14 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
         {&scratch->lines, SPL_GPU_UPLOAD, lines_at_start * sizeof(struct spl_draw_line)},
     };
+    uint64_t working = 0, page = taken(page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
+        working += taken(wanted[i].bytes);
+    if (working > limits->memory_bytes) // a page that has no room is its dataset's business
+        return spl_fail_field(err, SPL_E_LIMIT, "memory-limit",
+                              "memory-limit, %" PRIu64 " bytes of device memory, is too little: working memory takes %" PRIu64
+                              ", and the largest dataset's first page %" PRIu64 "; it takes at least %" PRIu64,
+                              limits->memory_bytes, working, page, working + page);
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         int rc = wanted[i].bytes ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
                                  : SPL_OK;

@@ -13,6 +13,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/access/door.h"
 #include "service/state.h"
 
 enum { drain_max = 8 * body_max, idle_s = 30 };
@@ -89,8 +90,8 @@ static enum MHD_Result send_reply(struct request *request)
     if (request->service->draining || request->closes)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);
-    if (request->service->access)
-        spl_access_add_cors(request);
+    MHD_add_response_header(request->response, "X-Content-Type-Options", "nosniff");
+    spl_door_add_cors(request);
     count_reply(request);
     spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
@@ -169,6 +170,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         return MHD_YES;
     if (!request->started) {
         request->started = true;
+        request->has_host = strcmp(version, MHD_HTTP_VERSION_1_0);
         snprintf(request->method, sizeof request->method, "%s", method);
         spl_request_set_id(request, MHD_lookup_connection_value(handle, MHD_HEADER_KIND, "X-Request-Id"));
         spl_refuse_many_headers(request);

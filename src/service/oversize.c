@@ -29,7 +29,7 @@ static void refuse_on_socket(struct request *request, unsigned status, const cha
                  title, status, detail, request->id, field);
     length = snprintf(reply, sizeof reply,
                       "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                      "X-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
+                      "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
                       status, title, request->id, length, text);
     request->status = status;
     request->abandoned = true;

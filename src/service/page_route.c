@@ -40,7 +40,6 @@ static const char *get_header(struct request *request, const char *name)
 static void reply_with(struct request *request, const struct asset *asset, const char *const (*headers)[2])
 {
     static const char *const always[][2] = {{MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache"},
-                                            {"X-Content-Type-Options", "nosniff"},
                                             {"Referrer-Policy", "no-referrer"},
                                             {NULL, NULL}};
     const char *held = get_header(request, MHD_HTTP_HEADER_IF_NONE_MATCH);
@@ -90,7 +89,13 @@ void spl_show_page(struct request *request)
 
 void spl_show_embed(struct request *request, const struct spl_call *call)
 {
-    (void)call; // the page asks for its dataset itself, and can then say what is wrong with it
+    (void)call; // the page asks for its dataset itself, and can then say what is wrong with it, or with its signature
+    const char *query = request->query, *second = strchr(query, '&');
+    if (*query && (strncmp(query, "exp=", 4) || !second || second != strrchr(query, '&') || strncmp(second, "&sig=", 5))) {
+        spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "",
+                          "the page takes camera and settings behind '#', and no parameters but those of splatd sign");
+        return;
+    }
     static const char *const headers[][2] = {{"Content-Security-Policy", POLICY "*"}, {NULL, NULL}};
     reply_with(request, find("viewer/", "embed.html"), headers);
 }

@@ -74,7 +74,7 @@ static const struct route {
 } routes[] = {
     {"/", GET, SPL_SCOPE_NONE, false, index_page},
     {"/viewer/{name}", GET, SPL_SCOPE_NONE, false, spl_show_viewer_file},
-    {"/embed/{name}", GET, SPL_SCOPE_NONE, false, spl_show_embed},
+    {"/embed/{name}", GET, SPL_SCOPE_NONE, true, spl_show_embed},
     {"/clients/{name}", GET, SPL_SCOPE_NONE, false, spl_show_client},
     {"/v1/openapi.yaml", GET, SPL_SCOPE_NONE, false, spl_show_openapi_yaml},
     {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},

@@ -5,10 +5,13 @@
  * same way and its error returned. Everything here runs on the loop's thread, which is the caller's. */
 #include "service/service.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -236,18 +239,36 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
     return spl_pipeline_create(&options, &service->pipeline, err);
 }
 
+/* Where tours go must be a folder that can be written, or datasets are loaded in vain. */
+static int check_folder(const char *path, struct spl_error *err)
+{
+    struct stat status;
+    if (!*path)
+        return 0;
+    if (stat(path, &status) || access(path, W_OK | X_OK))
+        return spl_fail_field(err, SPL_E_USAGE, "tours", "cannot write to '%.200s': %s", path, strerror(errno));
+    return S_ISDIR(status.st_mode) ? 0 : spl_fail_field(err, SPL_E_USAGE, "tours", "'%.200s' is no folder", path);
+}
+
+/* Everything that can be known before a socket is opened. The supervisor's are open already. */
+static int check(struct spl_service *service, struct spl_error *err)
+{
+    int fds[SPL_SUPERVISOR_SOCKETS], rc = spl_service_options_check(service->options, err);
+    if (rc || (rc = check_folder(service->options->tours, err)) || (rc = spl_supervisor_take_sockets(fds, err)))
+        return rc;
+    service->listen_fd = fds[0];
+    service->ops_fd = fds[1];
+    return spl_access_init(service, err);
+}
+
 /* The sockets that the supervisor has bound, or our own. */
 static int open_sockets(struct spl_service *service, struct spl_error *err)
 {
-    int fds[SPL_SUPERVISOR_SOCKETS], rc;
-    if ((rc = spl_supervisor_take_sockets(fds, err)))
+    int rc = spl_ops_start(service, err);
+    if (rc)
         return rc;
-    service->ops_fd = fds[1];
-    if ((rc = spl_ops_start(service, err)))
-        return rc;
-    service->listen_fd = fds[0];
-    if (fds[0] < 0)
-        return spl_listen("--listen", service->options->listen, &service->listen_fd, service->url, sizeof service->url,
+    if (service->listen_fd < 0)
+        return spl_listen("listen", service->options->listen, &service->listen_fd, service->url, sizeof service->url,
                           err);
     spl_listen_print(service->listen_fd, service->url, sizeof service->url);
     return 0;
@@ -275,7 +296,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     int rc = init_loop(service, err);
     if (rc)
         goto free_service;
-    if ((rc = open_sockets(service, err)) || (rc = spl_access_init(service, err)) ||
+    if ((rc = check(service, err)) || (rc = open_sockets(service, err)) ||
         (rc = spl_loading_start(service, err)))
         goto done;
     spl_health_watch(service);

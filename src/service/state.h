@@ -68,6 +68,7 @@ struct request {
     size_t body_length, body_capacity, body_seen;
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     bool started;
+    bool has_host;  /* of HTTP/1.1, which demands it */
     bool head;      /* the method is HEAD */
     bool closes;    /* the connection ends with the reply */
     bool abandoned; /* the client has left: close without a reply */

@@ -328,7 +328,7 @@ def read_reply(s):
 
 
 def request(path):
-    return f"GET {path} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
+    return f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
 
 
 def median_ms(port, paths):

@@ -74,7 +74,7 @@ with tempfile.TemporaryDirectory() as top, contextlib.ExitStack() as stack:
         f"pid {top}/pid; error_log {top}/error.log; daemon off; events {{}} http {{ {folders} access_log off;\n"
         f"{SNIPPET}\n"
         f"upstream pods {{ hash {VARIABLE} consistent; {servers} }} server {{ listen 127.0.0.1:{port};"
-        f"location / {{ add_header X-Key {VARIABLE} always; proxy_pass http://pods; }} }} }}")
+        f"location / {{ add_header X-Key {VARIABLE} always; proxy_set_header Host $host; proxy_pass http://pods; }} }} }}")
     process = subprocess.Popen([NGINX, "-c", f"{top}/nginx.conf", "-p", top], stderr=subprocess.DEVNULL)
     try:
         def answers():

@@ -8,6 +8,7 @@ import math
 import pathlib
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import threading
@@ -749,6 +750,43 @@ def test_a_token_is_asked_for():
             with elsewhere(site, f'<splat-view dataset="wall" token="{token}"></splat-view>') as url:
                 with page(url, ready="document.querySelector('splat-view')?.camera", complaints="401"):
                     pass
+
+
+def test_a_signed_page_needs_no_token():
+    """In a page of another origin: until it expires, unaltered, for its dataset and no other."""
+    heard = "<script>addEventListener('message', e => (window.heard ??= []).push(e.data.splatd))</script>"
+    with tempfile.TemporaryDirectory() as folder:
+        tokens, key = pathlib.Path(folder, "tokens"), pathlib.Path(folder, "key")
+        tokens.write_text("a-token-of-the-tests view\n")
+        key.write_text("0123456789abcdef0123456789abcdef")
+        tokens.chmod(0o600)
+        key.chmod(0o600)
+        with Daemon(REAL, "--tokens", str(tokens), "--url-key", str(key), datasets=(WALL, TEXTURED)) as guarded:
+            site = f"http://127.0.0.1:{guarded.port}"
+
+            def sign(path, expires="1h"):
+                command = [REAL, "sign", site + path, "--key", str(key), "--expires", expires]
+                return subprocess.run(command, capture_output=True, text=True, check=True, timeout=30).stdout.strip()
+            signed = sign("/embed/wall#eye=3,0,1&target=0,0,1")
+            with elsewhere(site, f'{heard}<iframe width=400 height=300 src="{signed}"></iframe>') as url:
+                with page(url, ready="window.heard?.includes('camera')") as tab:
+                    assert "token" not in tab.run("heard")
+            with page(signed, size=(400, 300)) as tab:
+                digest = settled(tab)
+                assert digest[1] > 10
+                tab.drag((200, 150), (260, 150))  # views that nobody has signed one by one
+                settled(tab, digest)
+            query = re.search(r"exp=[^#]*", signed)[0]
+            with elsewhere(site, f'<splat-view dataset="wall" signed="{query.replace("&", "&amp;")}"></splat-view>') as url:
+                with page(url, ready="document.querySelector('splat-view')?.camera"):
+                    pass
+            old = sign("/embed/wall", "1s")
+            time.sleep(2.1)
+            for wrong, said in ((signed.replace("/wall", "/wall-textured"), "was changed"), (old, "has expired"),
+                                (signed.replace("exp=", "exp=1"), "was changed"), (signed.replace("&sig=", "&sig=A"), "changed")):
+                with page(wrong, ready="!document.querySelector('#notice').hidden", complaints="403") as tab:
+                    assert said in tab.text("#notice p") and tab.text("#notice p").startswith("Refused"), wrong
+                    assert tab.run("document.querySelector('canvas').hidden")
 
 
 try:

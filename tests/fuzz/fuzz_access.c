@@ -40,6 +40,7 @@ static void try_query(const char *query)
         const char *path = spl_sign_path_of(url);
         char *mark = strchr(path, '?');
         *mark = '\0';
+        mark[1 + strcspn(mark + 1, "#")] = '\0';
         if (spl_sign_check(&key, path, mark + 1, 1, &kept, NULL) ||
             !spl_sign_check(&key, path, mark + 1, 2, &kept, NULL))
             abort();

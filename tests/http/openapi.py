@@ -140,7 +140,7 @@ used = set()  # "GET /v1/x", "GET /v1/x -> 200", "GET /v1/x ?name", "GET /v1/x b
 def check_request(where, operation, parameters, query, headers, body):
     """Of a request that has succeeded: what it used is documented."""
     if headers.get("Authorization") is None:  # the security scheme signedUrl
-        query = re.sub(r"(^|&)exp=\d+&sig=[\w-]{43}\Z", "", query)
+        query = re.sub(r"(^|&)exp=\d+&(sig|embed)=[\w-]{43}\Z", "", query)
     for name, text in urllib.parse.parse_qsl(query.replace("+", "%2B"), keep_blank_values=True):
         parameter = find_parameter(parameters, "query", name)
         assert parameter, f"{where} takes '?{name}', which is not documented{NEWS}"

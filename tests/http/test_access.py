@@ -22,14 +22,14 @@ def lines():
 
 
 @contextlib.contextmanager
-def guarded(*args, tokens=None, **environment):
+def guarded(*args, tokens=None, datasets=(WALL,), **environment):
     with tempfile.TemporaryDirectory() as home:
         file, key = pathlib.Path(home, "tokens"), pathlib.Path(home, "url.key")
         file.write_text(tokens or lines())
         key.write_text(KEY)
         file.chmod(0o600)
         key.chmod(0o600)
-        with Daemon(FAKE, "--tokens", str(file), "--url-key", str(key), *args, **environment) as d:
+        with Daemon(FAKE, "--tokens", str(file), "--url-key", str(key), *args, datasets=datasets, **environment) as d:
             d.tokens, d.key = file, str(key)
             yield d
         log = "".join(d.lines)
@@ -112,12 +112,79 @@ def test_a_signed_url_is_good_for_what_it_says():
             assert reply.status in (401, 403), (path, reply.status)
             assert reply.status == 401 or reply.json()["field"] in ("sig", "exp"), reply.body
         assert d.ask(url, "POST", "{}").status == 401
-        assert d.ask(sign(d, "/v1/status")).status == 401 and d.ask(sign(d, "/v1/datasets")).status == 401
         assert d.ask(sign(d, "/v1/datasets/none")).status == 404
         short = sign(d, SMALL, "1s")
         eventually(lambda: d.ask(short).status == 403)
         assert d.ask(short).json()["field"] == "exp"
         assert d.ask(short, headers=bearer(VIEWER)).status == 403  # it says what it is; the token does not mend it
+
+
+def passed_on(signed):
+    """What the page at a signed /embed/ adds to its requests."""
+    return signed.partition("?")[2].partition("#")[0].replace("&sig=", "&embed=")
+
+
+def test_a_signed_page_looks_at_its_dataset_and_nothing_else():
+    with tempfile.TemporaryDirectory() as home:
+        other = pathlib.Path(home, "yard_2.b.spld")
+        other.write_bytes(pathlib.Path(WALL).read_bytes())
+        with guarded("--tours", home, datasets=(WALL, str(other))) as d:
+            page = sign(d, "/embed/wall#eye=3,0,1&target=0,0,1")
+            assert page.endswith("#eye=3,0,1&target=0,0,1") and d.ask(page.partition("#")[0]).status == 200
+            grant = passed_on(page)
+            looks = ["/v1/datasets/wall?", f"{SMALL}&", f"{VIEW}?eye=3,0,1&target=0,0,1&width=32&height=32&",
+                     f"{VIEW}?width=16&layer=depth&format=png&", "/v1/datasets/%77all?",
+                     "/v1/datasets/wall/pick?x=8&y=8&width=16&height=16&"]
+            for path in looks:
+                assert d.ask(path + grant).status == d.ask(path + grant, "HEAD").status == 200, path
+                assert d.ask(path.rstrip("&?")).status == 401, path
+            assert d.ask("/v1/datasets/wall/profile?" + grant).status == 404  # it has none
+            for path in ("/v1/datasets", "/v1/status", "/v1/tours", "/v1/tours/0123456789abcdef",
+                         "/v1/tours/0123456789abcdef/events", "/v1/tours/0123456789abcdef/video.mp4"):
+                assert d.ask(f"{path}?{grant}").status == 401, path
+            for method, path, body in (("POST", VIEW, "{}"), ("POST", VIEW + "s", "{}"), ("PUT", "/v1/datasets/wall", "x"),
+                                       ("POST", "/v1/datasets/wall/tours", "{}"), ("DELETE", "/v1/datasets/wall", None),
+                                       ("POST", "/v1/datasets/wall/pick", "{}")):
+                assert d.ask(f"{path}?{grant}", method, body).status == 401, (method, path)
+            odd = "/v1/datasets/yard_2.b"
+            for path in (odd, odd + "/view", "/v1/datasets/none", "/v1/datasets/wall%2fview/view", "/v1/datasets/wal/view"):
+                reply = d.ask(f"{path}?{grant}")
+                assert reply.status == 403 and reply.json()["field"] == "sig", (path, reply.status)
+            for way in ("/embed/yard_2.b", "/embed/%79ard%5f2.b"):  # its id counts, not how it is written
+                theirs = passed_on(sign(d, way))
+                assert d.ask(f"{odd}/view?width=16&{theirs}").status == 200 and d.ask(f"{SMALL}&{theirs}").status == 403
+            expiry, signature = grant.removeprefix("exp=").split("&embed=")
+            for wrong in (f"exp={int(expiry) + 1}&embed={signature}", f"exp={expiry}&embed={signature[:-1]}", "embed=",
+                          f"exp={expiry}&embed={'A' * 43}", f"exp={expiry}&width=16&embed={signature}",
+                          f"exp=0{expiry}&embed={signature}", f"embed={signature}", f"exp={expiry}&sig={signature}"):
+                reply = d.ask(f"{SMALL}&{wrong}")
+                assert reply.status == 403 and reply.json()["field"] in ("sig", "exp"), (wrong, reply.status)
+            for wrong in (f"exp={expiry}&embed={signature}&x=1", f"embed={signature}&exp={expiry}"):
+                assert d.ask(f"{SMALL}&{wrong}").status == 401, wrong
+            view = sign(d, VIEW + "?width=16").replace("&sig=", "&embed=")  # a view's signature is no page's
+            assert d.ask(view).status == 403 and d.ask(f"/v1/datasets/wall?{passed_on(view)}").status == 403
+            short = passed_on(sign(d, "/embed/wall", "1s"))
+            eventually(lambda: d.ask(f"{SMALL}&{short}").status == 403)
+            assert d.ask(f"{SMALL}&{short}").json()["field"] == "exp"
+            for path in ("/embed/wall?x=1", "/embed/wall?exp=1", f"/embed/wall?x=1&{page.partition('?')[2]}"):
+                assert d.ask(path.partition("#")[0]).status == 400, path
+
+
+def test_splatd_sign_refuses_what_nobody_could_use():
+    with tempfile.TemporaryDirectory() as home:
+        key = pathlib.Path(home, "key")
+        key.write_text(KEY)
+        key.chmod(0o600)
+        for path in ("/", "/tours", "/v1/status", "/v1/datasets", "/v1/datasets/", "/v1/tours", "/v1/tours/x/video.mp4",
+                     "/v1/datasets/a/views", "/v1/datasets/a/tours", "/v1/datasets/a/view/", "/v1/datasets//view",
+                     "/v1/datasets/a/b/view", "/V1/datasets/a", "/embed/", "/embed/a/b", "/embed", "/embed/a?width=16",
+                     "/embed/a%2", "/viewer/main.js", "/v1/datasets/a/view#x", "/x/embed/a"):
+            for url in (path, "https://scans.example" + path):
+                done = subprocess.run([REAL, "sign", url, "--key", key], capture_output=True, text=True, timeout=30)
+                assert done.returncode == 2 and not done.stdout and path in done.stderr, (url, done)
+                assert "/embed/" in done.stderr, done.stderr  # it says what can be signed
+        shown = subprocess.run([REAL, "sign", "--help"], capture_output=True, text=True, timeout=30).stdout
+        assert "/embed/vault" in shown and "iframe" in shown
 
 
 def test_splatd_sign_refuses_bad_arguments():
@@ -127,10 +194,10 @@ def test_splatd_sign_refuses_bad_arguments():
         short = pathlib.Path(home, "short")
         short.write_text("secret")
         for arguments, said in [
-            (["/v1/x"], "--key"), (["--key", key], "one URL"), (["/a", "/b", "--key", key], "one URL"),
-            (["/v1/x", "--key", "/nowhere"], "/nowhere"), (["/v1/x", "--key", short], "32"),
+            (["/embed/x"], "--key"), (["--key", key], "one URL"), (["/a", "/b", "--key", key], "one URL"),
+            (["/embed/x", "--key", "/nowhere"], "/nowhere"), (["/embed/x", "--key", short], "32"),
             (["v1", "--key", key], "'v1'"), (["/a#b", "--key", key], "'/a#b'"),
-            *[(["/v1/x", "--key", key, "--expires", e], f"'{e}'") for e in ("1", "h", "-1h", "0s", "1w", "1hh", "99999d", "")],
+            *[(["/embed/x", "--key", key, "--expires", e], f"'{e}'") for e in ("1", "h", "-1h", "0s", "1w", "1hh", "99999d", "")],
         ]:
             done = subprocess.run([REAL, "sign", *arguments], capture_output=True, text=True, timeout=30)
             assert done.returncode == 2 and said in done.stderr and not done.stdout, (arguments, done)
@@ -243,7 +310,7 @@ def test_connections_are_capped():
         def outcome(i):
             with socket.create_connection(("127.0.0.1", d.port), 20) as s:
                 try:
-                    s.sendall(b"GET /v1/openapi.yaml HTTP/1.1\r\nHost: x\r\n\r\n")
+                    s.sendall(b"GET /v1/openapi.yaml HTTP/1.1\r\nHost: localhost\r\n\r\n")
                     return s.recv(12) and bool(time.sleep(1)) is False
                 except OSError:
                     return b""

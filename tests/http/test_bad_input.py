@@ -7,7 +7,7 @@ import socket
 import subprocess
 import tempfile
 
-from harness import FAKE, VIEW, WALL, Daemon, run
+from harness import FAKE, REAL, VIEW, WALL, Daemon, run
 
 # query, field; the parser's unit test has many more
 QUERIES = [
@@ -109,7 +109,7 @@ def test_sizes_are_capped():
             reply = d.ask(VIEW + "?" + "a" * length)
             assert reply.status == 414 and reply.json()["field"] == "url", length
         for length in (20000, 60000):  # libmicrohttpd's own
-            assert raw(d, f"GET {VIEW}?{'a' * length} HTTP/1.1\r\nHost: x\r\n\r\n".encode())[:12] == b"HTTP/1.1 414"
+            assert raw(d, f"GET {VIEW}?{'a' * length} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())[:12] == b"HTTP/1.1 414"
         for pairs in (100, 300, 4000):
             reply = d.ask(VIEW + "?" + "a&" * pairs)
             assert reply.status == 414 and reply.json()["field"] == "url", pairs
@@ -135,7 +135,7 @@ def test_headers_of_every_size_are_answered():
             said = []
             for length in range(0, 16000, 400):
                 headers = "".join(f"X-{i}: {'y' * (length // count)}\r\n" for i in range(count))
-                answer = raw(d, f"GET {VIEW}?width=8&height=8&layer=depth HTTP/1.1\r\nHost: x\r\n"
+                answer = raw(d, f"GET {VIEW}?width=8&height=8&layer=depth HTTP/1.1\r\nHost: localhost\r\n"
                              f"Connection: close\r\n{headers}\r\n".encode())
                 kind = "problem" if b"problem+json" in answer else "plain" if b"<html>" in answer else "view"
                 said += [(answer[:12], kind)]
@@ -149,7 +149,7 @@ def test_large_bodies_are_refused():
         assert d.post(b'{"lod":1' + b" " * (1024 * 1024 - 9) + b"}").status == 200
         reply = d.post(b'{"lod":1' + b" " * (1024 * 1024 - 8) + b"}")
         assert reply.status == 413 and reply.json()["field"] == "body"
-        head = f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n".encode()
+        head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode()
         assert b" 413 " in raw(d, head + b"Content-Length: 2000000\r\nExpect: 100-continue\r\n\r\n")
         assert b" 413 " in raw(d, head + b"Content-Length: 99999999999\r\n\r\n")
         chunk = b"10000\r\n" + b"x" * 65536 + b"\r\n"
@@ -162,11 +162,11 @@ def test_broken_http_is_survived():
     with Daemon(FAKE) as d:
         for data in [b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n",
                      b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\n\n",
-                     b"GET / HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
+                     b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n", b"G" * 300000,
                      b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 50000 + b"\r\n",
                      b"GET " + b"a" * 300000 + b" HTTP/1.1\r\n\r\n",
                      b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
-                     b"GET /\x01 HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"]:
+                     b"GET /\x01 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"]:
             try:
                 with socket.create_connection(("127.0.0.1", d.port), 15) as s:  # half a request is cut after 10 s
                     s.sendall(data)
@@ -178,8 +178,8 @@ def test_broken_http_is_survived():
         assert d.view(width=8, height=8).status == 200
 
 
-def refused(*arguments):
-    done = subprocess.run([FAKE, *arguments], capture_output=True, text=True, timeout=30)
+def refused(*arguments, binary=(FAKE,)):
+    done = subprocess.run([*binary, *arguments], capture_output=True, text=True, timeout=30)
     assert done.stdout == "", done.stdout
     return done.returncode, done.stderr
 
@@ -209,6 +209,82 @@ def test_the_command_line_is_checked():
             assert code == 1 and str(d.port) in text, (code, text)
         with Daemon(FAKE, "--no-verify", datasets=[broken]) as d:
             assert d.ask("/v1/datasets/broken").status == 200
+
+
+def lines_of_json(text):
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_opened():
+    with tempfile.TemporaryDirectory() as folder:
+        conf, tokens, key = (os.path.join(folder, name) for name in ("s.conf", "tokens", "key"))
+        with open(tokens, "w") as f:
+            f.write("# mine\nshort view\n")
+        with open(key, "w") as f:
+            f.write("short")
+        os.chmod(tokens, 0o600), os.chmod(key, 0o600)
+        for text, said in [
+            ("listen = nonsense", ("listen takes ADDR:PORT", "'nonsense'")), ("tokens = /nowhere", ("tokens", "/nowhere")),
+            (f"tokens = {tokens}", ("tokens, line 2",)), (f"tokens = {folder}", ("tokens", folder)),
+            ("url-key = /nowhere", ("url-key", "tokens")), ("listen = 0.0.0.0:0", ("listen", "--allow-anonymous")),
+            ("tours = /nowhere/x", ("tours", "/nowhere/x")), (f"tours = {tokens}", ("tours", tokens)),
+            ("listen = no-such-name.invalid:80", ("listen", "no-such-name.invalid")), ("queue = 0", ("queue", "1 to 4096")),
+        ]:
+            for log_format in ("text", "json"):
+                with open(conf, "w") as f:
+                    f.write(f"\ufeff# mine\r\nlog-format = {log_format}\r\n{text}\r\n")
+                args = [] if "listen =" in text else ["--listen", "127.0.0.1:0"]
+                code, got = refused("--config", conf, "--ops-listen", "127.0.0.1:0", *args, WALL)
+                assert code == 2 and f"{conf}, line 3: " in got, (text, code, got)
+                assert all(word in got for word in said) and "health" not in got and got.count("\n") == 1, (text, got)
+                assert log_format == "text" or lines_of_json(got)[0]["level"] == "error", got
+        big, fifo = os.path.join(folder, "big"), os.path.join(folder, "fifo")
+        with open(big, "wb") as f:
+            f.truncate(1 << 30)
+        os.mkfifo(fifo)
+        for path in (folder, fifo, big, "/dev/zero", os.path.join(folder, "none")):
+            for flag in ("--config", "--tokens"):
+                code, got = refused(flag, path, "--listen", "127.0.0.1:0", "--ops-listen", "127.0.0.1:0", WALL)
+                assert code == 2 and path in got and "health" not in got, (flag, path, got)
+
+
+def test_every_line_is_json_where_that_is_asked_for():
+    with tempfile.TemporaryDirectory() as folder, Daemon(FAKE, "--log-format", "json") as other:
+        usual = ("--listen", "127.0.0.1:0", "--ops-listen", "127.0.0.1:0")
+        for arguments, code, said in [
+            (("--frobnicate", WALL), 2, "--frobnicate"), (("-x", WALL), 2, "-x"), (("--queue",), 2, "--queue"),
+            (("--verify=1", WALL), 2, "--verify"), (("--queue", "0", WALL), 2, "queue"), ((), 2, "at least one"),
+            (("/nowhere/x.spld", *usual), 2, "/nowhere/x.spld"), ((os.path.join(folder, "a\n\"b\\.spld"), *usual), 2, "b"),
+            (("--require-gpu", *usual, WALL), 1, "no usable device"),
+            (("--listen", f"127.0.0.1:{other.port}", "--ops-listen", "127.0.0.1:0", WALL), 1, str(other.port)),
+            (("--ops-listen", f"127.0.0.1:{other.port}", "--listen", "127.0.0.1:0", WALL), 1, str(other.port)),
+            (("--tokens", "/nowhere", *usual, WALL), 2, "/nowhere"),
+        ]:
+            got_code, got = refused("--log-format", "json", *arguments)
+            lines = lines_of_json(got)
+            assert got_code == code and lines[-1]["level"] == "error" and said in lines[-1]["message"], (arguments, got)
+        code, got = refused("--log-format", "json", "--device", 'x"y', *usual, WALL, binary=(REAL, "serve"))
+        assert code == 1 and "no device matches" in lines_of_json(got)[-1]["message"], got
+        assert other.stop() == 0
+        lines_of_json("".join(other.lines))
+
+
+def test_the_least_memory_limit_is_said_and_works():
+    def start(limit):
+        done = subprocess.run([REAL, "serve", "--log-format", "json", "--memory-limit", str(limit), "--listen",
+                               "127.0.0.1:0", "--ops-listen", "127.0.0.1:0", WALL], capture_output=True, text=True, timeout=60)
+        last = lines_of_json(done.stderr)[-1]["message"]
+        assert done.returncode == 2 and "memory-limit" in last and str(limit) in last, done.stderr
+        assert "largest that device" not in last, last
+        return int(re.search(r"at least (\d+)", last)[1])
+    least = start("20971520")
+    assert start(1) == least > 20 << 20
+    with Daemon(REAL, "--memory-limit", str(least - 1)) as d:  # enough to work with: a page without room is its dataset's state
+        wall, = d.ask("/v1/datasets").json()["datasets"]
+        assert wall["state"] != "ready" and "memory limit" in wall["reason"], wall
+    with Daemon(REAL, "--memory-limit", str(least)) as d:
+        assert d.view(width=1280, height=720, method="splat").status == 200
+        assert d.view(width=1280, height=720, layer="depth", format="png", method="points").status == 200
 
 
 run(globals())

@@ -131,7 +131,7 @@ def test_a_batch_whose_client_left_is_given_up():
     with Daemon(FAKE, FAKE_FRAME_MS=100) as d:
         body = json.dumps(views(50)).encode()
         with socket.create_connection(("127.0.0.1", d.port)) as s:
-            s.sendall(f"POST {BATCH} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
+            s.sendall(f"POST {BATCH} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
             eventually(lambda: d.status()["counters"]["frames"] >= 2)
         eventually(lambda: d.status()["counters"]["clients_left"] == 1)
         assert d.ask(fresh(SMALL)).status == 200

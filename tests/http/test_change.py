@@ -185,7 +185,7 @@ def test_sizes_are_capped_and_large_bodies_only_go_here():
         eventually(lambda: left_over(d) == [])
         reply = d.ask("/v1/datasets/a/view", "POST", b" " * 2_000_000, AUTH)
         assert reply.status == 413
-        head = (f"PUT /v1/datasets/b HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999\r\nExpect: 100-continue\r\n"
+        head = (f"PUT /v1/datasets/b HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\nExpect: 100-continue\r\n"
                 f"Authorization: Bearer {VIEWER}\r\n\r\n").encode()
         with socket.create_connection(("127.0.0.1", d.port), 20) as s:
             s.sendall(head)
@@ -221,7 +221,7 @@ def test_clients_that_leave_leave_nothing():
     with serving() as d:
         for sent in (0, 1000, 1_500_000, 3_000_000):
             with socket.create_connection(("127.0.0.1", d.port), 20) as s:
-                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: x\r\nContent-Length: 9999999\r\n"
+                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999999\r\n"
                           f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + b"x" * sent)
                 eventually(lambda: "gone" in listed(d))
                 if sent > 2_000_000:  # reset instead of the end of a stream
@@ -234,7 +234,7 @@ def test_clients_that_leave_leave_nothing():
 def test_one_change_of_a_dataset_at_a_time():
     with serving() as d:
         with socket.create_connection(("127.0.0.1", d.port), 20) as s:
-            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: x\r\nContent-Length: {len(WALL_1)}\r\n"
+            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
                       f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
             eventually(lambda: listed(d).get("a", {}).get("state") == "loading")
             assert small(d, "a").status == 503
@@ -295,7 +295,7 @@ def test_a_full_disk_is_said():
 def test_sigterm_waits_for_an_upload():
     with serving() as d:
         with socket.create_connection(("127.0.0.1", d.port), 20) as s:
-            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: x\r\nContent-Length: {len(WALL_1)}\r\n"
+            s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
                       f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
             eventually(lambda: "a" in listed(d))
             d.process.terminate()

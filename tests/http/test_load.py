@@ -63,7 +63,7 @@ def test_work_of_clients_that_left_is_dropped():
         gone = []
         for _ in range(8):
             s = socket.create_connection(("127.0.0.1", d.port))
-            s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             gone.append(s)
         eventually(lambda: d.status()["queues"]["render"]["length"] >= 7)
         for s in gone:
@@ -175,7 +175,7 @@ def test_sigterm_finishes_a_long_frame():
 def test_a_second_signal_ends_at_once():
     d = Daemon(FAKE, FAKE_FRAME_MS=5000)
     s = socket.create_connection(("127.0.0.1", d.port))
-    s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
     eventually(lambda: d.status()["counters"]["requests"] >= 2)
     began = time.monotonic()
     d.process.send_signal(signal.SIGTERM)
@@ -223,7 +223,7 @@ def test_half_a_request_holds_up_no_exit():
     with Daemon(FAKE) as d:
         halves = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(4)]
         for s in halves:
-            s.sendall(f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nContent-Length: 99\r\n\r\n{{".encode())
+            s.sendall(f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99\r\n\r\n{{".encode())
         eventually(lambda: d.status()["counters"]["requests"] >= 4)
         began = time.monotonic()
         assert d.stop() == 0 and time.monotonic() - began < 8

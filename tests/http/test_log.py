@@ -62,7 +62,7 @@ def test_request_ids():
 def test_clients_that_leave_are_in_the_log():
     with Daemon(FAKE, "--log-format", "json", FAKE_FRAME_MS=400) as d:
         with socket.create_connection(("127.0.0.1", d.port)) as s:
-            s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            s.sendall(f"GET {SMALL} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             eventually(lambda: d.status()["queues"]["render"]["length"] == 0)
         eventually(lambda: any('"end":"client-left"' in line for line in d.lines))
 

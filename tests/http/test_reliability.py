@@ -108,9 +108,9 @@ def quote(r, text):
 def garbage(r, d):
     """Bytes that are no HTTP, or a part of some; then away."""
     data = r.choice([lambda: bytes(r.randrange(256) for _ in range(r.randrange(300))),
-                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n".encode()[:r.randrange(60)],
-                     lambda: f"POST {VIEW} HTTP/1.1\r\nHost: x\r\nContent-Length: {r.randrange(999)}\r\n\r\n{{".encode(),
-                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: x\r\n\r\n".encode() * r.randrange(1, 20),
+                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: localhost\r\n".encode()[:r.randrange(60)],
+                     lambda: f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {r.randrange(999)}\r\n\r\n{{".encode(),
+                     lambda: f"GET {SMALL} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() * r.randrange(1, 20),
                      lambda: b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n" + b"zz\r\n" * r.randrange(9)])()
     try:
         with socket.create_connection(("127.0.0.1", d.port), 30) as s:
@@ -158,7 +158,7 @@ def test_clients_that_leave_in_the_middle_of_a_reply():
         def leave(i):
             s = socket.create_connection(("127.0.0.1", d.port), 60)
             s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            s.sendall(f"GET {VIEW}?width=1600&height=900&format=raw HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+            s.sendall(f"GET {VIEW}?width=1600&height=900&format=raw HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             assert s.recv(1000).startswith(b"HTTP/1.1 200")
             all_wait.wait(60)
             if i == 0:

@@ -1,7 +1,7 @@
-/* What is checked before a request is looked at: how often its address asks, whether its token or its signature allows
- * what it wants, and which pages may read the answer.
+/* What is checked before a request is looked at: by which name and from which page it comes (door.c), how often its
+ * address asks, whether its token or its signature allows what it wants.
  *
- * Without tokens, rates and origins service->access is NULL, and a request costs one comparison. No reply and no line
+ * Without tokens and rates service->access is NULL, and everybody may view and make tours. No reply and no line
  * of the log holds a token or a signature. A change of the files takes effect by SIGHUP; a request's token is borrowed
  * only while it is routed. Owned by the loop's thread. */
 #include "service/access/access.h"
@@ -18,7 +18,9 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/access/buckets.h"
+#include "service/access/door.h"
 #include "service/access/sign.h"
+#include "service/listen.h"
 #include "service/state.h"
 
 struct spl_access {
@@ -28,18 +30,16 @@ struct spl_access {
     struct spl_buckets *all;       // may be NULL
 };
 
-/* Only this machine can reach it. */
-static bool is_local(int fd)
+/* Can only this machine reach the main listener, a socket that was passed or the address that is to be opened? */
+static int find_local(const struct spl_service *service, bool *local, struct spl_error *err)
 {
     struct sockaddr_storage bound;
     socklen_t length = sizeof bound;
-    if (getsockname(fd, (struct sockaddr *)&bound, &length))
-        return false;
-    if (bound.ss_family == AF_INET)
-        return ntohl(((struct sockaddr_in *)&bound)->sin_addr.s_addr) >> 24 == 127;
-    if (bound.ss_family == AF_INET6)
-        return IN6_IS_ADDR_LOOPBACK(&((struct sockaddr_in6 *)&bound)->sin6_addr);
-    return bound.ss_family == AF_UNIX;
+    if (service->listen_fd < 0)
+        return spl_listen_is_local("listen", service->options->listen, local, err);
+    *local = !getsockname(service->listen_fd, (struct sockaddr *)&bound, &length) &&
+             spl_sockaddr_is_local((const struct sockaddr *)&bound);
+    return 0;
 }
 
 static int read_secrets(const struct spl_service_options *options, struct spl_tokens **tokens, struct spl_sign_key *key,
@@ -47,10 +47,15 @@ static int read_secrets(const struct spl_service_options *options, struct spl_to
 {
     *tokens = NULL;
     *key = (struct spl_sign_key){0};
-    int rc = *options->tokens ? spl_tokens_read(options->tokens, tokens, err) : 0;
-    if (!rc && *options->url_key)
-        rc = spl_sign_key_read(options->url_key, key, err);
+    struct spl_error why = {0};
+    const char *field = "tokens";
+    int rc = *options->tokens ? spl_tokens_read(options->tokens, tokens, &why) : 0;
+    if (!rc && *options->url_key) {
+        field = "url-key";
+        rc = spl_sign_key_read(options->url_key, key, &why);
+    }
     if (rc) {
+        spl_fail_field(err, rc, field, "%s", why.message);
         spl_tokens_destroy(*tokens);
         *tokens = NULL;
     }
@@ -60,19 +65,20 @@ static int read_secrets(const struct spl_service_options *options, struct spl_to
 int spl_access_init(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_service_options *options = service->options;
-    if (*options->url_key && !*options->tokens)
-        return spl_fail(err, SPL_E_USAGE, "--url-key without --tokens: everybody may view anyway");
-    if (!*options->tokens && !options->allow_anonymous && !is_local(service->listen_fd))
-        return spl_fail(err, SPL_E_USAGE,
-                        "--listen %.100s can be reached from elsewhere; give --tokens FILE, or --allow-anonymous if "
-                        "everybody there may use the service",
-                        options->listen);
-    if (!*options->tokens && !options->rate_limit && !options->rate_limit_total && !options->cors.count)
+    bool local;
+    int rc = find_local(service, &local, err);
+    if (rc)
+        return rc;
+    if (!*options->tokens && !options->allow_anonymous && !local)
+        return spl_fail_field(err, SPL_E_USAGE, "listen",
+                              "--listen %.100s can be reached from elsewhere; give --tokens FILE, or --allow-anonymous "
+                              "if everybody there may use the service", options->listen);
+    if (!*options->tokens && !options->rate_limit && !options->rate_limit_total)
         return 0;
     struct spl_access *access = service->access = spl_alloc(1, sizeof *access, err);
     if (!access)
         return SPL_E_NOMEM;
-    int rc = read_secrets(options, &access->tokens, &access->key, err);
+    rc = read_secrets(options, &access->tokens, &access->key, err);
     if (!rc && options->rate_limit)
         rc = spl_buckets_create(options->rate_limit, &access->addresses, err);
     if (!rc && options->rate_limit_total)
@@ -171,50 +177,19 @@ void spl_access_charge(struct request *request, unsigned count)
         spl_buckets_charge(access->all, everybody, count);
 }
 
-/* The request's Origin where its pages may read replies; NULL otherwise. */
-static const char *allowed_origin(struct request *request)
+/* Does no token decide about the request? One that is shown does, right or wrong, where there are tokens. */
+static bool is_anonymous(struct request *request)
 {
-    const struct spl_text_list *cors = &request->service->options->cors;
-    const char *origin =
-        cors->count ? MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN) : NULL;
-    for (size_t i = 0; origin && i < cors->count; i++)
-        if (!strcmp(cors->items[i], "*") || !strcasecmp(cors->items[i], origin))
-            return origin;
-    return NULL;
-}
-
-void spl_access_add_cors(struct request *request)
-{
-    const struct spl_text_list *cors = &request->service->options->cors;
-    if (!cors->count || !request->response)
-        return;
-    const char *origin = allowed_origin(request);
-    MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, "Origin");
-    if (!origin || MHD_get_response_header(request->response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN))
-        return;
-    MHD_add_response_header(request->response, MHD_HTTP_HEADER_ACCESS_CONTROL_ALLOW_ORIGIN, origin);
-    MHD_add_response_header(request->response, "Access-Control-Expose-Headers", "*");
-}
-
-/* Answers what a browser asks before it sends a request of another origin. */
-static bool answer_preflight(struct request *request, const char *method)
-{
-    if (strcmp(method, MHD_HTTP_METHOD_OPTIONS) || !allowed_origin(request) ||
-        !MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, "Access-Control-Request-Method"))
-        return false;
-    spl_reply_empty(request, MHD_HTTP_NO_CONTENT);
-    if (!request->response)
-        return true;
-    MHD_add_response_header(request->response, "Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, DELETE");
-    MHD_add_response_header(request->response, "Access-Control-Allow-Headers",
-                            "Authorization, Content-Type, If-None-Match, Range");
-    MHD_add_response_header(request->response, "Access-Control-Max-Age", "600");
-    return true;
+    struct spl_access *access = request->service->access;
+    return !access || !access->tokens ||
+           (request->service->options->allow_anonymous &&
+            !MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_AUTHORIZATION));
 }
 
 bool spl_access_admit(struct request *request, const char *method)
 {
-    return !request->service->access || (is_within_rates(request) && !answer_preflight(request, method));
+    return spl_door_check_host(request, is_anonymous(request)) &&
+           (!request->service->access || is_within_rates(request)) && spl_door_check_preflight(request, method);
 }
 
 static bool refuse(struct request *request, unsigned status, const char *field, const char *challenge,
@@ -262,6 +237,9 @@ static const struct spl_token *find_token(struct request *request, bool *shown)
 bool spl_access_check(struct request *request, enum spl_scope scope, const struct spl_call *call)
 {
     struct spl_access *access = request->service->access;
+    bool changes = call->method != SPL_GET && scope != SPL_SCOPE_VIEW;
+    if (changes && is_anonymous(request) && !spl_door_check_origin(request))
+        return false;
     if (!access || !access->tokens)
         return scope != SPL_SCOPE_ADMIN ||
                refuse(request, MHD_HTTP_FORBIDDEN, "", NULL,
@@ -275,8 +253,8 @@ bool spl_access_check(struct request *request, enum spl_scope scope, const struc
     request->token = find_token(request, &shown);
     if (scope == SPL_SCOPE_NONE)
         return true;
-    if (access->key.bytes && scope == SPL_SCOPE_VIEW && call->method == SPL_GET && *call->id &&
-        spl_sign_is_signed(request->query))
+    if (access->key.bytes && call->method == SPL_GET && spl_sign_is_signed(request->query) &&
+        spl_sign_covers(request->uri, strlen(request->uri)))
         return check_signature(request);
     if (!shown)
         return (request->service->options->allow_anonymous && scope != SPL_SCOPE_ADMIN) ||

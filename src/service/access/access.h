@@ -1,4 +1,4 @@
-/* Who may do what: bearer tokens, signed URLs, how often, from which pages. Owned by the loop's thread. */
+/* Who may do what: bearer tokens, signed URLs, how often; door.h has names and pages. Owned by the loop's thread. */
 #ifndef SPL_SERVICE_ACCESS_H
 #define SPL_SERVICE_ACCESS_H
 
@@ -10,8 +10,8 @@ struct request;
 struct spl_call;
 struct spl_access;
 
-/* Reads what the options name: tokens, the key of URLs, rates. Refuses a listening socket that others can reach where
- * anybody might do anything and nobody has said so. service->access stays NULL where there is nothing to check. */
+/* Reads what the options name: tokens, the key of URLs, rates. Refuses an address that others can reach where anybody
+ * might do anything and nobody has said so; it is called before that is opened, or with the socket that was passed. service->access stays NULL where there is nothing to check. */
 int spl_access_init(struct spl_service *service, struct spl_error *err);
 void spl_access_finish(struct spl_service *service); /* idempotent */
 
@@ -28,8 +28,4 @@ void spl_access_charge(struct request *request, unsigned count);
 
 /* May listings that answer `request` show dataset `id`? */
 bool spl_access_may_see(struct request *request, const char *id);
-
-/* Adds what lets pages of other origins read the reply. */
-void spl_access_add_cors(struct request *request);
-
 #endif

@@ -12,8 +12,11 @@
 
 #include "base/memory.h"
 #include "service/access/secret.h"
+#include "service/request/request.h"
 
-enum { key_least = 32, key_most = 4096, target_max = 16 * 1024 };
+enum { key_least = 32, key_most = 4096, target_max = 16 * 1024, page_max = 512 };
+
+static const char datasets[] = "/v1/datasets/", pages[] = "/embed/";
 
 int spl_sign_key_read(const char *path, struct spl_sign_key *out, struct spl_error *err)
 {
@@ -48,7 +51,40 @@ static const char *last_of(const char *query)
 
 bool spl_sign_is_signed(const char *query)
 {
-    return !strncmp(last_of(query), "sig=", 4);
+    const char *last = last_of(query);
+    return !strncmp(last, "sig=", 4) || !strncmp(last, "embed=", 6);
+}
+
+/* The length of the id behind `prefix` in `path`; 0 when `path` does not begin with it. */
+static size_t find_id(const char *path, const char *prefix)
+{
+    size_t length = strlen(prefix);
+    return strncmp(path, prefix, length) ? 0 : strcspn(path + length, "/?#");
+}
+
+bool spl_sign_covers(const char *path, size_t length)
+{
+    static const char *const below[] = {"", "/view", "/pick", "/profile"};
+    size_t id = find_id(path, pages);
+    if (id)
+        return sizeof pages - 1 + id == length;
+    if (!(id = find_id(path, datasets)))
+        return false;
+    const char *rest = path + sizeof datasets - 1 + id;
+    for (size_t i = 0; i < sizeof below / sizeof *below; i++)
+        if ((size_t)(rest - path) + strlen(below[i]) == length && !strncmp(rest, below[i], strlen(below[i])))
+            return true;
+    return false;
+}
+
+/* The signed path of the page of the dataset that `path` names behind `prefix`. */
+static int name_page(const char *path, const char *prefix, char out[page_max], struct spl_error *err)
+{
+    size_t id = find_id(path, prefix);
+    if (!id)
+        return spl_fail_field(err, SPL_E_INPUT, "sig", "a page's signature is for its dataset");
+    memcpy(out, pages, sizeof pages);
+    return spl_percent_decode(path + strlen(prefix), id, out + sizeof pages - 1, page_max - sizeof pages, "sig", err);
 }
 
 /* Of `path`?`query`, of which `query_length` bytes count. */
@@ -85,22 +121,28 @@ static int64_t parse_expiry(const char *text, const char *end)
 int spl_sign_check(const struct spl_sign_key *key, const char *path, const char *query, int64_t now_s, size_t *kept,
                    struct spl_error *err)
 {
-    char right[SPL_DIGEST_TEXT];
-    const char *sig = last_of(query), *exp = sig;
-    if (strncmp(sig, "sig=", 4) || sig == query)
+    char right[SPL_DIGEST_TEXT], page[page_max];
+    const char *last = last_of(query), *exp = last, *shown = strchr(last, '=');
+    bool passed_on = !strncmp(last, "embed=", 6);
+    if (!spl_sign_is_signed(query) || last == query)
         return spl_fail_field(err, SPL_E_INPUT, "sig", "a signed URL ends in &exp=…&sig=…");
-    size_t signed_length = (size_t)(sig - query) - 1;
-    for (exp = sig - 1; exp > query && exp[-1] != '&';)
+    size_t signed_length = (size_t)(last - query) - 1;
+    for (exp = last - 1; exp > query && exp[-1] != '&';)
         exp--;
     if (strncmp(exp, "exp=", 4))
         return spl_fail_field(err, SPL_E_INPUT, "exp", "a signed URL ends in &exp=…&sig=…");
-    int rc = make(key, path, strlen(path), query, signed_length, right, err);
-    if (rc)
+    int rc = 0;
+    if (passed_on || find_id(path, pages)) {
+        rc = name_page(path, passed_on ? datasets : pages, page, err);
+        path = page;
+    }
+    const char *from = passed_on ? exp : query;
+    if (rc || (rc = make(key, path, strlen(path), from, signed_length - (size_t)(from - query), right, err)))
         return rc;
-    if (strlen(sig + 4) != SPL_DIGEST_TEXT - 1 || !spl_secret_is_equal(sig + 4, right, SPL_DIGEST_TEXT - 1))
+    if (strlen(++shown) != SPL_DIGEST_TEXT - 1 || !spl_secret_is_equal(shown, right, SPL_DIGEST_TEXT - 1))
         return spl_fail_field(err, SPL_E_INPUT, "sig",
                               "the URL was not signed with this service's key, or was changed");
-    int64_t expires = parse_expiry(exp + 4, sig - 1);
+    int64_t expires = parse_expiry(exp + 4, last - 1);
     if (expires < now_s)
         return spl_fail_field(err, SPL_E_INPUT, "exp", "the URL has expired; ask its author for a new one");
     *kept = exp == query ? 0 : (size_t)(exp - query) - 1;
@@ -115,28 +157,56 @@ const char *spl_sign_path_of(const char *url)
     return *path == '/' ? path : NULL;
 }
 
+/* Why `url`, whose path is `path` (may be NULL), cannot be signed. */
+static int refuse(const char *url, const char *path, struct spl_error *err)
+{
+    if (!path || strpbrk(url, " \t\r\n"))
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%.200s' is no URL such as https://HOST/v1/datasets/ID/view?width=640 or its path, without "
+                        "blanks; https://HOST/embed/ID is one as well", url);
+    size_t length = strcspn(path, "?#");
+    bool page = find_id(path, pages);
+    if (!spl_sign_covers(path, length))
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick and "
+                        "/profile, and the page /embed/ID; anything else needs a token", url);
+    if (page && path[length] == '?')
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%.200s' cannot be signed: /embed/ID takes camera and settings behind '#', not behind '?'", url);
+    if (!page && strchr(path, '#'))
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%.200s' cannot be signed: only /embed/ID has something behind '#'", url);
+    return 0;
+}
+
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err)
 {
-    char sig[SPL_DIGEST_TEXT], exp[32];
+    char sig[SPL_DIGEST_TEXT], exp[32], page[page_max];
     const char *path = spl_sign_path_of(url);
     *out = NULL;
-    if (!path || strpbrk(url, "# \t\r\n"))
-        return spl_fail(err, SPL_E_USAGE,
-                        "'%.200s' is no URL such as https://HOST/v1/datasets/ID/view?width=640 or its "
-                        "path, without '#' and blanks",
-                        url);
-    const char *mark = strchr(path, '?'), *query = mark ? mark + 1 : "";
+    int rc = refuse(url, path, err);
+    if (rc)
+        return rc;
+    size_t path_length = strcspn(path, "?#"), signed_length = path_length;
+    const char *query = path[path_length] == '?' ? path + path_length + 1 : "";
     if (spl_sign_is_signed(query) || strstr(query, "exp="))
         return spl_fail(err, SPL_E_USAGE, "'%.200s' has exp or sig already", url);
     snprintf(exp, sizeof exp, "%sexp=%" PRId64, *query ? "&" : "", expires_s);
     char *signed_query = NULL;
-    int rc = 0;
     if (asprintf(&signed_query, "%s%s", query, exp) < 0)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
-    size_t path_length = mark ? (size_t)(mark - path) : strlen(path);
-    rc = make(key, path, path_length, signed_query, strlen(signed_query), sig, err);
-    if (!rc &&
-        asprintf(out, "%.*s?%s&sig=%s", (int)(path - url + (ptrdiff_t)path_length), url, signed_query, sig) < 0) {
+    const char *signed_path = path, *fragment = path + strcspn(path, "#");
+    if (find_id(path, pages)) {
+        struct spl_error why = {0};
+        if (name_page(path, pages, page, &why))
+            rc = spl_fail(err, SPL_E_USAGE, "'%.200s' cannot be signed: %s", url, why.message);
+        signed_path = page;
+        signed_length = rc ? 0 : strlen(page);
+    }
+    if (!rc)
+        rc = make(key, signed_path, signed_length, signed_query, strlen(signed_query), sig, err);
+    if (!rc && asprintf(out, "%.*s?%s&sig=%s%s", (int)(path - url + (ptrdiff_t)path_length), url, signed_query, sig,
+                        fragment) < 0) {
         *out = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
     }

@@ -1,5 +1,9 @@
 /* URLs that carry their own permission: ...?PARAMETERS&exp=UNIX-SECONDS&sig=SIGNATURE, where SIGNATURE is base64url of
- * HMAC-SHA-256 over everything from the path's '/' to the last byte before "&sig=", as it stands in the request. Pure
+ * HMAC-SHA-256 over everything from the path's '/' to the last byte before "&sig=", as it stands in the request.
+ *
+ * A signed page, /embed/ID?exp=…&sig=SIGNATURE, lets its reader look at dataset ID as he likes: the page's requests under
+ * /v1/datasets/ID end in &exp=UNIX-SECONDS&embed=SIGNATURE, the same two values. The signed text is
+ * /embed/ID?exp=UNIX-SECONDS with the ID decoded, so it is no other URL's, and says of which dataset and how long. Pure
  * functions but for the reading of the key; any thread. */
 #ifndef SPL_SERVICE_SIGN_H
 #define SPL_SERVICE_SIGN_H
@@ -19,8 +23,11 @@ struct spl_sign_key {
 int spl_sign_key_read(const char *path, struct spl_sign_key *out, struct spl_error *err);
 void spl_sign_key_finish(struct spl_sign_key *key);
 
-/* Does a query have the form of a signed one: does its last parameter begin with "sig="? */
+/* Does a query have the form of a signed one: is its last parameter sig or embed? */
 bool spl_sign_is_signed(const char *query);
+
+/* Is `path`[0..length) something that a signature can allow to GET: a dataset, its profile, views and picks, its page? */
+bool spl_sign_covers(const char *path, size_t length);
 
 /* Checks the signature of `path`?`query` and that it has not expired at `now_s`, Unix time. On success *kept is the
  * length of the query without exp and sig. SPL_E_INPUT with field sig or exp. */
@@ -30,8 +37,8 @@ int spl_sign_check(const struct spl_sign_key *key, const char *path, const char 
 /* Where the path of `url` begins, behind scheme and host if it has them; NULL where there is none. */
 const char *spl_sign_path_of(const char *url);
 
-/* Appends exp and sig to `url`, with or without scheme and host. The caller frees *out. SPL_E_USAGE for what is no such
- * URL, has a fragment, or is signed already. */
+/* Appends exp and sig to `url`, with or without scheme and host, and before its fragment, which only
+ * a page has. The caller frees *out. SPL_E_USAGE for what is no URL, is signed already, or cannot be signed. */
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err);
 
 #endif

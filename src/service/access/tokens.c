@@ -139,7 +139,8 @@ int spl_tokens_parse(const char *text, size_t length, const char *path, struct s
     int rc = 0;
     if (!(tokens = spl_alloc(1, sizeof *tokens, err)))
         return SPL_E_NOMEM;
-    for (size_t begin = 0; !rc && begin < length;) {
+    size_t mark = length >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0; // what editors for Windows put first
+    for (size_t begin = mark; !rc && begin < length;) {
         const char *end = memchr(text + begin, '\n', length - begin);
         size_t bytes = end ? (size_t)(end - text) - begin : length - begin, kept = bytes;
         at.line++;

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/memory.h"
@@ -30,9 +31,11 @@ static int parse_line(struct spl_service_options *options, const char *path, uns
                       bool given[SPL_PARAMETERS], struct spl_error *err)
 {
     char where[256], *text = trim(line, end), *equals = strchr(text, '=');
-    if (!*text || *text == '#')
+    if (!*text || (*text == '#' && !strchr(text, '\r')))
         return 0;
     snprintf(where, sizeof where, "%.200s, line %u: ", path, number);
+    if (strchr(text, '\r'))
+        return spl_fail(err, SPL_E_USAGE, "%sa carriage return in the middle; lines end in a newline, or in both", where);
     if (!equals)
         return spl_fail(err, SPL_E_USAGE, "%s'%.80s' is no 'name = value'", where, text);
     char *value = trim(equals + 1, equals + strlen(equals)), *name = trim(text, equals);
@@ -49,17 +52,21 @@ static int parse_line(struct spl_service_options *options, const char *path, uns
 int spl_service_options_parse(struct spl_service_options *options, const char *path, const char *data, size_t length,
                               struct spl_error *err)
 {
+    static const char mark[] = "\xef\xbb\xbf"; // what editors for Windows put first
     bool given[SPL_PARAMETERS] = {0};
-    if (memchr(data, '\0', length))
-        return spl_fail(err, SPL_E_USAGE, "%.200s is no text file: it holds a zero byte", path);
+    unsigned number = 1;
+    const char *zero = memchr(data, '\0', length);
+    for (const char *c = data; zero && c < zero; c++)
+        number += *c == '\n';
+    if (zero)
+        return spl_fail(err, SPL_E_USAGE, "%.200s, line %u: a zero byte; this is no text file", path, number);
     char *copy = spl_alloc_raw(length + 1, 1, err);
     if (!copy)
         return SPL_E_NOMEM;
     memcpy(copy, data, length);
     copy[length] = '\0';
     int rc = 0;
-    unsigned number = 1;
-    for (char *line = copy, *next; !rc && line < copy + length; line = next, number++) {
+    for (char *line = copy + (strncmp(copy, mark, sizeof mark - 1) ? 0 : sizeof mark - 1), *next; !rc && line < copy + length; line = next, number++) {
         char *end = strchrnul(line, '\n');
         next = end + 1;
         rc = parse_line(options, path, number, line, end, given, err);
@@ -70,13 +77,20 @@ int spl_service_options_parse(struct spl_service_options *options, const char *p
 
 int spl_service_options_read(struct spl_service_options *options, const char *path, struct spl_error *err)
 {
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    char *data = fd >= 0 ? spl_alloc_raw(config_max + 1, 1, err) : NULL;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO would wait for a writer
+    struct stat status;
     size_t length = 0;
     int rc = 0;
-    if (fd < 0)
-        return spl_fail(err, SPL_E_USAGE, "cannot open the config file '%.200s': %s", path, strerror(errno));
-    if (!data)
+    if (fd < 0 || fstat(fd, &status)) {
+        rc = spl_fail(err, SPL_E_USAGE, "cannot open the config file '%.200s': %s", path, strerror(errno));
+        if (fd >= 0)
+            close(fd);
+        return rc;
+    }
+    if (!S_ISREG(status.st_mode))
+        rc = spl_fail(err, SPL_E_USAGE, "the config file '%.200s' is no regular file", path);
+    char *data = rc ? NULL : spl_alloc_raw(config_max + 1, 1, err);
+    if (!rc && !data)
         rc = SPL_E_NOMEM;
     for (ssize_t got = 1; !rc && got > 0 && length <= config_max; length += got > 0 ? (size_t)got : 0) {
         got = read(fd, data + length, config_max + 1 - length);

@@ -134,7 +134,7 @@ int spl_ops_start(struct spl_service *service, struct spl_error *err)
         service->ops_fd = -1;
         spl_listen_print(fd, url, sizeof url);
     } else if (options->ops_listen[0]) {
-        rc = spl_listen("--ops-listen", options->ops_listen, &fd, url, sizeof url, &busy);
+        rc = spl_listen("ops-listen", options->ops_listen, &fd, url, sizeof url, &busy);
     } else {
         return 0;
     }

@@ -11,6 +11,8 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "service/access/host.h"
+#include "service/listen.h"
 
 const struct spl_parameter spl_parameters[SPL_PARAMETERS] = {
 #define PARAMETER(field, name, type, fallback, least, most, unit, text)                                                \
@@ -68,6 +70,57 @@ static bool parse_choice(const char *names, const char *text, uint64_t *out)
     return false;
 }
 
+static bool is_address(const char *text)
+{
+    char host[SPL_LISTEN_TEXT], *name, *port;
+    return spl_listen_split(text, host, &name, &port);
+}
+
+static bool is_address_or_none(const char *text)
+{
+    return !*text || is_address(text);
+}
+
+/* scheme "://" host [":" port], as a browser writes it. */
+static bool is_origin(const char *text)
+{
+    const char *authority = strstr(text, "://");
+    static const struct spl_text_list none;
+    return !strcmp(text, "*") || (authority && authority > text && spl_origin_is_ours(text, authority + 3, &none));
+}
+
+static bool is_name(const char *text)
+{
+    return !strcmp(text, "*") || spl_host_is_name(text);
+}
+
+static bool is_some(const char *text)
+{
+    return *text;
+}
+
+/* The forms of TEXT and LIST that can be told without looking outside; the first that fits counts. */
+static const struct form {
+    const char *unit, *name; // may be NULL: any parameter of that unit
+    bool (*is)(const char *text);
+    const char *shown;
+} forms[] = {
+    {"ADDR:PORT", "ops-listen", is_address_or_none, "ADDR:PORT such as 127.0.0.1:8081 or [::1]:8081, or nothing"},
+    {"ADDR:PORT", NULL, is_address, "ADDR:PORT such as 127.0.0.1:8080 or [::1]:8080"},
+    {"ORIGIN", NULL, is_origin, "an origin such as https://dash.example, or *"},
+    {"NAME", NULL, is_name, "a host's name without a port such as scans.example, or *"},
+    {"PATH", NULL, is_some, "a value (PATH)"},
+};
+
+/* NULL: anything goes. */
+static const struct form *form_of(const struct spl_parameter *parameter)
+{
+    for (size_t i = 0; i < sizeof forms / sizeof *forms; i++)
+        if (!strcmp(forms[i].unit, parameter->unit) && (!forms[i].name || !strcmp(forms[i].name, parameter->name)))
+            return &forms[i];
+    return NULL;
+}
+
 static int refuse(const struct spl_parameter *parameter, const char *text, const char *where, struct spl_error *err)
 {
     char range[160];
@@ -85,7 +138,7 @@ static int refuse(const struct spl_parameter *parameter, const char *text, const
                  parameter->type == SPL_PARAMETER_BYTES ? ", or such with K, M, G or T" : "");
         break;
     default:
-        snprintf(range, sizeof range, "a value (%s)", parameter->unit);
+        snprintf(range, sizeof range, "%s", form_of(parameter)->shown);
         break;
     }
     return spl_fail_field(err, SPL_E_USAGE, parameter->name, "%.200s%s takes %s, not '%.80s'", where, parameter->name,
@@ -136,10 +189,11 @@ int spl_service_options_set(struct spl_service_options *options, size_t index, c
     int rc = 0;
     switch (parameter->type) {
     case SPL_PARAMETER_TEXT:
-        rc = weaker ? 0 : set_text(out, text, err);
+        valid = !form_of(parameter) || form_of(parameter)->is(text);
+        rc = weaker || !valid ? 0 : set_text(out, text, err);
         break;
     case SPL_PARAMETER_LIST:
-        valid = *text;
+        valid = form_of(parameter)->is(text);
         if (!weaker && origin > options->origin[index])
             clear_list(out);
         rc = weaker || !valid ? 0 : add_item(out, text, err);
@@ -158,9 +212,40 @@ int spl_service_options_set(struct spl_service_options *options, size_t index, c
     }
     if (!valid)
         return refuse(parameter, text, where, err);
-    if (!rc && !weaker)
+    if (!rc && !weaker) {
         options->origin[index] = origin;
+        free(options->where[index]);
+        options->where[index] = origin == SPL_FROM_FILE ? strdup(where) : NULL; // without memory only a message is less
+    }
     return rc;
+}
+
+void spl_service_options_locate(const struct spl_service_options *options, const char *name, char *out,
+                                size_t capacity)
+{
+    size_t index = spl_parameter_find(name);
+    bool known = index < SPL_PARAMETERS && options->where[index];
+    snprintf(out, capacity, "%s", known ? options->where[index] : "");
+}
+
+int spl_service_options_check(const struct spl_service_options *options, struct spl_error *err)
+{
+    const enum spl_origin *origin = options->origin;
+    size_t port = strlen(options->listen) - 2;
+    if (*options->url_key && !*options->tokens)
+        return spl_fail_field(err, SPL_E_USAGE, "url-key", "--url-key without --tokens: everybody may view anyway");
+    if (!strcmp(options->listen, options->ops_listen) && strcmp(options->listen + port, ":0"))
+        return spl_fail_field(err, SPL_E_USAGE, "ops-listen", "--ops-listen takes another address than --listen, not '%s'",
+                              options->ops_listen);
+    if (origin[SPL_PARAMETER_connections_per_address] && options->connections_per_address > options->connections)
+        return spl_fail_field(err, SPL_E_USAGE, "connections-per-address",
+                              "--connections-per-address takes at most what --connections allows in all, %" PRIu64
+                              ", not %" PRIu64, options->connections, options->connections_per_address);
+    if (options->rate_limit_total && options->rate_limit > options->rate_limit_total)
+        return spl_fail_field(err, SPL_E_USAGE, "rate-limit",
+                              "--rate-limit takes at most what --rate-limit-total allows all addresses together, %" PRIu64
+                              ", not %" PRIu64, options->rate_limit_total, options->rate_limit);
+    return 0;
 }
 
 int spl_service_options_init(struct spl_service_options *options, struct spl_error *err)
@@ -178,6 +263,7 @@ int spl_service_options_init(struct spl_service_options *options, struct spl_err
 void spl_service_options_finish(struct spl_service_options *options)
 {
     for (size_t i = 0; i < SPL_PARAMETERS; i++) {
+        free(options->where[i]);
         if (spl_parameters[i].type == SPL_PARAMETER_TEXT)
             free(*(char **)member(options, i));
         if (spl_parameters[i].type == SPL_PARAMETER_LIST)

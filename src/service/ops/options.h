@@ -51,6 +51,7 @@ struct spl_service_options {
 #include "service/ops/params.def"
 #undef PARAMETER
     enum spl_origin origin[SPL_PARAMETERS];
+    char *where[SPL_PARAMETERS]; // may be NULL; "FILE, line 3: " of what a file has set last
 };
 
 struct spl_parameter {
@@ -78,8 +79,16 @@ size_t spl_parameter_find(const char *name);
 int spl_service_options_set(struct spl_service_options *options, size_t index, const char *text, enum spl_origin origin,
                             const char *where, struct spl_error *err);
 
+/* What no value alone can say: those that contradict each other. SPL_E_USAGE with the field. Opens nothing. */
+int spl_service_options_check(const struct spl_service_options *options, struct spl_error *err);
+
+/* "FILE, line 3: " where a file has set parameter `name`, else "". */
+void spl_service_options_locate(const struct spl_service_options *options, const char *name, char *out,
+                                size_t capacity);
+
 /* Reads a config file: lines `name = value`, blank lines, and lines whose first character is '#'. Space around name and
  * value is dropped, everything else of the value is kept as it stands. A name may be given once, a LIST several times.
+ * Line ends may be CRLF, a byte order mark may come first. A regular file of at most 1 MiB.
  * SPL_E_USAGE with file, line, name and value. Blocks on disk. */
 int spl_service_options_read(struct spl_service_options *options, const char *path, struct spl_error *err);
 

@@ -14,6 +14,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "dataset/dataset.h"
 #include "service/view/key.h"
 #include "service/view/stages.h"
 
@@ -108,7 +109,15 @@ static int build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
     struct spl_catalog_entry *entry, *next;
-    int rc = spl_renderer_create(&pipeline->options.renderer, &gpu->renderer, err);
+    struct spl_renderer_options options = pipeline->options.renderer;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        size_t bytes = 0;
+        spl_dataset_get_page(entry->dataset, 0, &bytes);
+        if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
+            options.first_page_bytes = bytes + 4;
+    }
+    int rc = spl_renderer_create(&options, &gpu->renderer, err);
     spl_pipeline_touch(pipeline);
     if (rc)
         return rc;

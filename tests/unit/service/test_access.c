@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "service/access/buckets.h"
 #include "service/access/secret.h"
+#include "service/access/host.h"
 #include "service/access/sign.h"
 #include "service/access/tokens.h"
 
@@ -190,17 +191,56 @@ static void urls_are_signed_with_or_without_host_and_query(void **state)
     assert_int_equal(check(&key, path, 0, &kept, &err), 0);
     assert_int_equal(kept, 0);
     free(whole);
-    assert_int_equal(spl_sign_url(&key, "/v1/x?from=http://y/z", expires, &whole, &err), 0);
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?from=http://y/z", expires, &whole, &err), 0);
     assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
     free(whole);
     const char *const bad[] = {"",     "v1/x", "https://host", "https://host?/x", "://h/x",
-                               "/a#b", "/a b", path,           "/a?exp=3"};
+                               "/a#b", "/a b", path,           "/v1/datasets/a?exp=3",
+                               "/v1/datasets/a#b", "/v1/datasets/a b", "/v1/datasets", "/v1/datasets/a/tours",
+                               "/embed/a?x=1", "/embed/a?", "/embed/%4", "/embed/a/b", "/v1/status"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         err = (struct spl_error){0};
         assert_int_equal(spl_sign_url(&key, bad[i], expires, &whole, &err), SPL_E_USAGE);
         assert_null(whole);
     }
     free(path);
+    spl_sign_key_finish(&key);
+}
+
+/* printf '/embed/wall?exp=2000000000' | openssl dgst -sha256 -hmac KEY -binary | basenc --base64url */
+#define EMBED_SIG "uGFR9oN68ejwIId_oJQIftuQOqh13V6-6sa9ooo_RZc"
+
+static void a_signed_page_passes_its_signature_on(void **state)
+{
+    (void)state;
+    struct spl_sign_key key = make_key(KEY);
+    struct spl_error err = {0};
+    char *url = NULL;
+    size_t kept = 7;
+    assert_int_equal(spl_sign_url(&key, "https://h/embed/w%61ll#eye=1,2,3", expires, &url, &err), 0);
+    assert_string_equal(url, "https://h/embed/w%61ll?exp=2000000000&sig=" EMBED_SIG "#eye=1,2,3");
+    free(url);
+    static const char *const good[] = {"/v1/datasets/wall?exp=2000000000&embed=" EMBED_SIG,
+                                       "/v1/datasets/w%61ll/pick?exp=2000000000&embed=" EMBED_SIG,
+                                       "/embed/wall?exp=2000000000&sig=" EMBED_SIG};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        assert_int_equal(check(&key, good[i], expires, &kept, &err), 0);
+        assert_int_equal(kept, 0);
+    }
+    assert_int_equal(check(&key, "/v1/datasets/wall/view?eye=1&exp=2000000000&embed=" EMBED_SIG, 0, &kept, &err), 0);
+    assert_int_equal(kept, strlen("eye=1"));
+    static const char *const bad[] = {"/v1/datasets/walls/view?exp=2000000000&embed=" EMBED_SIG,
+                                      "/v1/datasets/wall?exp=2000000001&embed=" EMBED_SIG,
+                                      "/v1/datasets/wall?exp=02000000000&embed=" EMBED_SIG,
+                                      "/v1/datasets/wall?exp=2000000000&sig=" EMBED_SIG,
+                                      "/v1/datasets/wall?embed=" EMBED_SIG,
+                                      "/v1/datasets/%?exp=2000000000&embed=" EMBED_SIG,
+                                      "/v1/tours/wall?exp=2000000000&embed=" EMBED_SIG,
+                                      "/wall?exp=2000000000&embed=" EMBED_SIG};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_int_equal(check(&key, bad[i], 0, &kept, &err), SPL_E_INPUT);
+    assert_int_equal(check(&key, good[0], expires + 1, &kept, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "exp");
     spl_sign_key_finish(&key);
 }
 
@@ -272,6 +312,39 @@ static void a_table_full_of_addresses_still_works(void **state)
     spl_buckets_destroy(buckets);
 }
 
+static void a_host_is_an_address_or_a_name_that_is_listed(void **state)
+{
+    (void)state;
+    char *items[] = {"Scans.example.", "[2001:db8::1]", "*", "not a name"};
+    const struct spl_text_list none = {0}, some = {items, 2}, any = {items, 4};
+    static const char *const bad[] = {"", ":80", ".", "..", "a..", "[", "[]", "[::1", "[::1]x", "[::1]:x", "[a]", "::1",
+                                      "a b", "a/b", "a@b", "a:1:2", "a:80x", "a,b", "\xc3\xa4.example", "a%2e", "a#b"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_false(spl_host_is_name(bad[i]));
+        assert_false(spl_host_is_ours(bad[i], &any));
+    }
+    char longest[300];
+    memset(longest, 'a', sizeof longest);
+    longest[254] = '\0';
+    assert_false(spl_host_is_ours(longest, &any));
+    longest[253] = '\0';
+    assert_true(spl_host_is_ours(longest, &any) && !spl_host_is_ours(longest, &some));
+    static const char *const ours[] = {"127.0.0.1", "1.2.3.4:80", "1.2.3.4.", "[::]", "[::1]:8080", "LOCALHOST.:1"};
+    for (size_t i = 0; i < sizeof ours / sizeof *ours; i++)
+        assert_true(spl_host_is_ours(ours[i], &none));
+    assert_false(spl_host_is_ours("scans.example", &none));
+    assert_true(spl_host_is_ours("scans.EXAMPLE:1", &some) && !spl_host_is_ours("x.scans.example", &some));
+    assert_true(spl_host_is_name("a.b-c_d") && spl_host_is_name("[::1]") && spl_host_is_name("10.0.0.1"));
+    assert_false(spl_host_is_name("a:80") || spl_host_is_name("[::1]:80"));
+
+    assert_true(spl_origin_is_ours("https://a:1", "A:1", &none) && spl_origin_is_ours("http://[::1]:8", "[::1]:8", &none));
+    assert_true(spl_origin_is_ours("http://scans.example:8443", "127.0.0.1", &some));
+    static const char *const foreign[] = {"null", "", "https://b", "https://a:2", "https://a", "a:1", "https://a:1/",
+                                          "https://x@a:1", "file://", "https://a:1.evil"};
+    for (size_t i = 0; i < sizeof foreign / sizeof *foreign; i++)
+        assert_false(spl_origin_is_ours(foreign[i], "a:1", &any) || spl_origin_is_ours(foreign[i], NULL, &some));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -280,9 +353,11 @@ int main(void)
         cmocka_unit_test(digests_are_those_of_the_standards),
         cmocka_unit_test(signed_urls_hold_until_they_expire_and_not_when_changed),
         cmocka_unit_test(urls_are_signed_with_or_without_host_and_query),
+        cmocka_unit_test(a_signed_page_passes_its_signature_on),
         cmocka_unit_test(keys_that_are_too_short_are_refused),
         cmocka_unit_test(buckets_empty_and_fill_again),
         cmocka_unit_test(a_table_full_of_addresses_still_works),
+        cmocka_unit_test(a_host_is_an_address_or_a_name_that_is_listed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

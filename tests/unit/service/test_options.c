@@ -60,6 +60,20 @@ static void bad_lines_say_where_and_what(void **state)
         {"deadlin = 5", {"line 1", "'deadlin'", "--help"}},
         {"queue 5", {"line 1", "'queue 5'", "name = value"}},
         {"= 5", {"line 1", "''"}},
+        {"[server]\nqueue = 5", {"line 1", "'[server]'", "name = value"}},
+        {"# a\r\n\r\nqueue = 0\r\n", {"line 3", "queue", "'0'"}},
+        {"# a\rqueue = 5\r", {"line 1", "carriage return"}},
+        {"queue = 5\n\xef\xbb\xbf" "encoders = 1", {"line 2", "no parameter"}},
+        {"\n\nlisten = nonsense", {"x.conf, line 3: listen takes ADDR:PORT", "127.0.0.1:8080", "'nonsense'"}},
+        {"listen =", {"line 1: listen takes", "''"}},
+        {"listen = 1.2.3.4:65536", {"line 1: listen takes", "'1.2.3.4:65536'"}},
+        {"listen = ::1:80", {"line 1: listen takes", "[::1]:8080"}},
+        {"ops-listen = 8081", {"line 1: ops-listen takes", "'8081'"}},
+        {"cors = dash.example", {"line 1: cors takes", "https://dash.example", "'dash.example'"}},
+        {"cors = https://dash.example/", {"line 1: cors takes"}},
+        {"cors = https://", {"line 1: cors takes"}},
+        {"host-name = scans.example:8080", {"line 1: host-name takes", "'scans.example:8080'"}},
+        {"host-name = https://scans.example", {"line 1: host-name takes"}},
         {"queue = 5\nencoders = 1\nqueue = 6", {"line 3", "queue", "second", "'6'"}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -72,7 +86,8 @@ static void bad_lines_say_where_and_what(void **state)
         begin(NULL);
     }
     struct spl_error err = {0};
-    assert_int_equal(spl_service_options_parse(&options, "x.conf", "queue = 5\0", 10, &err), SPL_E_USAGE);
+    assert_int_equal(spl_service_options_parse(&options, "x.conf", "\nqueue = 5\0", 11, &err), SPL_E_USAGE);
+    assert_non_null(strstr(err.message, "x.conf, line 2"));
     assert_int_equal(spl_service_options_read(&options, "/no/such.conf", NULL), SPL_E_USAGE);
     assert_int_equal(spl_service_options_read(&options, "/", NULL), SPL_E_USAGE);
 }
@@ -81,7 +96,7 @@ static void a_file_sets_every_type(void **state)
 {
     (void)state;
     struct spl_error err = {0};
-    const char *text = " queue=7 \r\n\t# comment\n\nmemory-limit = 3G\nrequire-gpu = true\nverify = false\n"
+    const char *text = "\xef\xbb\xbf queue=7 \r\n\t# comment\n\nmemory-limit = 3G\nrequire-gpu = true\nverify = false\n"
                        "log-level = debug\ndevice = part of a # name\ndataset = /a b/x.spld\ndataset = y";
     assert_int_equal(parse(text, &err), 0);
     assert_int_equal(options.queue, 7);
@@ -93,6 +108,42 @@ static void a_file_sets_every_type(void **state)
     assert_string_equal(options.datasets.items[0], "/a b/x.spld");
     assert_string_equal(options.datasets.items[1], "y");
     assert_int_equal(options.deadline_ms, 10000); // not in the file
+}
+
+/* Each alone is in its range. */
+static void values_that_contradict_each_other_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *field, *said;
+    } cases[] = {
+        {"url-key = k", "url-key", "tokens"},
+        {"listen = 127.0.0.1:8080\nops-listen = 127.0.0.1:8080", "ops-listen", "127.0.0.1:8080"},
+        {"ops-listen = 127.0.0.1:8080", "ops-listen", "listen"},
+        {"connections = 5\nconnections-per-address = 6", "connections-per-address", "5"},
+        {"rate-limit = 9\nrate-limit-total = 8", "rate-limit", "8"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_error err = {0};
+        assert_int_equal(parse(cases[i].text, NULL), 0);
+        assert_int_equal(spl_service_options_check(&options, &err), SPL_E_USAGE);
+        assert_string_equal(err.field, cases[i].field);
+        assert_non_null(strstr(err.message, cases[i].said));
+        char where[300];
+        spl_service_options_locate(&options, cases[i].field, where, sizeof where);
+        assert_memory_equal(where, "x.conf, line ", 13);
+        end(NULL);
+        begin(NULL);
+    }
+    assert_int_equal(parse("connections = 5\nlisten = 127.0.0.1:0\nops-listen = 127.0.0.1:0\ntokens = t\nurl-key = k\n"
+                           "rate-limit = 9\ncors = *\ncors = http://[::1]:8\nhost-name = a.b\nhost-name = *", NULL), 0);
+    assert_int_equal(spl_service_options_check(&options, NULL), 0);
+    char where[300];
+    set_flag(SPL_PARAMETER_rate_limit, "1");
+    for (int i = 0; i < 3; i++) { // of a flag, a default, no parameter
+        spl_service_options_locate(&options, ((const char *[]){"rate-limit", "queue", "frobnicate"})[i], where, sizeof where);
+        assert_string_equal(where, "");
+    }
 }
 
 static void flags_win_over_the_file_in_either_order(void **state)
@@ -163,6 +214,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(bad_lines_say_where_and_what, begin, end),
         cmocka_unit_test_setup_teardown(a_file_sets_every_type, begin, end),
+        cmocka_unit_test_setup_teardown(values_that_contradict_each_other_are_refused, begin, end),
         cmocka_unit_test_setup_teardown(flags_win_over_the_file_in_either_order, begin, end),
         cmocka_unit_test_setup_teardown(every_row_is_sound_and_shown, begin, end),
     };
