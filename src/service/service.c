@@ -6,6 +6,7 @@
 #include "service/service.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -239,15 +240,25 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
     return spl_pipeline_create(&options, &service->pipeline, err);
 }
 
-/* Where tours go must be a folder that can be written, or datasets are loaded in vain. */
+/* Where tours go must be a folder that can be written, or one that open.c can make, or datasets are loaded in vain. */
 static int check_folder(const char *path, struct spl_error *err)
 {
     struct stat status;
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/')
+        length--;
+    const char *slash = memrchr(path, '/', length);
+    char parent[PATH_MAX];
     if (!*path)
         return 0;
-    if (stat(path, &status) || access(path, W_OK | X_OK))
-        return spl_fail_field(err, SPL_E_USAGE, "tours", "cannot write to '%.200s': %s", path, strerror(errno));
-    return S_ISDIR(status.st_mode) ? 0 : spl_fail_field(err, SPL_E_USAGE, "tours", "'%.200s' is no folder", path);
+    snprintf(parent, sizeof parent, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+    bool missing = stat(path, &status) && errno == ENOENT;
+    if (access(missing ? parent : path, W_OK | X_OK))
+        return spl_fail_field(err, SPL_E_USAGE, "tours", "the tours' folder '%.200s' cannot be %s: %s", path,
+                              missing ? "made" : "written", strerror(errno));
+    if (!missing && !S_ISDIR(status.st_mode))
+        return spl_fail_field(err, SPL_E_USAGE, "tours", "the tours' folder '%.200s' is no folder", path);
+    return 0;
 }
 
 /* Everything that can be known before a socket is opened. The supervisor's are open already. */

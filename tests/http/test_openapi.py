@@ -47,7 +47,8 @@ def test_the_document_is_sound():
 def test_what_is_not_documented_is_found():
     def fault_of(method, target, status=200, headers={}, body=b"", sent=None):
         message = http.client.HTTPMessage()  # names without regard to case
-        for name, text in {"Content-Type": "application/json", "X-Request-Id": "1", **headers}.items():
+        for name, text in {"Content-Type": "application/json", "X-Request-Id": "1", "X-Content-Type-Options": "nosniff",
+                           **headers}.items():
             message[name] = text
         reply = harness.Reply(status, message, body)
         try:
