@@ -1,5 +1,6 @@
-/* make_wall [--small | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half), two
- * levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. --knot makes what takes long to open. */
+/* make_wall [--small | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half),
+ * two levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms. --knot makes what takes long to
+ * open. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

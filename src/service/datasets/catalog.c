@@ -150,8 +150,8 @@ static void open_range(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     struct opening *opening = context;
     for (size_t i = begin; i < end; i++)
-        spl_catalog_entry_open(opening->files->items[i].path, opening->verify, opening->cancelled,
-                               &opening->entries[i], &opening->errors[i]);
+        spl_catalog_entry_open(opening->files->items[i].path, opening->verify, opening->cancelled, &opening->entries[i],
+                               &opening->errors[i]);
 }
 
 /* Puts one opened file into its slot; takes the entry. */

@@ -45,7 +45,8 @@ static void refuse(struct spl_catalog_slot *slot, const struct spl_error *err)
     slot->next = NULL;
     spl_catalog_set_reason(slot, err->message);
     if (strcmp(before, slot->reason))
-        spl_log_warn("dataset %s %s: %s", slot->id, slot->current ? "keeps its version" : "is not served", err->message);
+        spl_log_warn("dataset %s %s: %s", slot->id, slot->current ? "keeps its version" : "is not served",
+                     err->message);
 }
 
 static void free_opening(struct opening *opening)

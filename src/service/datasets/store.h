@@ -22,7 +22,8 @@ int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct
 int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err);
 
 /* Syncs and verifies the file, renames it to `target` and opens it there: the caller owns *entry. SPL_E_INPUT or
- * SPL_E_CORRUPT for what is no dataset, SPL_E_CANCELLED once *cancelled (for the entry's life) is set. Ends `incoming`. */
+ * SPL_E_CORRUPT for what is no dataset, SPL_E_CANCELLED once *cancelled (for the entry's life) is set. Ends `incoming`.
+ */
 int spl_incoming_commit(struct spl_incoming *incoming, const char *target, const atomic_bool *cancelled,
                         struct spl_catalog_entry **entry, struct spl_file_mark *mark, struct spl_error *err);
 
