@@ -43,7 +43,8 @@ static int map_file(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct stat status;
     int fd, rc = SPL_OK;
-    if (!stat(dataset->path, &status) && !S_ISREG(status.st_mode)) /* opening a device or a FIFO is seen at its other end */
+    if (!stat(dataset->path, &status) &&
+        !S_ISREG(status.st_mode)) /* opening a device or a FIFO is seen at its other end */
         return spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
     fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0 && errno == ENOENT)
@@ -194,7 +195,8 @@ int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_er
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err)
 {
-    const size_t block = section->bytes < 1 << 20 ? (size_t)section->bytes : 1 << 20; /* a file may have many small ones */
+    const size_t block =
+        section->bytes < 1 << 20 ? (size_t)section->bytes : 1 << 20; /* a file may have many small ones */
     void *buffer = spl_alloc_raw(block, 1, err);
     XXH3_state_t *state = buffer ? XXH3_createState() : NULL;
     int rc = state ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory for checksums");

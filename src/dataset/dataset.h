@@ -11,8 +11,8 @@
 #include "dataset/format.h"
 #include "sparse/dictionary.h"
 
-/* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL) with
- * SPL_E_CANCELLED, as later does whatever else takes long with the dataset. */
+/* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL)
+ * with SPL_E_CANCELLED, as later does whatever else takes long with the dataset. */
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err);
 

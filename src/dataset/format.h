@@ -13,6 +13,7 @@
 #define SPL_PAGE_BYTES (16u << 20) /* target; a page is at most SPL_PAGE_BYTES_MAX */
 #define SPL_PAGE_BYTES_MAX (64u << 20)
 #define SPL_NODE_CHUNKS_MAX 4096u
+#define SPL_META_BYTES_MAX (8u << 20) /* JSON takes some fifty times as much memory at worst */
 
 struct spl_file_header { /* at offset 0 */
     char magic[8];

@@ -14,7 +14,6 @@
 #include "dataset/open.h"
 
 enum { section_alignment = 64, table_alignment = 8 };
-#define META_BYTES_MAX (64u << 20)
 
 static int corrupt(const struct spl_dataset *dataset, struct spl_error *err, const char *what, const char *why)
 {
@@ -181,8 +180,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
                        : !nodes               ? "lists no section NODE"
                        : !chunks              ? "lists no section CHNK"
                                               : "lists no section PAGE");
-    if (dataset->meta_section->bytes > META_BYTES_MAX)
-        return corrupt(dataset, err, "section META", "is larger than 64 MiB");
+    if (dataset->meta_section->bytes > SPL_META_BYTES_MAX)
+        return corrupt(dataset, err, "section META", "is larger than 8 MiB");
     if (!nodes->bytes || nodes->bytes % sizeof(struct spl_node) || nodes->bytes / sizeof(struct spl_node) > UINT32_MAX)
         return corrupt(dataset, err, "section NODE", "is not a whole number of nodes");
     if (!chunks->bytes || chunks->bytes % sizeof(struct spl_chunk) ||

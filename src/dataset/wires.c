@@ -3,8 +3,8 @@
  * sides are parts of. Pieces are never changed once they are there: under the mutex they come, without it they are
  * read.
  *
- * All of it is bounded by the file's size, not by what the file says of itself, and ends early where nobody waits for it
- * any more. */
+ * All of it is bounded by the file's size, not by what the file says of itself, and ends early where nobody waits for
+ * it any more. */
 #include "dataset/wires.h"
 
 #include <math.h>
@@ -18,8 +18,8 @@
 
 enum { block_pieces = SPL_WIRES_BLOCK, halves_most = 16 };
 /* What a file may cost by its size, whatever it says about itself: several times what scans of nothing but wires do. */
-enum { point_bytes = 2 };                     /* more points than that are not gathered */
-enum { byte_steps = 512, piece_steps = 512 }; /* 10 to 20 ns each; a piece's are for its memory */
+enum { point_bytes = 2 };                      /* more points than that are not gathered */
+enum { byte_steps = 512, piece_steps = 512 };  /* 10 to 20 ns each; a piece's are for its memory */
 static const uint64_t steps_most = 1ull << 33; /* of any file: some two minutes */
 static const double straight = 8; /* spacings that half a piece over a gap is long */
 

@@ -336,7 +336,10 @@ int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct sp
     char *text = json_dumps(meta, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->path);
-    int rc = write_rest(writer, nodes, node_count, chunks, chunk_count, text, err);
+    int rc = strlen(text) > SPL_META_BYTES_MAX
+                 ? spl_fail(err, SPL_E_LIMIT, "what describes the dataset has %zu bytes, a file takes %u", strlen(text),
+                            SPL_META_BYTES_MAX)
+                 : write_rest(writer, nodes, node_count, chunks, chunk_count, text, err);
     if (!rc && fsync(writer->fd))
         rc = spl_fail_errno(err, errno, "cannot sync %s", writer->part_path);
     if (!rc && rename(writer->part_path, writer->path))

@@ -27,8 +27,8 @@ static void write_anew(const char *path, const struct spl_dataset *dataset, stru
     const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
     const uint32_t *words = spl_dataset_get_page(dataset, 0, &bytes);
     spl_assert(nodes == 1 && !spl_dataset_writer_create(path, &writer, NULL));
-    spl_assert(!spl_dataset_writer_add_node(writer, words, bytes / sizeof *words - SPL_PAGE_TAIL_WORDS, NULL, 0, &page,
-                                            NULL));
+    spl_assert(
+        !spl_dataset_writer_add_node(writer, words, bytes / sizeof *words - SPL_PAGE_TAIL_WORDS, NULL, 0, &page, NULL));
     spl_assert(!spl_dataset_writer_finish(writer, node, 1, chunks, count, spl_dataset_get_meta(dataset), NULL));
     spl_dataset_writer_destroy(writer);
 }

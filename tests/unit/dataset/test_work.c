@@ -44,8 +44,7 @@ static void a_straight_wire_is_joined_to_its_end(void **state)
     enum { count = 100000 };
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (int i = 0; i < count; i++)
-        splats[i] = (struct make_splat){
-            .position = {0.02 * i}, .normal = {0, 0, 1}, .radius = 0.01f, .linear = true};
+        splats[i] = (struct make_splat){.position = {0.02 * i}, .normal = {0, 0, 1}, .radius = 0.01f, .linear = true};
     struct spl_dataset *dataset = make_dataset(splats, count);
     const struct spl_wires *wires;
     assert_int_equal(spl_dataset_get_wires(dataset, &wires, NULL), SPL_OK);
