@@ -7,7 +7,7 @@
 // dataset  its id
 // label    what screen readers call the view
 // token    where the service wants one; whoever sees the page sees it, so let it allow no more than view
-// signed   in its place, what `splatd sign /embed/ID` puts behind '?': exp=…&sig=…, good for this dataset until it expires
+// signed   in its place, what `splatd sign /embed/ID` puts behind '?': exp=…&sig=…, for this dataset until it expires
 // eye, target, up, fov, layer, method, visibility, kernel, threshold, pyramid, lod, supersample, atoms, budget
 //          as parameters of a view; changing one moves the view
 //
@@ -63,8 +63,8 @@ class SplatView extends HTMLElement {
     if (!dataset) return;
     const given = SETTINGS.filter((name) => this.hasAttribute(name));
     const fragment = given.map((name) => `${name}=${encodeURIComponent(this.getAttribute(name))}`).join("&");
-    const path = `/embed/${encodeURIComponent(dataset)}${this.hasAttribute("signed") ? `?${this.getAttribute("signed")}` : ""}`;
-    const page = new URL(path, this.getAttribute("src") || HOME).href;
+    const signed = this.hasAttribute("signed") ? `?${this.getAttribute("signed")}` : "";
+    const page = new URL(`/embed/${encodeURIComponent(dataset)}${signed}`, this.getAttribute("src") || HOME).href;
     this.#frame.title = this.getAttribute("label") || `View of ${dataset}`;
     // A frame that is there already is told by its fragment alone, without an entry in the history.
     if (page === this.#page) this.#frame.contentWindow.location.replace(`${page}#${fragment}`);

@@ -93,7 +93,7 @@ struct spl_renderer_options {
     bool debug;                 /* validation layers, GL debug output */
     uint64_t memory_limit;      /* bytes of device memory, 0 = 3/4 of what the device reports */
     uint64_t scratch_samples;   /* largest tile in samples, 0 = 4 Mi */
-    uint64_t first_page_bytes;  /* most of what the datasets to come cannot do without, for the least limit; 0 = unknown */
+    uint64_t first_page_bytes;  /* largest first page of datasets to come, for the least limit; 0 = unknown */
 };
 
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */

@@ -48,8 +48,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         working += taken(wanted[i].bytes);
     if (working > limits->memory_bytes) // a page that has no room is its dataset's business
         return spl_fail_field(err, SPL_E_LIMIT, "memory-limit",
-                              "memory-limit, %" PRIu64 " bytes of device memory, is too little: working memory takes %" PRIu64
-                              ", and the largest dataset's first page %" PRIu64 "; it takes at least %" PRIu64,
+                              "memory-limit, %" PRIu64 " bytes of device memory, is too little: working memory takes %"
+                              PRIu64 ", and the largest dataset's first page %" PRIu64 "; it takes at least %" PRIu64,
                               limits->memory_bytes, working, page, working + page);
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         int rc = wanted[i].bytes ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)

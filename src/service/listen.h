@@ -18,7 +18,8 @@ bool spl_listen_split(const char *address, char out[SPL_LISTEN_TEXT], char **hos
 int spl_listen_is_local(const char *field, const char *address, bool *local, struct spl_error *err);
 bool spl_sockaddr_is_local(const struct sockaddr *address);
 
-/* Binds and listens. `field` is the parameter at fault in errors; `address` is HOST:PORT or [IPv6]:PORT; port 0 takes a free one. On success
+/* Binds and listens. `field` is the parameter at fault in errors; `address` is HOST:PORT or [IPv6]:PORT; port 0 takes a
+ * free one. On success
  * *fd belongs to the caller and `url` says where it is reachable, with the port that was taken. */
 int spl_listen(const char *field, const char *address, int *fd, char *url, size_t url_capacity, struct spl_error *err);
 

@@ -91,7 +91,8 @@ void spl_show_embed(struct request *request, const struct spl_call *call)
 {
     (void)call; // the page asks for its dataset itself, and can then say what is wrong with it, or with its signature
     const char *query = request->query, *second = strchr(query, '&');
-    if (*query && (strncmp(query, "exp=", 4) || !second || second != strrchr(query, '&') || strncmp(second, "&sig=", 5))) {
+    if (*query &&
+        (strncmp(query, "exp=", 4) || !second || second != strrchr(query, '&') || strncmp(second, "&sig=", 5))) {
         spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "",
                           "the page takes camera and settings behind '#', and no parameters but those of splatd sign");
         return;

@@ -11,7 +11,8 @@ struct spl_call;
 struct spl_access;
 
 /* Reads what the options name: tokens, the key of URLs, rates. Refuses an address that others can reach where anybody
- * might do anything and nobody has said so; it is called before that is opened, or with the socket that was passed. service->access stays NULL where there is nothing to check. */
+ * might do anything and nobody has said so; it is called before that is opened, or with the socket that was passed.
+ * service->access stays NULL where there is nothing to check. */
 int spl_access_init(struct spl_service *service, struct spl_error *err);
 void spl_access_finish(struct spl_service *service); /* idempotent */
 

@@ -47,8 +47,8 @@ bool spl_door_check_host(struct request *request, bool anonymous)
     if (!anonymous || !host || spl_host_is_ours(host, &request->service->options->host_names))
         return true;
     snprintf(detail, sizeof detail,
-             "this service is not known here as '%.200s'; start it with --host-name NAME if that name is its own, or ask "
-             "by an address or localhost", host);
+             "this service is not known here as '%.200s'; start it with --host-name NAME if that name is its own, or "
+             "ask by an address or localhost", host);
     return refuse(request, MHD_HTTP_MISDIRECTED_REQUEST, "host", MHD_HTTP_HEADER_HOST, detail);
 }
 
@@ -76,8 +76,8 @@ bool spl_door_check_origin(struct request *request)
         spl_origin_is_ours(origin, get_header(request, MHD_HTTP_HEADER_HOST), &request->service->options->host_names))
         return true;
     return refuse(request, MHD_HTTP_FORBIDDEN, "forbidden", MHD_HTTP_HEADER_ORIGIN,
-                  "pages of other origins change nothing here; start the service with --cors ORIGIN if that page may, or "
-                  "send a token");
+                  "pages of other origins change nothing here; start the service with --cors ORIGIN if that page may, "
+                  "or send a token");
 }
 
 bool spl_door_check_preflight(struct request *request, const char *method)

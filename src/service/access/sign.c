@@ -172,7 +172,8 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
                         "/profile, and the page /embed/ID; anything else needs a token", url);
     if (page && path[length] == '?')
         return spl_fail(err, SPL_E_USAGE,
-                        "'%.200s' cannot be signed: /embed/ID takes camera and settings behind '#', not behind '?'", url);
+                        "'%.200s' cannot be signed: /embed/ID takes camera and settings behind '#', not behind '?'",
+                        url);
     if (!page && strchr(path, '#'))
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: only /embed/ID has something behind '#'", url);

@@ -1,7 +1,7 @@
 /* URLs that carry their own permission: ...?PARAMETERS&exp=UNIX-SECONDS&sig=SIGNATURE, where SIGNATURE is base64url of
  * HMAC-SHA-256 over everything from the path's '/' to the last byte before "&sig=", as it stands in the request.
  *
- * A signed page, /embed/ID?exp=…&sig=SIGNATURE, lets its reader look at dataset ID as he likes: the page's requests under
+ * A signed page, /embed/ID?exp=…&sig=SIGNATURE, lets its reader look at dataset ID at will: the page's requests under
  * /v1/datasets/ID end in &exp=UNIX-SECONDS&embed=SIGNATURE, the same two values. The signed text is
  * /embed/ID?exp=UNIX-SECONDS with the ID decoded, so it is no other URL's, and says of which dataset and how long. Pure
  * functions but for the reading of the key; any thread. */
@@ -26,7 +26,7 @@ void spl_sign_key_finish(struct spl_sign_key *key);
 /* Does a query have the form of a signed one: is its last parameter sig or embed? */
 bool spl_sign_is_signed(const char *query);
 
-/* Is `path`[0..length) something that a signature can allow to GET: a dataset, its profile, views and picks, its page? */
+/* Can a signature allow to GET `path`[0..length): a dataset, its profile, views and picks, its page? */
 bool spl_sign_covers(const char *path, size_t length);
 
 /* Checks the signature of `path`?`query` and that it has not expired at `now_s`, Unix time. On success *kept is the

@@ -35,7 +35,7 @@ static int parse_line(struct spl_service_options *options, const char *path, uns
         return 0;
     snprintf(where, sizeof where, "%.200s, line %u: ", path, number);
     if (strchr(text, '\r'))
-        return spl_fail(err, SPL_E_USAGE, "%sa carriage return in the middle; lines end in a newline, or in both", where);
+        return spl_fail(err, SPL_E_USAGE, "%sa carriage return in its middle; lines end in newline or CRLF", where);
     if (!equals)
         return spl_fail(err, SPL_E_USAGE, "%s'%.80s' is no 'name = value'", where, text);
     char *value = trim(equals + 1, equals + strlen(equals)), *name = trim(text, equals);
@@ -66,7 +66,8 @@ int spl_service_options_parse(struct spl_service_options *options, const char *p
     memcpy(copy, data, length);
     copy[length] = '\0';
     int rc = 0;
-    for (char *line = copy + (strncmp(copy, mark, sizeof mark - 1) ? 0 : sizeof mark - 1), *next; !rc && line < copy + length; line = next, number++) {
+    char *first = copy + (strncmp(copy, mark, sizeof mark - 1) ? 0 : sizeof mark - 1);
+    for (char *line = first, *next; !rc && line < copy + length; line = next, number++) {
         char *end = strchrnul(line, '\n');
         next = end + 1;
         rc = parse_line(options, path, number, line, end, given, err);

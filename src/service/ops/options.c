@@ -235,7 +235,7 @@ int spl_service_options_check(const struct spl_service_options *options, struct 
     if (*options->url_key && !*options->tokens)
         return spl_fail_field(err, SPL_E_USAGE, "url-key", "--url-key without --tokens: everybody may view anyway");
     if (!strcmp(options->listen, options->ops_listen) && strcmp(options->listen + port, ":0"))
-        return spl_fail_field(err, SPL_E_USAGE, "ops-listen", "--ops-listen takes another address than --listen, not '%s'",
+        return spl_fail_field(err, SPL_E_USAGE, "ops-listen", "--ops-listen must differ from --listen, not be %s",
                               options->ops_listen);
     if (origin[SPL_PARAMETER_connections_per_address] && options->connections_per_address > options->connections)
         return spl_fail_field(err, SPL_E_USAGE, "connections-per-address",
@@ -243,7 +243,7 @@ int spl_service_options_check(const struct spl_service_options *options, struct 
                               ", not %" PRIu64, options->connections, options->connections_per_address);
     if (options->rate_limit_total && options->rate_limit > options->rate_limit_total)
         return spl_fail_field(err, SPL_E_USAGE, "rate-limit",
-                              "--rate-limit takes at most what --rate-limit-total allows all addresses together, %" PRIu64
+                              "--rate-limit takes at most what --rate-limit-total allows all together, %" PRIu64
                               ", not %" PRIu64, options->rate_limit_total, options->rate_limit);
     return 0;
 }
