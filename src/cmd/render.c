@@ -40,7 +40,7 @@ static void usage(FILE *out)
             "  --eye X,Y,Z --target X,Y,Z --up X,Y,Z    left out: the default view's\n"
             "  --fov DEG                vertical field of view; or a pinhole in pixels:\n"
             "  --fx F [--fy F --cx X --cy Y]            fy = fx, principal point in the middle when left out\n"
-            "  --size WxH               pixels (1280x720)\n"
+            "  --size WxH               pixels (1280x720); W or xH alone: at 16:9\n"
             "  --near N --far N         view depths that are drawn\n"
             "Drawing:\n"
             "  --method METHOD          splat: oriented discs; points: one pixel a splat; fill: points, hidden\n"
@@ -50,7 +50,7 @@ static void usage(FILE *out)
             "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
             "  --atoms N                of a splat's texture at most, 0 to 8; 0 = its mean colour (8)\n"
             "  --supersample N          samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge (1)\n"
-            "  --background COLOUR      #rrggbb, #rrggbbaa or transparent (#000000)\n"
+            "  --background COLOUR      a CSS name (white), #rrggbb, #rrggbbaa or transparent (black)\n"
             "  --margin M               depth behind the first surface that is blended, in splat radii (1)\n"
             "Method fill:\n"
             "  --visibility V           adaptive; constant: the whole kernel everywhere, slow; none: removes none\n"
@@ -70,7 +70,18 @@ static void usage(FILE *out)
             "  --no-verify              trust the file's checksums\n");
 }
 
-enum option_id { OPT_EYE = SPL_CMD_OWN, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_NEAR, OPT_FAR };
+enum option_id {
+    OPT_EYE = SPL_CMD_OWN,
+    OPT_TARGET,
+    OPT_UP,
+    OPT_FOV,
+    OPT_FX,
+    OPT_FY,
+    OPT_CX,
+    OPT_CY,
+    OPT_NEAR,
+    OPT_FAR
+};
 
 static const struct option options[] = {
     {"eye", required_argument, NULL, OPT_EYE},
@@ -125,7 +136,8 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
         a->drawing.format = dot ? spl_format_from_name(dot + 1) : -1;
     }
     if (a->drawing.format < 0)
-        return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
     return SPL_OK;
@@ -163,8 +175,8 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats,
-                   const struct arguments *a, const struct spl_encoded *encoded)
+static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats, const struct arguments *a,
+                   const struct spl_encoded *encoded)
 {
     fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms%s\n", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms,
@@ -209,8 +221,16 @@ static int render(struct arguments *a, struct spl_error *err)
 int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
-        .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
-        .near = NAN, .far = NAN,
+        .eye = {NAN},
+        .target = {NAN},
+        .up = {NAN},
+        .fov = NAN,
+        .fx = NAN,
+        .fy = NAN,
+        .cx = NAN,
+        .cy = NAN,
+        .near = NAN,
+        .far = NAN,
     };
     spl_cmd_drawing_init(&a.drawing, 1280, 720);
     struct spl_error err = {0};

@@ -60,7 +60,7 @@ static void usage(FILE *out)
             "  --ease KIND              none, in, out or in-out (none)\n"
             "  --closed                 the last camera is followed by the first\n"
             "Drawing:\n"
-            "  --size WxH               pixels (the path's own, or 1280x720)\n"
+            "  --size WxH               pixels (the path's own, or 1280x720); W or xH alone: at that ratio\n"
             "  --method splat|points|fill, --lod L, --supersample N, --background COLOUR, --margin M,\n"
             "  --atoms N; of method fill --visibility V, --kernel N, --threshold T, --pyramid N\n"
             "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"

@@ -19,7 +19,7 @@ enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
     connection_pool = 14 * 1024, /* libmicrohttpd's pool; see oversize.c */
-    reply_bytes_max = 1 << 30, /* in all; beyond, views are refused until clients have read theirs */
+    reply_bytes_max = 1 << 30,   /* in all; beyond, views are refused until clients have read theirs */
 };
 
 enum phase {
@@ -143,7 +143,7 @@ struct spl_service {
 int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
-void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
+void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
 
 /* connections.c: every connection, and how long its phases may take. */
 void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
@@ -230,6 +230,7 @@ bool spl_wants_page(struct request *request); /* its Accept names text/html, and
 void spl_show_page(struct request *request);
 void spl_show_viewer_file(struct request *request, const struct spl_call *call);
 void spl_show_embed(struct request *request, const struct spl_call *call);
+void spl_list_clients(struct request *request, const struct spl_call *call);
 void spl_show_client(struct request *request, const struct spl_call *call);
 
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */
