@@ -255,7 +255,8 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);
     a->bench.height = (uint32_t)fmin(size[1], UINT32_MAX);
     if (!status && optind == argc)
-        status = spl_fail(err, SPL_E_USAGE, "bench needs at least one NAME.spld; 'splatd bench --help' shows how");
+        status = spl_fail(err, SPL_E_USAGE, 
+                          "bench needs at least one dataset: splatd bench hall.spld; 'splatd bench --help' shows more");
     if (!status && argc - optind > LIST_MAX)
         status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);
     if (!status && a->set && !a->views)

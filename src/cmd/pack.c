@@ -292,7 +292,8 @@ int spl_cmd_pack(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (optind == argc) {
-        fprintf(stderr, "splatd: pack needs at least one scan; 'splatd pack --help' shows how\n");
+        fprintf(stderr, "splatd: pack needs at least one scan: splatd pack scan.las -o scan.spld; "
+                        "'splatd pack --help' shows more\n");
         return 2;
     }
     if (!o.output) {

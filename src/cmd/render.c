@@ -70,18 +70,7 @@ static void usage(FILE *out)
             "  --no-verify              trust the file's checksums\n");
 }
 
-enum option_id {
-    OPT_EYE = SPL_CMD_OWN,
-    OPT_TARGET,
-    OPT_UP,
-    OPT_FOV,
-    OPT_FX,
-    OPT_FY,
-    OPT_CX,
-    OPT_CY,
-    OPT_NEAR,
-    OPT_FAR
-};
+enum option_id { OPT_EYE = SPL_CMD_OWN, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_NEAR, OPT_FAR };
 
 static const struct option options[] = {
     {"eye", required_argument, NULL, OPT_EYE},
@@ -136,8 +125,7 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
         a->drawing.format = dot ? spl_format_from_name(dot + 1) : -1;
     }
     if (a->drawing.format < 0)
-        return spl_fail(err, SPL_E_USAGE,
-                        "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
+        return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
     return SPL_OK;
@@ -175,8 +163,8 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats, const struct arguments *a,
-                   const struct spl_encoded *encoded)
+static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats,
+                   const struct arguments *a, const struct spl_encoded *encoded)
 {
     fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms%s\n", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms,
@@ -221,16 +209,8 @@ static int render(struct arguments *a, struct spl_error *err)
 int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
-        .eye = {NAN},
-        .target = {NAN},
-        .up = {NAN},
-        .fov = NAN,
-        .fx = NAN,
-        .fy = NAN,
-        .cx = NAN,
-        .cy = NAN,
-        .near = NAN,
-        .far = NAN,
+        .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
+        .near = NAN, .far = NAN,
     };
     spl_cmd_drawing_init(&a.drawing, 1280, 720);
     struct spl_error err = {0};
@@ -247,7 +227,8 @@ int spl_cmd_render(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
-        fprintf(stderr, "splatd: render takes one dataset, NAME.spld; 'splatd render --help' shows how\n");
+        fprintf(stderr, "splatd: render takes one dataset: splatd render hall.spld -o view.jpg; "
+                        "'splatd render --help' shows more\n");
         return 2;
     }
     a.dataset = argv[optind];

@@ -129,7 +129,9 @@ static int parse(struct spl_service_options *o, int argc, char **argv, const str
             return rc;
     }
     return o->datasets.count ? 0
-                             : spl_fail(err, SPL_E_USAGE, "serve needs at least one NAME.spld or a directory of them");
+                             : spl_fail(err, SPL_E_USAGE,
+                                      "serve needs at least one NAME.spld or a directory of them: splatd serve "
+                                      "hall.spld; 'splatd serve --help' shows more");
 }
 
 int spl_cmd_serve(int argc, char **argv)

@@ -30,6 +30,21 @@ for command in commands:
     check([command, "--no-such-option"], 2, "stderr")
     if f"`splatd {command}" not in README:
         wrong.append(f"README.md does not show splatd {command}")
+# What is missing is named, beside an example that has it.
+for words, wanted in {
+    "serve": r"NAME\.spld.*: splatd serve \S+\.spld", "pack": r"one scan: splatd pack \S+ -o \S+\.spld",
+    "pack a.ply": r"-o NAME\.spld", "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
+    "render a.spld b.spld -o c.png": "takes one dataset", "tour": r"one dataset: splatd tour \S+ --path \S+ -o \S+",
+    "tour a.spld -o b.mp4": "--path FILE", "tour a.spld --path b.json": r"-o OUT\.mp4",
+    "info": r"one dataset: splatd info \S+\.spld", "synth": r"one SCENE: splatd synth \S+ -o \S+", "synth courtyard": "-o DIR",
+    "bench": r"one dataset: splatd bench \S+\.spld", "bench --left-out a.spld": "--cameras is missing",
+    "bench --textures a.tex": "-o OUT is missing", "compare": r"IMAGE and a TRUTH: splatd compare \S+ \S+",
+    "compare a.png": "TRUTH, which is missing", "sign": "URL.*--key FILE.*--help", "render a.spld -o b.png --size 3x": "1280x720",
+    "render a.spld -o b.png --background rad": "white", "render a.spld -o": "requires an argument.*\n.*splatd render --help",
+}.items():
+    said = check(words.split(), 2, "stderr")
+    if not re.search(wanted, said):
+        wrong.append(f"splatd {words}: {said!r} does not say {wanted!r}")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")
