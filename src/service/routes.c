@@ -133,7 +133,8 @@ static void refuse_method(struct request *request, unsigned allowed, const char 
             strcat(allow, *allow ? ", " : "");
             strcat(allow, m == SPL_GET ? "GET, HEAD" : methods[m]);
         }
-    snprintf(detail, sizeof detail, "method %.32s is not allowed here; %s are", method, allow);
+    snprintf(detail, sizeof detail, "method %.32s is not allowed here; %s %s", method, allow,
+             strchr(allow, ',') ? "are" : "is");
     spl_reply_problem(request, MHD_HTTP_METHOD_NOT_ALLOWED, "method", "", detail);
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_ALLOW, allow);

@@ -287,7 +287,8 @@ def test_the_clients_are_listed():
             assert head.headers["Content-Length"] == str(len(got.body))
         assert d.ask("/clients/none").json()["detail"].endswith("/clients/ lists them")
         assert d.ask("/").json()["clients"] == "/clients/"
-        assert d.ask("/clients/", "POST").status == 405
+        assert d.ask("/clients/", "POST").json()["detail"].endswith("GET, HEAD are")
+        assert d.ask(VIEW + "s").json()["detail"].endswith("POST is")
 
 
 def test_the_same_request_gives_the_same_bytes():

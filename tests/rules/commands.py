@@ -2,9 +2,11 @@
 a message on stderr, README.md names the command.
 
 usage: commands.py SPLATD README.md"""
+import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
 SPLATD, README = sys.argv[1], open(sys.argv[2], encoding="utf-8").read()
 wrong = []
@@ -45,6 +47,13 @@ for words, wanted in {
     said = check(words.split(), 2, "stderr")
     if not re.search(wanted, said):
         wrong.append(f"splatd {words}: {said!r} does not say {wanted!r}")
+with tempfile.TemporaryDirectory() as folder:
+    scan = pathlib.Path(folder, "scan.xyz")
+    scan.write_text("".join(f"{x} {y} 0\n" for x in range(20) for y in range(20)))
+    before, same = scan.read_bytes(), pathlib.Path(folder, "same.xyz")
+    same.symlink_to(scan)
+    if "-o NAME.spld" not in check(["pack", str(same), "-o", str(scan)], 2, "stderr") or scan.read_bytes() != before:
+        wrong.append("splatd pack writes over its scan")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")

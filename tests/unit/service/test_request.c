@@ -453,6 +453,27 @@ static void colours_have_names(void **state)
     assert_refused(query, refusals, sizeof refusals / sizeof *refusals);
 }
 
+static void refusals_say_what_to_write(void **state)
+{
+    (void)state;
+    static const char *const rows[][2] = {
+        {"eye=1, 2,3", "by commas, without blanks"},
+        {"eye=(1,2,3)", "by commas"},
+        {"eye=0,0,5&target=0,0,0", "up=0,1,0"},
+        {"eye=0,5,0&target=0,0,0&up=0,1,0", "up=0,0,1"},
+        {"background=#fff", "a CSS name such as white, RRGGBB"},
+        {"zoom=3", "/v1/openapi.json"},
+        {"height=8192", "the width that follows from height is 14564; at most 8192"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view_request r;
+        struct spl_error err;
+        assert_int_equal(query(rows[i][0], &r, &err), SPL_E_INPUT);
+        if (!strstr(err.message, rows[i][1]))
+            fail_msg("%s: '%s' does not say '%s'", rows[i][0], err.message, rows[i][1]);
+    }
+}
+
 static void percent_decoding_is_exact(void **state)
 {
     (void)state;
@@ -480,7 +501,7 @@ int main(void)
         cmocka_unit_test(demands_arrive),
         cmocka_unit_test(a_side_that_is_left_out_follows),
         cmocka_unit_test(matrices_are_taken_as_rows),
-        cmocka_unit_test(colours_have_names),
+        cmocka_unit_test(colours_have_names),                cmocka_unit_test(refusals_say_what_to_write),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
