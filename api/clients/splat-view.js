@@ -1,6 +1,6 @@
-// <splat-view src="https://splats.example" dataset="hall" eye="4,5,6" target="0,0,1" fov="40"></splat-view>
+// A view of a dataset that people can move in, for any page on any origin.
 //
-// A view of a dataset that people can move in, for any page on any origin:
+//   <splat-view src="https://splats.example" dataset="hall" eye="4,5,6" target="0,0,1" fov="40"></splat-view>
 //   <script type="module" src="https://splats.example/clients/splat-view.js"></script>
 //
 // src      the service; by default where this file came from

@@ -65,7 +65,8 @@ class Dataset:
 class Splatd:
     def __init__(self, url="http://127.0.0.1:8080", token=None, timeout=60, patience=30):
         """`patience`: seconds that a busy service is asked again, when it says when."""
-        self.url, self.timeout, self.patience = url.rstrip("/"), timeout, patience
+        self.url = (url if "://" in url else f"http://{url}").rstrip("/")
+        self.timeout, self.patience = timeout, patience
         self.headers = {"Authorization": f"Bearer {token}"} if token else {}
 
     def ask(self, path, body=None):
@@ -114,11 +115,26 @@ def ring(target, count, radius, height, up=(0, 0, 1)):
         yield {"eye": eye, "target": list(target), "up": list(up)}
 
 
-if __name__ == "__main__":
-    if len(sys.argv) < 3 or not all("=" in pair for pair in sys.argv[3:]):
-        sys.exit("usage: splatd.py URL DATASET [NAME=VALUE…] > IMAGE")
+def main(arguments):
+    usage = "usage: splatd.py URL DATASET [NAME=VALUE…] > IMAGE\n  " + __doc__.rpartition("line:  ")[2].strip()
+    if arguments[:1] in (["--help"], ["-h"]):
+        print(usage)
+        return 0
+    wrong = [f"{name} is missing" for name in ("URL", "DATASET")[len(arguments):]]
+    wrong += [f"'{pair}' is not NAME=VALUE" for pair in arguments[2:] if not pair.partition("=")[1]]
+    if not wrong and sys.stdout.isatty():
+        wrong = ["an image does not belong on a terminal; add > FILE"]
+    if wrong:
+        print(f"splatd.py: {wrong[0]}\n{usage}", file=sys.stderr)
+        return 2
     try:
-        found = Splatd(sys.argv[1]).dataset(sys.argv[2]).view(**dict(pair.split("=", 1) for pair in sys.argv[3:]))
-    except (SplatdError, OSError) as error:
-        sys.exit(f"splatd.py: {error}")
+        found = Splatd(arguments[0]).dataset(arguments[1]).view(**dict(pair.split("=", 1) for pair in arguments[2:]))
+    except (SplatdError, OSError, ValueError) as error:
+        print(f"splatd.py: {arguments[0]}: {error}", file=sys.stderr)
+        return 1
     sys.stdout.buffer.write(found.bytes)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -13,7 +13,29 @@
 set -euo pipefail
 
 base=${SPLATD_URL:-http://127.0.0.1:8080} base=${base%/}
-usage() { sed -n '4,9s/^# \{0,3\}//p' "$0" >&2; exit 2; }
+examples() { sed -n '4,9s/^# \{0,3\}//p' "$0"; }
+
+# WHAT IS WRONG
+usage() {
+    echo "splatd.sh: $1; as in" >&2
+    examples >&2
+    exit 2
+}
+
+# NAMES ARGUMENT…: every one of NAMES must have an argument, and what follows them is NAME=VALUE.
+needs() {
+    local -a names
+    local pair
+    read -ra names <<<"$1"
+    shift
+    [ $# -ge ${#names[@]} ] || usage "$command needs ${names[*]}, and ${names[$#]} is missing"
+    for pair in "${@:${#names[@]} + 1}"; do
+        [[ $pair == ?*=* ]] || usage "$command: '$pair' is not NAME=VALUE"
+    done
+}
+
+# NAME ARGUMENT
+number() { [[ $2 =~ ^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)$ ]] || usage "$command: $1 '$2' is no number"; }
 
 # URL…: prints the reply; a refusal is told on stderr.
 ask() {
@@ -45,7 +67,10 @@ view() {
 # DATASET DIR COUNT RADIUS HEIGHT target=X,Y,Z NAME=VALUE…
 ring() {
     local id=$1 dir=$2 count=$3 radius=$4 height=$5 target=${6#target=} i=0 eye
-    [ "target=$target" = "$6" ] || usage
+    [[ $count =~ ^[0-9]*[1-9][0-9]*$ ]] || usage "ring: COUNT '$count' is no whole number from 1 on"
+    number RADIUS "$radius"
+    number HEIGHT "$height"
+    [ "target=$target" = "$6" ] || usage "ring needs target=X,Y,Z in the place of '$6'"
     shift 6
     mkdir -p "$dir"
     awk -v n="$count" -v r="$radius" -v h="$height" -v t="$target" 'BEGIN {
@@ -63,16 +88,18 @@ ring() {
 command=${1-}
 [ $# -gt 0 ] && shift
 case $command in
-datasets) ask "$base/v1/datasets" | sed -n 's/^ *"id": "\(.*\)",$/\1/p' ;;
-info) [ $# = 1 ] || usage; ask "$base/v1/datasets/$1"; echo ;;
-view) [ $# -ge 2 ] || usage; view "$@" ;;
+--help | -h | help) examples ;;
+datasets) [ $# = 0 ] || usage "datasets takes nothing, not '$1'"; ask "$base/v1/datasets" | sed -n 's/^ *"id": "\(.*\)",$/\1/p' ;;
+info) needs DATASET "$@"; [ $# = 1 ] || usage "info takes one DATASET, not '$2' as well"; ask "$base/v1/datasets/$1"; echo ;;
+view) needs "DATASET FILE" "$@"; view "$@" ;;
 pick)
-    [ $# -ge 3 ] || usage
+    needs "DATASET X Y" "$@"
     id=$1 x=$2 y=$3
     shift 3
     ask "$base/v1/datasets/$id/pick?$(query "x=$x" "y=$y" "$@")"
     echo
     ;;
-ring) [ $# -ge 6 ] || usage; ring "$@" ;;
-*) usage ;;
+ring) needs "DATASET DIR COUNT RADIUS HEIGHT target=X,Y,Z" "$@"; ring "$@" ;;
+"") usage "a command is missing" ;;
+*) usage "there is no command '$command'" ;;
 esac

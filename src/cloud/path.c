@@ -11,25 +11,31 @@
 #include <sys/stat.h>
 
 #include "cloud/path_reader.h"
+#include "geom/size.h"
 
-enum { width_default = 1280, height_default = 720 };
 static const double fov_default = 60;
 
 int spl_path_set_size(struct spl_path_reader *reader, double width, double height, struct spl_error *err)
 {
     const struct spl_camera_limits *limits = reader->options->limits;
     const uint32_t wanted[2] = {reader->options->width, reader->options->height};
-    double size[2] = {width, height};
-    for (int i = 0; i < 2; i++) {
-        const char *field = i ? "height" : "width";
-        size[i] = wanted[i] ? wanted[i] : size[i];
-        if (!(size[i] >= 1 && size[i] <= limits->side_px && size[i] == floor(size[i])))
-            return spl_fail_field(err, SPL_E_INPUT, field, "%s %g of the path is no whole number of 1 to %u pixels",
-                                  field, size[i], limits->side_px);
-    }
+    const double own[2] = {width, height};
+    const char *const fields[] = {"width", "height"};
+    double size[2] = {wanted[0], wanted[1]};
+    for (int i = 0; i < 2 && !(wanted[0] && wanted[1]); i++)
+        if (!(own[i] >= 1 && own[i] <= limits->side_px && own[i] == floor(own[i])))
+            return spl_fail_field(err, SPL_E_INPUT, fields[i], "%s %g of the path is no whole number of 1 to %u pixels",
+                                  fields[i], own[i], limits->side_px);
+    spl_size_follow(size, own);
+    for (int i = 0; i < 2; i++)
+        if (!(size[i] <= limits->side_px))
+            return spl_fail_field(err, SPL_E_INPUT, wanted[i] ? fields[i] : fields[!i],
+                                  "the path's images of %g x %g become %.0f x %.0f; a side has at most %u pixels",
+                                  width, height, size[0], size[1], limits->side_px);
     if (size[0] * size[1] > (double)limits->pixels)
-        return spl_fail_field(err, SPL_E_LIMIT, "width", "images of %.0f x %.0f are %.0f pixels; the limit is %llu",
-                              size[0], size[1], size[0] * size[1], (unsigned long long)limits->pixels);
+        return spl_fail_field(err, SPL_E_LIMIT, !wanted[0] && wanted[1] ? "height" : "width",
+                              "images of %.0f x %.0f are %.0f pixels; the limit is %llu", size[0], size[1],
+                              size[0] * size[1], (unsigned long long)limits->pixels);
     reader->width = (uint32_t)size[0];
     reader->height = (uint32_t)size[1];
     return 0;
@@ -75,9 +81,11 @@ static int read_own_key(struct spl_path_reader *reader, json_t *view, struct spl
     struct spl_camera out;
     if (time && !json_is_number(time))
         return spl_fail_field(err, SPL_E_INPUT, "time", "time must be a number, not %s", spl_json_type_name(time));
-    for (int i = 0; i < 2; i++) // a field of view needs the shape of the outcome
-        if (!json_object_get(view, sides[i]) && !json_object_get(camera, sides[i]) && !spl_camera_form_has_size(camera))
-            json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
+    bool sized = spl_camera_form_has_size(camera);
+    for (int i = 0; i < 2; i++)
+        sized = sized || json_object_get(view, sides[i]) || json_object_get(camera, sides[i]);
+    for (int i = 0; i < 2 && !sized; i++) // a field of view needs the shape of the outcome
+        json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
     int rc = spl_camera_from_json(view, others, reader->options->defaults, reader->options->limits, &out, err);
     return rc ? rc : spl_path_take(reader, &out, time ? json_number_value(time) : NAN, err);
 }
@@ -92,8 +100,8 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     {
         bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed");
         if (!number && !flag && strcmp(name, reader->list))
-            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; api/tours.md lists them",
-                                  name);
+            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; known are %s, closed, fps",
+                                  name, reader->list);
         if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
             return spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number above 0, at most 1000");
         if (flag && !json_is_boolean(value))
@@ -106,7 +114,7 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
                               spl_json_type_name(list));
     reader->path->fps = json_number_value(json_object_get(json, "fps"));
     reader->path->closed = json_is_true(json_object_get(json, "closed"));
-    int rc = spl_path_set_size(reader, width_default, height_default, err);
+    int rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
         if ((rc = read_own_key(reader, json_array_get(list, i), &why)))

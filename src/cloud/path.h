@@ -16,7 +16,8 @@
 #include "geom/camera_path.h"
 
 struct spl_path_options {
-    uint32_t width, height; /* of every camera; 0 = what the path says, 1280 x 720 when it does not */
+    uint32_t width, height; /* of every camera; 0 = what the path says, 1280 x 720 when it does not; one that is 0
+                             * follows from the other at the path's ratio */
     const struct spl_camera_defaults *defaults; /* may be NULL: fov 60, near 0.01, no far, and poses must be complete */
     const struct spl_camera_limits *limits;
 };

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cloud/path_reader.h"
+#include "geom/camera_matrix.h"
 
 static int get_list(struct spl_path_reader *reader, const json_t *json, const char *name, const json_t **list,
                     struct spl_error *err)
@@ -24,7 +25,8 @@ static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *f
     struct spl_camera camera;
     struct spl_error why = {0};
     int rc;
-    if ((rc = spl_json_get_numbers(frame, "camera_to_world", 16, matrix, err)) ||
+    if ((rc = spl_json_get_matrix(json_object_get(frame, "camera_to_world"), "camera_to_world", 4, 4, SPL_ROW_MAJOR,
+                                  matrix, err)) ||
         (rc = spl_json_get_number(frame, "fov", &fov, err)) || (rc = spl_path_set_fov(reader, fov, &camera, err)))
         return rc;
     if ((rc = spl_camera_set_matrix(&camera, matrix, SPL_AXES_OPENGL, &why)))

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cloud/path_reader.h"
+#include "geom/size.h"
 #include "cloud/view_list.h"
 #include "geom/quaternion.h"
 
@@ -63,7 +64,7 @@ int spl_path_read_tum(struct spl_path_reader *reader, struct spl_source *source,
 {
     const char *line;
     size_t length;
-    int got = 0, rc = spl_path_set_size(reader, 1280, 720, err);
+    int got = 0, rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
     reader->path->whole = true;
     while (!rc && (got = spl_source_line(source, &line, &length, err)) > 0) {
         struct spl_error why = {0};

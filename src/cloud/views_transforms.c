@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "cloud/path_reader.h"
 #include "cloud/view_list.h"
+#include "geom/camera_matrix.h"
 
 /* A lens value of the frame, or of all frames. */
 static const json_t *get(const json_t *document, const json_t *frame, const char *name)
@@ -82,20 +83,6 @@ static int get_lens(const json_t *document, const json_t *frame, struct spl_came
     return rc ? rc : spl_distortion_init(distortion, err);
 }
 
-static int get_matrix(const json_t *frame, double matrix[16], struct spl_error *err)
-{
-    const json_t *rows = json_object_get(frame, "transform_matrix");
-    for (size_t i = 0; i < 16; i++) {
-        const json_t *number = json_array_get(json_array_get(rows, i / 4), i % 4);
-        if (!json_is_number(number) || json_array_size(rows) != 4 || json_array_size(json_array_get(rows, i / 4)) != 4)
-            return spl_fail_field(err, SPL_E_INPUT, "transform_matrix",
-                                  "transform_matrix must be 4 rows of 4 numbers; row %zu, column %zu is %s", i / 4 + 1,
-                                  i % 4 + 1, spl_json_type_name(number));
-        matrix[i] = json_number_value(number);
-    }
-    return SPL_OK;
-}
-
 /* Blender's exporter leaves the extension out. */
 static int add_frame(struct spl_view_list *list, const char *path, const char *folder, const json_t *document,
                      const json_t *frame, const struct spl_photograph_options *photographs, struct spl_error *err)
@@ -109,7 +96,9 @@ static int add_frame(struct spl_view_list *list, const char *path, const char *f
     if (!file || !*file)
         return spl_fail_field(err, SPL_E_INPUT, "file_path", "file_path must be text, not %s",
                               file ? "empty" : spl_json_type_name(json_object_get(frame, "file_path")));
-    if ((rc = get_lens(document, frame, &camera, &distortion, err)) || (rc = get_matrix(frame, matrix, err)))
+    if ((rc = get_lens(document, frame, &camera, &distortion, err)) ||
+        (rc = spl_json_get_matrix(json_object_get(frame, "transform_matrix"), "transform_matrix", 4, 4, SPL_ROW_MAJOR,
+                                  matrix, err)))
         return rc;
     if ((rc = spl_camera_set_matrix(&camera, matrix, SPL_AXES_OPENGL, &why)))
         return spl_fail_field(err, rc, "transform_matrix", "transform_matrix: %s", why.message);

@@ -22,7 +22,7 @@ static void help(void)
         "                            \"vfov_deg\": 40, \"near\": 0.1, \"far\": 50}, \"close\": {…}}};\n"
         "                            default: round the dataset's default view, closing in\n"
         "  --frames N                places on the path (20)\n"
-        "  --size WxH                (1280x720)\n"
+        "  --size WxH                (1280x720); W or xH alone: at 16:9\n"
         "  --device LIST             such as vulkan,egl (auto); 'splatd devices' lists them\n"
         "  --method LIST             such as splat,points,fill (splat)\n"
         "  --lod LIST                pixels a splat, such as 1,2 (1)\n"

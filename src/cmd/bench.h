@@ -18,7 +18,7 @@ struct spl_cmd_bench_sweep {
     const char *views;                 /* JSON or COLMAP folder; NULL = `path` */
     const struct spl_path *path;       /* NULL = the dataset's own orbit */
     uint32_t places;                   /* on a path */
-    uint32_t width, height;            /* 0 = 1280x720 on a path, the views' own otherwise */
+    uint32_t width, height;            /* 0 = 1280x720 on a path, the views' own otherwise; one 0: at that ratio */
     const char *peers, *profile;       /* CSV, may be NULL; NULL = beside the dataset */
     bool no_profile;
     struct spl_sweep_options sweep; /* all but dataset, views, settings, folder, progress */
@@ -38,7 +38,8 @@ struct spl_cmd_bench_arguments {
     size_t supersample_count, atom_count;
     struct spl_path path;
     const char *views, *set;
-    bool json, sized, listed[4]; /* listed: --method, --lod, --supersample, --atoms were given */
+    uint32_t size[2];     /* of --size; a side that was left out is 0 */
+    bool json, listed[4]; /* listed: --method, --lod, --supersample, --atoms were given */
     struct spl_bench_options bench;
     struct spl_cmd_bench_sweep sweep;
 };

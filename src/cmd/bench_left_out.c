@@ -167,7 +167,8 @@ int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err)
         else
             rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
     if (!rc && (argc - optind != 1 || !a.cameras))
-        rc = spl_fail(err, SPL_E_USAGE, "bench --left-out takes one NAME.spld and --cameras MODEL");
+        rc = spl_fail(err, SPL_E_USAGE, "bench --left-out takes one NAME.spld and --cameras MODEL; %s",
+                      a.cameras ? "give one NAME.spld" : "--cameras is missing");
     a.dataset = argv[optind];
     return rc ? rc : run(&a, err);
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "geom/size.h"
 #include "shared.h"
 
 enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
@@ -131,8 +132,8 @@ static int take_option(struct spl_cmd_bench_arguments *a, int option, struct spl
         a->bench.frames = (uint32_t)count;
         break;
     case 'z':
-        a->sized = true;
-        status = spl_cmd_parse_size("--size", optarg, &a->bench.width, &a->bench.height, err);
+        a->size[0] = a->size[1] = 0;
+        status = spl_cmd_parse_size("--size", optarg, &a->size[0], &a->size[1], err);
         break;
     case 'b':
         status = spl_cmd_parse_count("--memory-limit", optarg, 1, 1u << 24, &count, err);
@@ -194,8 +195,8 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
     s->views = a->set ? NULL : a->views;
     s->path = a->bench.path;
     s->places = a->bench.frames ? a->bench.frames : 8;
-    s->width = a->sized ? a->bench.width : 0;
-    s->height = a->sized ? a->bench.height : 0;
+    s->width = a->size[0];
+    s->height = a->size[1];
     s->methods = a->methods;
     s->method_count = a->bench.method_count;
     s->lods = a->lods;
@@ -244,15 +245,18 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
         .method_count = 1,
         .lods = a->lods,
         .lod_count = 1,
-        .width = 1280,
-        .height = 720,
     };
     a->sweep.sweep.repeats = 5;
     int option, status = 0;
     while (!status && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
         status = take_option(a, option, err);
+    double size[2] = {a->size[0], a->size[1]};
+    spl_size_follow(size, (const double[]){SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT});
+    a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);
+    a->bench.height = (uint32_t)fmin(size[1], UINT32_MAX);
     if (!status && optind == argc)
-        status = spl_fail(err, SPL_E_USAGE, "bench needs at least one NAME.spld; 'splatd bench --help' shows how");
+        status = spl_fail(err, SPL_E_USAGE, 
+                          "bench needs at least one dataset: splatd bench hall.spld; 'splatd bench --help' shows more");
     if (!status && argc - optind > LIST_MAX)
         status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);
     if (!status && a->set && !a->views)

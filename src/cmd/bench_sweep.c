@@ -11,12 +11,11 @@
 #include "base/memory.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
+#include "geom/size.h"
 #include "measure/page.h"
 #include "measure/peers.h"
 #include "measure/report.h"
 #include "shared.h"
-
-enum { default_width = 1280, default_height = 720 };
 
 struct progress {
     struct spl_cmd_progress line;
@@ -48,6 +47,8 @@ static int views_of_path(const struct spl_cmd_bench_sweep *o, const struct spl_d
     if (rc)
         return rc;
     const struct spl_path *path = o->path ? o->path : &orbit;
+    double size[2] = {o->width, o->height};
+    spl_size_follow(size, (const double[]){SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT});
     list->views = spl_alloc(o->places, sizeof *list->views, err);
     if (!list->views)
         return SPL_E_NOMEM;
@@ -59,8 +60,7 @@ static int views_of_path(const struct spl_cmd_bench_sweep *o, const struct spl_d
             view->name = NULL;
             return spl_fail(err, SPL_E_NOMEM, "out of memory: a view's name");
         }
-        rc = spl_path_get_camera(path, share, o->width ? o->width : default_width,
-                                 o->height ? o->height : default_height, &view->camera, err);
+        rc = spl_path_get_camera(path, share, (uint32_t)size[0], (uint32_t)size[1], &view->camera, err);
     }
     return rc;
 }
@@ -70,13 +70,15 @@ static void resize(struct spl_view_list *list, uint32_t width, uint32_t height)
 {
     for (size_t i = 0; i < list->count; i++) {
         struct spl_camera *c = &list->views[i].camera;
-        double x = (double)width / c->width, y = (double)height / c->height;
+        double size[2] = {width, height};
+        spl_size_follow(size, (const double[]){c->width, c->height});
+        double x = size[0] / c->width, y = size[1] / c->height;
         c->fx *= x;
         c->cx *= x;
         c->fy *= y;
         c->cy *= y;
-        c->width = width;
-        c->height = height;
+        c->width = (uint32_t)fmin(size[0], UINT32_MAX);
+        c->height = (uint32_t)fmin(size[1], UINT32_MAX);
     }
 }
 
@@ -84,7 +86,7 @@ static int make_views(const struct spl_cmd_bench_sweep *o, const struct spl_data
                       struct spl_view_list *list, struct spl_error *err)
 {
     int rc = o->views ? spl_view_list_load(list, o->views, err) : views_of_path(o, dataset, list, err);
-    if (!rc && o->views && o->width)
+    if (!rc && o->views && (o->width || o->height))
         resize(list, o->width, o->height);
     struct spl_view view;
     spl_view_init(&view);

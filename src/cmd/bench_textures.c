@@ -129,7 +129,8 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
         }
     int files = argc - optind;
     if (!rc && (files < 1 || files > 2 || !a->folder))
-        rc = spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures, its NAME.spld, and -o OUT");
+        rc = spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures, its NAME.spld, and -o OUT; %s",
+                      a->folder ? "give one or two files" : "-o OUT is missing");
     if (!rc && files == 1 && (a->cameras || a->device))
         rc = spl_fail(err, SPL_E_USAGE, "--cameras and --device are about NAME.spld, which is missing");
     if (!rc && a->images && !a->cameras)

@@ -238,7 +238,10 @@ int spl_cmd_compare(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 2) {
-        fprintf(stderr, "splatd: compare takes an IMAGE and a TRUTH; 'splatd compare --help' shows how\n");
+        fprintf(stderr,
+                "splatd: compare takes an IMAGE and a TRUTH%s: splatd compare view.png truth.png; "
+                "'splatd compare --help' shows more\n",
+                argc - optind == 1 ? ", which is missing" : "");
         return 2;
     }
     a.image = argv[optind];

@@ -323,7 +323,8 @@ int spl_cmd_info(int argc, char **argv)
         }
     }
     if (optind == argc) {
-        fprintf(stderr, "splatd: info needs at least one NAME.spld; 'splatd info --help' shows how\n");
+        fprintf(stderr, "splatd: info needs at least one dataset: splatd info hall.spld; "
+                        "'splatd info --help' shows more\n");
         return 2;
     }
     if (picture && argc - optind > 1) {

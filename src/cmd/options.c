@@ -10,8 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-int spl_cmd_parse_real(const char *option, const char *text, double min, double max, double *out,
-                       struct spl_error *err)
+#include "geom/size.h"
+#include "image/color.h"
+
+int spl_cmd_parse_real(const char *option, const char *text, double min, double max, double *out, struct spl_error *err)
 {
     char *end;
     double value = strtod(text, &end);
@@ -50,32 +52,43 @@ int spl_cmd_parse_vector(const char *option, const char *text, double out[3], st
     return 0;
 }
 
-int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height,
-                       struct spl_error *err)
+static bool parse_side(const char **at, double *side)
 {
-    char *middle, *end = NULL;
+    char *end = NULL;
     errno = 0;
-    unsigned long w = strtoul(text, &middle, 10), h = 0;
-    if (*middle == 'x' && isdigit((unsigned char)middle[1]))
-        h = strtoul(middle + 1, &end, 10);
-    if (!isdigit((unsigned char)*text) || !end || *end || errno || w < 1 || h < 1 || w > UINT32_MAX || h > UINT32_MAX)
-        return spl_fail(err, SPL_E_USAGE, "%s takes WIDTHxHEIGHT in pixels, such as 1280x720, not '%s'", option,
-                        text);
-    *width = (uint32_t)w;
-    *height = (uint32_t)h;
+    unsigned long value = isdigit((unsigned char)**at) ? strtoul(*at, &end, 10) : 0;
+    if (!value || errno || value > UINT32_MAX)
+        return false;
+    *side = (double)value;
+    *at = end;
+    return true;
+}
+
+int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height, struct spl_error *err)
+{
+    const double shape[2] = {*width, *height};
+    const char *at = text;
+    double size[2] = {0};
+    bool good = *at == 'x' || parse_side(&at, &size[0]);
+    if (good && *at == 'x') {
+        at++;
+        good = parse_side(&at, &size[1]);
+    }
+    if (!good || *at)
+        return spl_fail(err, SPL_E_USAGE,
+                        "%s takes WIDTHxHEIGHT in pixels, such as 1280x720, or one side, 1280 or x720, not '%s'",
+                        option, text);
+    spl_size_follow(size, shape);
+    if (size[0] > UINT32_MAX || size[1] > UINT32_MAX)
+        return spl_fail(err, SPL_E_USAGE, "%s %s makes an image of %.0f x %.0f pixels", option, text, size[0], size[1]);
+    *width = (uint32_t)size[0];
+    *height = (uint32_t)size[1];
     return 0;
 }
 
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err)
 {
-    unsigned char rgba[4] = {0, 0, 0, 255};
-    size_t digits = text[0] == '#' ? strspn(text + 1, "0123456789abcdefABCDEF") : 0;
-    if (!strcmp(text, "transparent"))
-        rgba[3] = 0;
-    else if ((digits != 6 && digits != 8) || text[1 + digits])
-        return spl_fail(err, SPL_E_USAGE, "%s takes #rrggbb, #rrggbbaa or transparent, not '%s'", option, text);
-    else
-        sscanf(text, "#%2hhx%2hhx%2hhx%2hhx", &rgba[0], &rgba[1], &rgba[2], &rgba[3]);
-    memcpy(out, rgba, sizeof rgba);
-    return 0;
+    if (spl_color_from_text(text, out))
+        return 0;
+    return spl_fail(err, SPL_E_USAGE, "%s takes " SPL_COLOR_FORMS ", not '%s'", option, text);
 }

@@ -17,11 +17,11 @@ int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint
 /* "X,Y,Z" */
 int spl_cmd_parse_vector(const char *option, const char *text, double out[3], struct spl_error *err);
 
-/* "WxH", both at least 1; upper limits are the renderer's. */
-int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height,
-                       struct spl_error *err);
+/* "WxH", "W" or "xH", at least 1; upper limits are the renderer's. In: the size whose ratio a side that is left out
+ * takes; 0 x 0 leaves it 0. */
+int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, uint32_t *height, struct spl_error *err);
 
-/* "#rrggbb", "#rrggbbaa" or "transparent". */
+/* As over HTTP: "white", "#rrggbb", "#rrggbbaa", "transparent". */
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err);
 
 #endif

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <splatd/pack.h>
@@ -175,6 +176,13 @@ static const char *find_contradiction(const struct spl_pack_options *o, const st
     return NULL;
 }
 
+/* A dataset that is written over the scan it is made of takes the scan's place for good. */
+static bool is_same_file(const char *a, const char *b)
+{
+    struct stat one, other;
+    return !stat(a, &one) && !stat(b, &other) && one.st_dev == other.st_dev && one.st_ino == other.st_ino;
+}
+
 int spl_cmd_pack(int argc, char **argv)
 {
     enum {
@@ -292,7 +300,8 @@ int spl_cmd_pack(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (optind == argc) {
-        fprintf(stderr, "splatd: pack needs at least one scan; 'splatd pack --help' shows how\n");
+        fprintf(stderr, "splatd: pack needs at least one scan: splatd pack scan.las -o scan.spld; "
+                        "'splatd pack --help' shows more\n");
         return 2;
     }
     if (!o.output) {
@@ -304,6 +313,12 @@ int spl_cmd_pack(int argc, char **argv)
         fprintf(stderr, "splatd: %s\n", contradiction);
         return 2;
     }
+    for (int i = optind; i < argc; i++)
+        if (is_same_file(o.output, argv[i])) {
+            fprintf(stderr, "splatd: %s is a scan that is to be packed; write the dataset beside it: -o NAME.spld\n",
+                    o.output);
+            return 2;
+        }
     o.photos = photos.cameras ? &photos : NULL;
     o.inputs = (const char *const *)&argv[optind];
     o.input_count = (size_t)(argc - optind);

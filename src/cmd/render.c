@@ -40,7 +40,7 @@ static void usage(FILE *out)
             "  --eye X,Y,Z --target X,Y,Z --up X,Y,Z    left out: the default view's\n"
             "  --fov DEG                vertical field of view; or a pinhole in pixels:\n"
             "  --fx F [--fy F --cx X --cy Y]            fy = fx, principal point in the middle when left out\n"
-            "  --size WxH               pixels (1280x720)\n"
+            "  --size WxH               pixels (1280x720); W or xH alone: at 16:9\n"
             "  --near N --far N         view depths that are drawn\n"
             "Drawing:\n"
             "  --method METHOD          splat: oriented discs; points: one pixel a splat; fill: points, hidden\n"
@@ -50,7 +50,7 @@ static void usage(FILE *out)
             "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
             "  --atoms N                of a splat's texture at most, 0 to 8; 0 = its mean colour (8)\n"
             "  --supersample N          samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge (1)\n"
-            "  --background COLOUR      #rrggbb, #rrggbbaa or transparent (#000000)\n"
+            "  --background COLOUR      a CSS name (white), #rrggbb, #rrggbbaa or transparent (black)\n"
             "  --margin M               depth behind the first surface that is blended, in splat radii (1)\n"
             "Method fill:\n"
             "  --visibility V           adaptive; constant: the whole kernel everywhere, slow; none: removes none\n"
@@ -227,7 +227,8 @@ int spl_cmd_render(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
-        fprintf(stderr, "splatd: render takes one dataset, NAME.spld; 'splatd render --help' shows how\n");
+        fprintf(stderr, "splatd: render takes one dataset: splatd render hall.spld -o view.jpg; "
+                        "'splatd render --help' shows more\n");
         return 2;
     }
     a.dataset = argv[optind];

@@ -25,8 +25,8 @@ static void usage(FILE *out)
             "  curl -o d.npy \"$url?eye=8,0,2&target=0,0,1&fov=70&layer=depth&format=npy\"\n"
             "With a camera of COLMAP (or OpenGL, OpenCV), as JSON:\n"
             "  curl -o view.jpg --json '{\"camera\":{\"q\":[1,0,0,0],\"t\":[0,0,5],\"fov\":60},\"width\":640}' $url\n"
-            "Every dataset of a directory, on any address, on a real GPU or not at all:\n"
-            "  splatd serve --listen 0.0.0.0:8080 --require-gpu /srv/scans\n"
+            "Every dataset of a directory, on any address for those with a token, on a real GPU or not at all:\n"
+            "  splatd serve --listen 0.0.0.0:8080 --tokens /etc/splatd/tokens --require-gpu /srv/scans\n"
             "A free port for a test; stderr says which:\n"
             "  splatd serve --listen 127.0.0.1:0 courtyard.spld\n"
             "With parameters from a file, `name = value` a line; flags win over it:\n"
@@ -136,7 +136,9 @@ static int parse(struct spl_service_options *o, int argc, char **argv, const str
             return rc;
     }
     return o->datasets.count ? 0
-                             : spl_fail(err, SPL_E_USAGE, "serve needs at least one NAME.spld or a directory of them");
+                             : spl_fail(err, SPL_E_USAGE,
+                                      "serve needs at least one NAME.spld or a directory of them: splatd serve "
+                                      "hall.spld; 'splatd serve --help' shows more");
 }
 
 /* Puts before an error's message where the parameter at fault was set, unless it says so itself. */

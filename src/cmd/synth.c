@@ -265,7 +265,8 @@ int spl_cmd_synth(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
-        fprintf(stderr, "splatd: synth takes one SCENE; 'splatd synth --list' names them\n");
+        fprintf(stderr, "splatd: synth takes one SCENE: splatd synth courtyard -o scan; "
+                        "'splatd synth --list' names them\n");
         return 2;
     }
     a.scan.scene = argv[optind];

@@ -60,7 +60,7 @@ static void usage(FILE *out)
             "  --ease KIND              none, in, out or in-out (none)\n"
             "  --closed                 the last camera is followed by the first\n"
             "Drawing:\n"
-            "  --size WxH               pixels (the path's own, or 1280x720)\n"
+            "  --size WxH               pixels (the path's own, or 1280x720); W or xH alone: at that ratio\n"
             "  --method splat|points|fill, --lod L, --supersample N, --background COLOUR, --margin M,\n"
             "  --atoms N; of method fill --visibility V, --kernel N, --threshold T, --pyramid N\n"
             "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"
@@ -133,8 +133,10 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
 static int resolve_output(struct arguments *a, struct spl_error *err)
 {
     const char *dot = a->drawing.output ? strrchr(a->drawing.output, '.') : NULL;
-    if (!a->path || !a->drawing.output)
-        return spl_fail(err, SPL_E_USAGE, "tour needs --path FILE and -o OUT.mp4 or a folder");
+    if (!a->path)
+        return spl_fail(err, SPL_E_USAGE, "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
+    if (!a->drawing.output)
+        return spl_fail(err, SPL_E_USAGE, "tour needs a video or a folder to write to: -o OUT.mp4 or -o FOLDER");
     a->video = dot && !strcmp(dot, ".mp4");
     if (a->video && (a->drawing.format >= 0 || a->drawing.layer != SPL_LAYER_COLOR))
         return spl_fail(err, SPL_E_USAGE, "a video is of color and takes no --format; give a folder for images");
@@ -273,7 +275,8 @@ int spl_cmd_tour(int argc, char **argv)
             return spl_cmd_fail(&err);
     }
     if (argc - optind != 1) {
-        fprintf(stderr, "splatd: tour takes one dataset, NAME.spld; 'splatd tour --help' shows how\n");
+        fprintf(stderr, "splatd: tour takes one dataset: splatd tour hall.spld --path camera_path.json -o tour.mp4; "
+                        "'splatd tour --help' shows more\n");
         return 2;
     }
     a.dataset = argv[optind];

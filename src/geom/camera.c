@@ -105,7 +105,8 @@ int spl_camera_look_at(struct spl_camera *camera, const double eye[3], const dou
     double right[3], down[3];
     cross(forward, upward, right);
     if (sqrt(dot(right, right)) < parallel_sine)
-        return spl_fail_field(err, SPL_E_INPUT, "up", "up is parallel to the direction of view; name another");
+        return spl_fail_field(err, SPL_E_INPUT, "up", "up is parallel to the direction of view; give another, such as up=%s",
+                              fabs(forward[2]) > 0.5 ? "0,1,0" : "0,0,1");
     normalize(right, 3);
     cross(forward, right, down);
     memcpy(camera->eye, eye, sizeof camera->eye);

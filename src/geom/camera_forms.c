@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "geom/camera_json.h"
+#include "geom/camera_matrix.h"
 
 static const json_t *get(const json_t *object, const char *path)
 {
@@ -26,44 +27,28 @@ int spl_json_get_number(const json_t *object, const char *path, double *out, str
     return 0;
 }
 
-int spl_json_get_numbers(const json_t *object, const char *path, unsigned count, double *out, struct spl_error *err)
+/* Sixteen numbers that the file's standard stores by columns; comes out by rows. */
+static int read_columns(const json_t *json, const char *name, double m[16], struct spl_error *err)
 {
-    const json_t *json = get(object, path);
-    if (!json_is_array(json) || json_array_size(json) != count)
-        return spl_fail_field(err, SPL_E_INPUT, path, "%s must be an array of %u numbers; it is %s of %zu", path, count,
-                              spl_json_type_name(json), json_array_size(json));
-    for (unsigned i = 0; i < count; i++) {
-        if (!json_is_number(json_array_get(json, i)))
-            return spl_fail_field(err, SPL_E_INPUT, path, "number %u of %s is %s", i + 1, path,
-                                  spl_json_type_name(json_array_get(json, i)));
-        out[i] = json_number_value(json_array_get(json, i));
-    }
-    return 0;
-}
-
-/* In a matrix that is stored by columns the last row is every fourth number. */
-static int check_last_row(const double m[16], const char *name, struct spl_error *err)
-{
-    if (m[3] == 0 && m[7] == 0 && m[11] == 0 && m[15] == 1)
-        return 0;
+    int rc = spl_json_get_matrix(json, name, 4, 4, SPL_COLUMN_MAJOR, m, err);
+    if (rc || (m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1))
+        return rc;
     return spl_fail_field(err, SPL_E_INPUT, name,
-                          "the last row of %s is %g %g %g %g instead of 0 0 0 1; it is stored by columns", name, m[3],
-                          m[7], m[11], m[15]);
+                          "the last row of %s is %g %g %g %g instead of 0 0 0 1; 16 numbers are stored by columns",
+                          name, m[12], m[13], m[14], m[15]);
 }
 
-/* extrinsic is column-major, world to camera: its columns are rows of the inverse's rotation. */
+/* extrinsic is world to camera: its columns are rows of the inverse's rotation. */
 static int set_extrinsic(struct spl_camera *camera, const double e[16], struct spl_error *err)
 {
-    double inverse[16] = {e[0], e[1], e[2], 0, e[4], e[5], e[6], 0, e[8], e[9], e[10], 0, 0, 0, 0, 1};
+    double inverse[16] = {e[0], e[4], e[8], 0, e[1], e[5], e[9], 0, e[2], e[6], e[10], 0, 0, 0, 0, 1};
     struct spl_error why = {0};
-    int rc = check_last_row(e, "extrinsic", err);
-    if (rc)
-        return rc;
+    int rc;
     if ((rc = spl_camera_set_matrix(camera, inverse, SPL_AXES_OPENCV, &why)))
         return spl_fail_field(err, rc, "extrinsic", "extrinsic: %s", why.message);
     const double *r = camera->rotation;
     for (int i = 0; i < 3; i++)
-        camera->eye[i] = -(r[i] * e[12] + r[3 + i] * e[13] + r[6 + i] * e[14]);
+        camera->eye[i] = -(r[i] * e[3] + r[3 + i] * e[7] + r[6 + i] * e[11]);
     return 0;
 }
 
@@ -74,23 +59,25 @@ int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct
     int rc;
     if ((rc = spl_json_get_number(intrinsic, "width", &size[0], err)) ||
         (rc = spl_json_get_number(intrinsic, "height", &size[1], err)) ||
-        (rc = spl_json_get_numbers(intrinsic, "intrinsic_matrix", 9, k, err)) ||
-        (rc = spl_json_get_numbers(json, "extrinsic", 16, extrinsic, err)))
+        (rc = spl_json_get_matrix(json_object_get(intrinsic, "intrinsic_matrix"), "intrinsic_matrix", 3, 3,
+                                  SPL_COLUMN_MAJOR, k, err)) ||
+        (rc = read_columns(json_object_get(json, "extrinsic"), "extrinsic", extrinsic, err)))
         return rc;
     for (int i = 0; i < 2; i++)
         if (!(size[i] >= 1 && size[i] <= 1e6 && size[i] == floor(size[i])))
             return spl_fail_field(err, SPL_E_INPUT, i ? "height" : "width", "an image side of %g pixels", size[i]);
-    if (k[1] != 0 || k[2] != 0 || k[3] != 0 || k[5] != 0 || k[8] != 1)
-        return spl_fail_field(err, SPL_E_INPUT, "intrinsic_matrix",
-                              "intrinsic_matrix must be fx 0 0 0 fy 0 cx cy 1: by columns, without skew");
+    if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
+        return spl_fail_field(
+            err, SPL_E_INPUT, "intrinsic_matrix",
+            "intrinsic_matrix must be fx 0 0 0 fy 0 cx cy 1: by columns, without skew, or three rows");
     if ((rc = set_extrinsic(camera, extrinsic, err)))
         return rc;
     camera->width = (uint32_t)size[0];
     camera->height = (uint32_t)size[1];
     camera->fx = k[0];
     camera->fy = k[4];
-    camera->cx = k[6] + 0.5; // Open3D's first pixel centre is (0, 0)
-    camera->cy = k[7] + 0.5;
+    camera->cx = k[2] + 0.5; // Open3D's first pixel centre is (0, 0)
+    camera->cy = k[5] + 0.5;
     return 0;
 }
 
@@ -179,7 +166,7 @@ static int read_gltf(const json_t *json, struct spl_value *values, struct spl_er
     const json_t *type = json_object_get(json, "type"), *lens = json_object_get(json, "perspective"),
                  *node = json_object_get(json, "matrix");
     const char *kind = type ? json_string_value(type) : "perspective";
-    double m[16] = {0}, rows[16];
+    double m[16];
     int rc = check_object(json, "gltf", known, err);
     if (rc)
         return rc;
@@ -197,11 +184,12 @@ static int read_gltf(const json_t *json, struct spl_value *values, struct spl_er
         return rc;
     if (!node)
         return 0;
-    if ((rc = spl_json_get_numbers(json, matrix_name, 16, m, err)) || (rc = check_last_row(m, matrix_name, err)))
-        return rc;
-    for (int i = 0; i < 16; i++)
-        rows[i] = m[i % 4 * 4 + i / 4];
-    return set_pose(values, matrix_name, rows, SPL_AXES_OPENGL, err);
+    if (json_is_array(json_array_get(node, 0)))
+        return spl_fail_field(err, SPL_E_INPUT, matrix_name,
+                              "%s must be 16 numbers by columns, as a glTF file has it; rows go into \"matrix\"",
+                              matrix_name);
+    rc = read_columns(node, matrix_name, m, err);
+    return rc ? rc : set_pose(values, matrix_name, m, SPL_AXES_OPENGL, err);
 }
 
 static int read_open3d(const json_t *json, struct spl_value *values, struct spl_error *err)
@@ -233,7 +221,7 @@ static int read_ros_matrix(const json_t *json, const char *name, unsigned column
                            struct spl_error *err)
 {
     double m[12] = {0};
-    int rc = spl_json_get_numbers(json, name, 3 * columns, m, err);
+    int rc = spl_json_get_matrix(get(json, name), name, 3, columns, SPL_ROW_MAJOR, m, err);
     for (unsigned i = 0; !rc && i < 3 * columns; i++) {
         unsigned row = i / columns, column = i % columns;
         bool any = row < 2 && (column == row || column == 2);
@@ -308,16 +296,9 @@ static int read_ros(const json_t *json, struct spl_value *values, struct spl_err
 static int read_transform(const json_t *json, struct spl_value *values, struct spl_error *err)
 {
     static const char name[] = "nerfstudio.transform_matrix";
-    const json_t *rows = json_object_get(json, "transform_matrix");
     double m[16];
-    for (size_t i = 0; i < 16; i++) {
-        const json_t *row = json_array_get(rows, i / 4), *number = json_array_get(row, i % 4);
-        if (json_array_size(rows) != 4 || json_array_size(row) != 4 || !json_is_number(number))
-            return spl_fail_field(err, SPL_E_INPUT, name, "%s must be 4 rows of 4 numbers; row %zu, column %zu is %s",
-                                  name, i / 4 + 1, i % 4 + 1, spl_json_type_name(number));
-        m[i] = json_number_value(number);
-    }
-    return set_pose(values, name, m, SPL_AXES_OPENGL, err);
+    int rc = spl_json_get_matrix(get(json, name), name, 4, 4, SPL_ROW_MAJOR, m, err);
+    return rc ? rc : set_pose(values, name, m, SPL_AXES_OPENGL, err);
 }
 
 /* A frame with its own lens, as nerfstudio and instant-ngp know it; what stands beside `frames` is copied into it. */

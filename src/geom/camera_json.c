@@ -8,12 +8,22 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/camera_matrix.h"
+
 static const struct {
     const char *name;
     enum spl_value_kind kind;
     unsigned places; /* of enum spl_value_place */
 } params[SPL_CAMERA_PARAMS] = {
 #define PARAM(name, alias, kind, places, help) {#name, SPL_KIND_##kind, places},
+#include "geom/camera_params.def"
+#undef PARAM
+};
+
+/* All names, each with two more characters: room for any list of them. */
+enum {
+    NAMES_SIZE = 1
+#define PARAM(name, alias, kind, places, help) +sizeof(#name ", ")
 #include "geom/camera_params.def"
 #undef PARAM
 };
@@ -99,7 +109,10 @@ int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const
     if (!most)
         return spl_value_from_choice(value, kind, name, json_string_value(json), err);
     int rc = 0;
-    if (most == 1) {
+    if (kind == SPL_KIND_MATRIX) {
+        value->count = 16;
+        rc = spl_json_get_matrix(json, name, 4, 4, SPL_ROW_MAJOR, value->n, err);
+    } else if (most == 1) {
         rc = number_from_json(value, json, name, err);
     } else if (!json_is_array(json)) {
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array of numbers, not %s", name,
@@ -118,8 +131,12 @@ static int find(const char *name, enum spl_value_place place, struct spl_error *
             return i;
         else if (!strcmp(name, params[i].name))
             return spl_fail_field(err, SPL_E_INPUT, name, "'%s' belongs into the \"camera\" object", name);
-    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s; api/cameras.md lists them", name,
-                          place == SPL_CAMERA ? "camera" : "view");
+    char known[NAMES_SIZE] = "";
+    for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
+        if (params[i].places & place)
+            strcat(strcat(known, *known ? ", " : ""), params[i].name);
+    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s; known are %s", name,
+                          place == SPL_CAMERA ? "camera" : "view", known);
 }
 
 static bool among(const char *name, const char *const *names)

@@ -85,17 +85,16 @@ bool spl_camera_form_has_size(const json_t *camera);
  * extrinsic. Not yet through spl_camera_check(). */
 int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct spl_error *err);
 
-/* A number, and `count` numbers in an array, of an object. What stands before the last dot of `path` is for messages
- * only. */
+/* A number of an object. What stands before the last dot of `path` is for messages only. */
 int spl_json_get_number(const json_t *object, const char *path, double *out, struct spl_error *err);
-int spl_json_get_numbers(const json_t *object, const char *path, unsigned count, double *out, struct spl_error *err);
 
 /* "an object", "text", …: for messages. */
 const char *spl_json_type_name(const json_t *json);
 
 /* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
  * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up
- * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left out. The outcome lies within
+ * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left
+ * out; one side that is left out follows from the other (geom/size.h). The outcome lies within
  * `limits` and has passed spl_camera_check(). */
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
                            const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);

@@ -8,13 +8,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/size.h"
+
 static const char *const names[SPL_CAMERA_PARAMS] = {
 #define PARAM(name, alias, kind, places, help) #name,
 #include "geom/camera_params.def"
 #undef PARAM
 };
-
-enum { width_default = 1280, height_default = 720 };
 
 static bool given(const struct spl_value *v, enum spl_camera_param param)
 {
@@ -45,17 +45,10 @@ static int missing(enum spl_camera_param param, enum spl_camera_param because, s
                           names[because]);
 }
 
-/* glTF's aspect ratio is that of the image: it decides what is left out, and may differ by the rounding to pixels. */
-static int apply_aspect(const struct spl_value *v, double size[2], struct spl_error *err)
+/* glTF's aspect ratio is that of the image: sides that are given may differ from it by the rounding to pixels. */
+static int check_aspect(double aspect, const double size[2], struct spl_error *err)
 {
-    double aspect = v[SPL_CAMERA_fov].n[1];
-    if (aspect == 0)
-        return 0;
-    if (!given(v, SPL_CAMERA_width))
-        size[0] = fmax(1, round(size[1] * aspect));
-    else if (!given(v, SPL_CAMERA_height))
-        size[1] = fmax(1, round(size[0] / aspect));
-    if (fabs(size[1] * aspect - size[0]) < 0.501 || fabs(size[0] / aspect - size[1]) < 0.501)
+    if (aspect == 0 || fabs(size[1] * aspect - size[0]) < 0.501 || fabs(size[0] / aspect - size[1]) < 0.501)
         return 0;
     return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_ASPECT,
                           SPL_GLTF_ASPECT " %g contradicts %.0f x %.0f pixels; leave it out, or width or height",
@@ -65,19 +58,28 @@ static int apply_aspect(const struct spl_value *v, double size[2], struct spl_er
 static int resolve_size(const struct spl_value *v, const struct spl_camera_limits *limits, uint32_t *width,
                         uint32_t *height, struct spl_error *err)
 {
-    double size[2] = {get(v, SPL_CAMERA_width, width_default), get(v, SPL_CAMERA_height, height_default)};
-    int rc = apply_aspect(v, size, err);
+    static const enum spl_camera_param sides[] = {SPL_CAMERA_width, SPL_CAMERA_height};
+    double aspect = v[SPL_CAMERA_fov].n[1], size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
+    const double shape[2] = {aspect != 0 ? SPL_HEIGHT_DEFAULT * aspect : SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT};
+    const char *const fields[] = {"width", "height"};
+    for (int i = 0; i < 2; i++)
+        if (given(v, sides[i]) && !(size[i] >= 1 && size[i] <= limits->side_px))
+            return spl_fail_field(err, SPL_E_INPUT, fields[i], "%s %.0f is outside 1 to %u", fields[i], size[i],
+                                  limits->side_px);
+    spl_size_follow(size, shape);
+    int rc = check_aspect(aspect, size, err);
+    const char *cause = given(v, sides[0])                   ? fields[0]
+                        : aspect != 0 && !given(v, sides[1]) ? SPL_GLTF_ASPECT
+                                                             : fields[1];
+    for (int i = 0; !rc && i < 2; i++)
+        if (size[i] > limits->side_px)
+            rc = spl_fail_field(err, SPL_E_INPUT, cause, "the %s that follows from %s is %.0f; at most %u is allowed",
+                                fields[i], cause, size[i], limits->side_px);
     if (rc)
         return rc;
-    for (int i = 0; i < 2; i++) {
-        const char *name = i ? "height" : "width";
-        if (size[i] < 1 || size[i] > limits->side_px)
-            return spl_fail_field(err, SPL_E_INPUT, name, "%s %.0f is outside 1 to %u", name, size[i], limits->side_px);
-    }
     if (size[0] * size[1] > (double)limits->pixels)
-        return spl_fail_field(err, SPL_E_INPUT, given(v, SPL_CAMERA_width) ? "width" : "height",
-                              "%.0f x %.0f is %.0f pixels; the limit is %llu", size[0], size[1], size[0] * size[1],
-                              (unsigned long long)limits->pixels);
+        return spl_fail_field(err, SPL_E_INPUT, cause, "%.0f x %.0f is %.0f pixels; the limit is %llu", size[0],
+                              size[1], size[0] * size[1], (unsigned long long)limits->pixels);
     *width = (uint32_t)size[0];
     *height = (uint32_t)size[1];
     return 0;

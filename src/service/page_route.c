@@ -101,24 +101,33 @@ void spl_show_embed(struct request *request, const struct spl_call *call)
     reply_with(request, find("viewer/", "embed.html"), headers);
 }
 
-static void show_file(struct request *request, const char *folder, const char *name, const char *const (*headers)[2])
+static void show_file(struct request *request, const char *folder, const char *name, const char *const (*headers)[2],
+                      const char *otherwise)
 {
     const struct asset *asset = find(folder, name);
     if (asset)
         reply_with(request, asset, headers);
     else
-        spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "name", "there is no such file; / is the page");
+        spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "name", otherwise);
 }
 
 void spl_show_viewer_file(struct request *request, const struct spl_call *call)
 {
     static const char *const headers[][2] = {{"Content-Security-Policy", POLICY "'none'"}, {NULL, NULL}};
-    show_file(request, "viewer/", call->name, headers);
+    show_file(request, "viewer/", call->name, headers, "there is no such file; / is the page");
+}
+
+void spl_list_clients(struct request *request, const struct spl_call *call)
+{
+    (void)call;
+    static const char *const headers[][2] = {
+        {"Content-Security-Policy", POLICY "'none'"}, {MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT}, {NULL, NULL}};
+    reply_with(request, find("list/", spl_wants_page(request) ? "clients.html" : "clients.json"), headers);
 }
 
 void spl_show_client(struct request *request, const struct spl_call *call)
 {
     static const char *const headers[][2] = {
         {"Access-Control-Allow-Origin", "*"}, {"Cross-Origin-Resource-Policy", "cross-origin"}, {NULL, NULL}};
-    show_file(request, "clients/", call->name, headers);
+    show_file(request, "clients/", call->name, headers, "there is no such client; /clients/ lists them");
 }

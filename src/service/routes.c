@@ -31,9 +31,9 @@ static void index_page(struct request *request, const struct spl_call *call)
     for (size_t i = 0; i < service->catalog.count; i++)
         if (service->catalog.slots[i].current && spl_access_may_see(request, service->catalog.slots[i].id))
             json_array_append_new(views, json_sprintf("%s/view", service->catalog.slots[i].current->uri));
-    spl_reply_json(request,
-                   json_pack("{s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION, "openapi",
-                             "/v1/openapi.json", "datasets", "/v1/datasets", "status", "/v1/status", "views", views));
+    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version",
+                                      SPLATD_VERSION, "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets",
+                                      "/v1/datasets", "status", "/v1/status", "views", views));
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT);
 }
@@ -75,6 +75,7 @@ static const struct route {
     {"/", GET, SPL_SCOPE_NONE, false, index_page},
     {"/viewer/{name}", GET, SPL_SCOPE_NONE, false, spl_show_viewer_file},
     {"/embed/{name}", GET, SPL_SCOPE_NONE, true, spl_show_embed},
+    {"/clients/", GET, SPL_SCOPE_NONE, false, spl_list_clients},
     {"/clients/{name}", GET, SPL_SCOPE_NONE, false, spl_show_client},
     {"/v1/openapi.yaml", GET, SPL_SCOPE_NONE, false, spl_show_openapi_yaml},
     {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},
@@ -135,7 +136,8 @@ static void refuse_method(struct request *request, unsigned allowed, const char 
             strcat(allow, *allow ? ", " : "");
             strcat(allow, m == SPL_GET ? "GET, HEAD" : methods[m]);
         }
-    snprintf(detail, sizeof detail, "method %.32s is not allowed here; %s are", method, allow);
+    snprintf(detail, sizeof detail, "method %.32s is not allowed here; %s %s", method, allow,
+             strchr(allow, ',') ? "are" : "is");
     spl_reply_problem(request, MHD_HTTP_METHOD_NOT_ALLOWED, "method", "", detail);
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_ALLOW, allow);

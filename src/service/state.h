@@ -19,7 +19,7 @@ enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
     connection_pool = 14 * 1024, /* libmicrohttpd's pool; see oversize.c */
-    reply_bytes_max = 1 << 30, /* in all; beyond, views are refused until clients have read theirs */
+    reply_bytes_max = 1 << 30,   /* in all; beyond, views are refused until clients have read theirs */
 };
 
 enum phase {
@@ -243,6 +243,7 @@ bool spl_wants_page(struct request *request); /* its Accept names text/html, and
 void spl_show_page(struct request *request);
 void spl_show_viewer_file(struct request *request, const struct spl_call *call);
 void spl_show_embed(struct request *request, const struct spl_call *call);
+void spl_list_clients(struct request *request, const struct spl_call *call);
 void spl_show_client(struct request *request, const struct spl_call *call);
 
 /* reply.c: each sets request->response and status; without memory the response stays NULL and the connection closes. */

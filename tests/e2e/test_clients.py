@@ -4,6 +4,7 @@ import math
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -95,9 +96,24 @@ def test_python_on_the_command_line():
             [*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=60
         )
         assert done.returncode == 0 and done.stdout.startswith(JPEG), done
-        for arguments in (["lod=-1"], ["lod"]):
-            done = subprocess.run([*command, *arguments], capture_output=True, timeout=60)
-            assert done.returncode == 1 and not done.stdout and b"splatd.py" in done.stderr, done
+        for arguments, code, said in [
+            ([*command, "lod=-1"], 1, "400: "),
+            ([*command[:3], "none"], 1, "there is no dataset 'none'"),
+            ([*command[:2], "http://127.0.0.1:1", "wall"], 1, "http://127.0.0.1:1: "),
+            ([*command[:2], "http://[", "wall"], 1, "http://[: "),
+            (command[:2], 2, "URL is missing\nusage: splatd.py URL DATASET"),
+            (command[:3], 2, "DATASET is missing\nusage: "),
+            ([*command, "lod=1", "layer"], 2, "'layer' is not NAME=VALUE\nusage: "),
+        ]:
+            done = subprocess.run(arguments, capture_output=True, timeout=60)
+            assert done.returncode == code and not done.stdout, done
+            assert done.stderr.decode().startswith("splatd.py: ") and said in done.stderr.decode(), done
+        done = subprocess.run([*command[:2], "--help"], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0 and "usage: " in done.stdout and "eye=" in done.stdout, done
+        done = subprocess.run(["script", "-qec", shlex.join(map(str, command)), "/dev/null"], capture_output=True, timeout=60)
+        assert done.returncode == 2 and b"> FILE" in done.stdout and b"\xff\xd8" not in done.stdout, done
+        done = subprocess.run([*command[:2], url(d).removeprefix("http://"), "wall", "width=64"], capture_output=True, timeout=60)
+        assert done.returncode == 0 and done.stdout.startswith(JPEG), done
 
 
 def test_shell():
@@ -118,17 +134,35 @@ def test_shell():
         views = [file.read_bytes() for file in sorted(pathlib.Path(folder, "views").iterdir())]
         assert len(views) == len(set(views)) == 3 and all(view.startswith(JPEG) for view in views)
         for arguments, code, said in [
-            ((), 2, "splatd.sh view"),
-            (("paint",), 2, "splatd.sh"),
-            (("view", "wall"), 2, "splatd.sh"),
-            (("ring", "wall", "x", "3", "2", "1", "eye=0,0,1"), 2, "splatd.sh"),
+            ((), 2, "a command is missing; as in\nsplatd.sh datasets\n"),
+            (("paint",), 2, "there is no command 'paint'"),
+            (("datasets", "wall"), 2, "datasets takes nothing, not 'wall'"),
+            (("info",), 2, "info needs DATASET, and DATASET is missing"),
+            (("info", "wall", "lod=1"), 2, "one DATASET, not 'lod=1' as well"),
+            (("view",), 2, "DATASET is missing"),
+            (("view", "wall"), 2, "view needs DATASET FILE, and FILE is missing"),
+            (("view", "wall", "b.jpg", "lod"), 2, "view: 'lod' is not NAME=VALUE"),
+            (("pick", "wall"), 2, "X is missing"),
+            (("pick", "wall", "32"), 2, "Y is missing; as in\nsplatd.sh datasets\n"),
+            (("ring",), 2, "DATASET is missing"),
+            (("ring", "wall"), 2, "DIR is missing"),
+            (("ring", "wall", "x"), 2, "COUNT is missing"),
+            (("ring", "wall", "x", "3"), 2, "RADIUS is missing"),
+            (("ring", "wall", "x", "3", "2"), 2, "HEIGHT is missing"),
+            (("ring", "wall", "x", "3", "2", "1"), 2, "target=X,Y,Z is missing"),
+            (("ring", "wall", "x", "3", "2", "1", "eye=0,0,1"), 2, "target=X,Y,Z in the place of 'eye=0,0,1'"),
+            (("ring", "wall", "x", "0", "2", "1", "target=0,0,1"), 2, "COUNT '0'"),
+            (("ring", "wall", "x", "three", "2", "1", "target=0,0,1"), 2, "COUNT 'three'"),
+            (("ring", "wall", "x", "3", "2m", "1", "target=0,0,1"), 2, "RADIUS '2m' is no number"),
+            (("ring", "wall", "x", "3", "2", "", "target=0,0,1"), 2, "HEIGHT '' is no number"),
             (("info", "none"), 1, "404: there is no dataset 'none'"),
             (("view", "wall", "b.jpg", "lod=-1"), 1, "400: "),
             (("view", "wall", "b.jpg", "background=#12&lod=0"), 1, "background"),
             (("ring", "none", "y", "3", "2", "1", "target=0,0,1"), 1, "404"),
         ]:
             out, err = shell(d, *arguments, code=code, folder=folder)
-            assert not out and said in err, (arguments, err)
+            assert not out and said in err and (code == 1 or "splatd.sh ring hall" in err), (arguments, err)
+        assert shell(d, "--help")[0].startswith(b"splatd.sh datasets\n") and not pathlib.Path(folder, "x").exists()
         assert not pathlib.Path(folder, "b.jpg").exists() and not list(pathlib.Path(folder).glob("*.part"))
 
 

@@ -36,10 +36,14 @@ writes a.jpeg ffd8ff --layer depth
 writes a.png 89504e47 --eye 0,-2,1.6 --target=-1,5,2 --fov 60 --background '#ff000080' --supersample 2
 writes a.png 89504e47 --layer depth --depth-scale 5000 --fx 60 --fy 61 --cx 30 --cy 20.5
 writes a.npy 934e554d5059 --layer normal --method points --lod 0
-writes a.dat 89504e47 --format png --background transparent --margin 2 --near 0.5 --far 100 --no-verify
+writes a.dat 89504e47 --format png --background White --margin 2 --near 0.5 --far 100 --no-verify
 
 bytes=$("$splatd" render courtyard.spld --size 8x4 --layer id --format raw -o - 2>/dev/null | wc -c)
 [ "$bytes" = 128 ] || fail "stdout got $bytes bytes instead of 128"
+for size in 32 x18; do
+    bytes=$("$splatd" render courtyard.spld --size $size --layer id --format raw -o - 2>/dev/null | wc -c)
+    [ "$bytes" = $((32 * 18 * 4)) ] || fail "--size $size: $bytes bytes instead of those of 32x18"
+done
 "$splatd" render --help | grep -q 'A first look' || fail "no help"
 "$splatd" render courtyard.spld --size 8x8 -o a.png 2>/dev/null
 cp a.png before.png

@@ -51,6 +51,9 @@ def test_requests_that_mean_the_same_share_an_etag():
                       "near=0.5",
                       "up=0,1,0", "cx=32.5", "supersample=2", "margin=1.5", "atoms=3", "transparent=true"]:
             assert tag("eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&" + other) != plain, other
+        for left_out, whole in [("width=320", "width=320&height=180"), ("height=45", "width=80&height=45"),
+                                ("background=navy", "background=000080")]:
+            assert tag(left_out) == tag(whole), left_out
         assert d.status()["counters"]["frames"] == 0
 
 

@@ -1,10 +1,12 @@
 """What each route answers when all is well: listings, every format of every layer, every form of a camera."""
+import io
 import json
 import math
 import os
 import pathlib
 import re
 import struct
+import zipfile
 import zlib
 
 import openapi
@@ -224,6 +226,71 @@ def test_a_body_says_all_that_a_query_does():
         assert d.post(same).body == coarse
 
 
+def test_a_side_that_is_left_out_follows_from_the_other():
+    with Daemon(REAL) as d:
+        assert jpeg_size(d.view(width=320).body) == jpeg_size(d.view(height=180).body) == (320, 180)
+        gltf = {"camera": {"gltf": {"perspective": {"yfov": 1, "znear": 0.1, "aspectRatio": 1.5}}}, "width": 90}
+        assert jpeg_size(d.post(gltf).body) == (90, 60)
+        batch = d.post({"width": 160, "container": "zip", "views": [{}, gltf]}, VIEW + "s")
+        with zipfile.ZipFile(io.BytesIO(batch.body)) as views:
+            assert [jpeg_size(views.read(f"00{i}.jpg")) for i in range(2)] == [(160, 90), (90, 60)]
+        assert d.ask(f"{PICK}?x=160.5&y=90.5&width=320").json() == d.ask(f"{PICK}?x=160.5&y=90.5&width=320&height=180").json()
+        assert d.ask(f"{PICK}?x=160.5&y=200&width=320").json()["field"] == "y"
+        assert d.view(height=8192).json()["field"] == "height"
+
+
+def test_a_matrix_may_be_rows():
+    flat = [1, 0, 0, 0, 0, 0, -1, -3, 0, 1, 0, 1, 0, 0, 0, 1]
+    rows = [flat[at:at + 4] for at in range(0, 16, 4)]
+    size = dict(width=64, height=48)
+    with Daemon(REAL) as d:
+        def ask(matrix):
+            reply = d.post({"camera": {"matrix": matrix, "convention": "opengl", "fov": 60}, **size})
+            assert reply.status == 200, reply.body
+            return reply.body
+        assert ask(flat) == ask(rows) == ask(rows[:3])
+        pick = {"x": 32.5, "y": 24.5, "camera": {"matrix": rows, "convention": "opengl", "fov": 60}, **size}
+        assert d.post(pick, PICK).json()["position"]
+        flat_open3d = [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 5, 1]
+        rows_open3d = [flat_open3d[column::4] for column in range(4)]
+        views = [d.post({"camera": {"open3d": {"extrinsic": extrinsic, "intrinsic": {**size, "intrinsic_matrix": k}}}}).body
+                 for extrinsic, k in [(flat_open3d, [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1]),
+                                      (rows_open3d, [[50, 0, 31.5], [0, 50, 23.5], [0, 0, 1]])]]
+        assert views[0] == views[1] and views[0][:2] == b"\xff\xd8", views[0][:300]
+        gltf = d.post({"camera": {"gltf": {"matrix": rows}, "fov": 60}}).json()
+        assert gltf["field"] == "gltf.matrix" and "by columns" in gltf["detail"], gltf
+
+
+def test_what_is_refused_points_to_what_is_served():
+    with Daemon(REAL) as d:
+        for reply in [d.view(zoom=1), d.post({"zoom": 1}), d.post({"camera": {"zoom": 1}}), d.post({"views": [{"zoom": 1}]}, VIEW + "s")]:
+            words = reply.json()["detail"]
+            assert reply.status == 400 and "zoom" in words and not re.search(r"\bapi/", words), words
+            [link] = re.findall(r"/v1/\S+", words)
+            assert d.ask(link).status == 200
+
+
+def test_the_clients_are_listed():
+    with Daemon(REAL) as d:
+        clients = d.ask("/clients/")
+        assert clients.headers["Content-Type"] == "application/json" and "Accept" in clients.headers["Vary"]
+        for entry in clients.json()["clients"]:
+            file = d.ask(entry["uri"])
+            assert file.status == 200 and len(file.body) == entry["bytes"] and entry["about"], entry
+        assert {entry["name"] for entry in clients.json()["clients"]} == {"splat-view.js", "splatd.py", "splatd.sh"}
+        page = d.ask("/clients/", headers={"Accept": "text/html,*/*;q=0.8"})
+        assert page.headers["Content-Type"].startswith("text/html") and "script" not in page.body.decode()
+        assert sorted(re.findall('href="([^"]+)"', page.body.decode())) == sorted(e["uri"] for e in clients.json()["clients"])
+        for accept in ("text/html", "application/json"):
+            got, head = (d.ask("/clients/", method, headers={"Accept": accept}) for method in ("GET", "HEAD"))
+            assert head.status == 200 and not head.body and head.headers["Content-Type"] == got.headers["Content-Type"]
+            assert head.headers["Content-Length"] == str(len(got.body))
+        assert d.ask("/clients/none").json()["detail"].endswith("/clients/ lists them")
+        assert d.ask("/").json()["clients"] == "/clients/"
+        assert d.ask("/clients/", "POST").json()["detail"].endswith("GET, HEAD are")
+        assert d.ask(VIEW + "s").json()["detail"].endswith("POST is")
+
+
 def test_the_same_request_gives_the_same_bytes():
     with Daemon(REAL, "--cache", "0") as d:
         for form in ("jpeg", "png"):
@@ -238,6 +305,9 @@ def test_background_and_methods_change_the_picture():
         away = dict(eye="3,0,1", target="9,0,1", up="0,0,1", width=8, height=4, format="raw")
         assert d.view(**away).body == b"\0\0\0\xff" * 32
         assert d.view(**away, background="#ff8000").body == b"\xff\x80\x00\xff" * 32
+        assert d.view(**away, background="White").body == b"\xff" * 128
+        assert d.post({"camera": {"eye": [3, 0, 1], "target": [9, 0, 1]}, "width": 8, "height": 4, "format": "raw",
+                       "background": "orange"}).body == b"\xff\xa5\x00\xff" * 32
         assert d.view(**away, transparent="true").body[3::4] == b"\0" * 32
         near = dict(**LOOK, width=160, height=120, format="raw")
         assert d.view(**near).body != d.view(**near, method="points").body

@@ -227,6 +227,18 @@ def test_every_format_and_member_is_taken():
         assert d.ask(tour["stream"]).status == 409 and d.ask(tour["uri"] + "/video.mp4").status == 404
 
 
+def test_a_side_that_is_left_out_follows_from_the_path():
+    keys = {"keyframes": [look(3), look(4)]}
+    wide = {"keyframes": [{**look(3), "width": 100}, {"camera": {**look(4)["camera"], "height": 50}}]}
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
+        for path, settings, size in [(nerfstudio()[1], {"width": 32}, (32, 24)), (nerfstudio()[1], {"height": 96}, (128, 96)),
+                                     (keys, {"width": 64}, (64, 36)), (keys, {"height": 9}, (16, 9)),
+                                     (wide, {"width": 64}, (64, 36))]:
+            tour = begin(d, {"path": path, "settings": settings, "frames": 2})
+            assert (tour["width"], tour["height"]) == size, (settings, tour)
+            ended(d, tour["uri"])
+
+
 def test_bad_tours_are_refused_by_field():
     cases = [
         ("", "body"), ("[]", "body"), ("{", "body"), ({}, "path"), ({"path": 5}, "path"), ({"path": {}}, "path"),
@@ -239,7 +251,7 @@ def test_bad_tours_are_refused_by_field():
         ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),
         ({**body(), "interpolation": {"positions": "cubic"}}, "positions"),
         ({**body(), "interpolation": {"rotations": 7}}, "rotations"), ({**body(), "settings": []}, "settings"),
-        ({**body(), "settings": {"width": 64}}, "settings.width"),
+        ({**body(), "settings": {"width": 9999}}, "settings.width"), ({**body(), "settings": {"height": 8192}}, "height"),
         ({**body(), "settings": {"width": 64, "height": 9999}}, "settings.height"),
         ({**body(), "settings": {"quality": 500}}, "settings.quality"),
         ({**body(), "settings": {"camera": {}}}, "settings.camera"), ({**body(), "settings": {"x": 1}}, "settings.x"),

@@ -2,9 +2,11 @@
 a message on stderr, README.md names the command.
 
 usage: commands.py SPLATD README.md"""
+import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
 SPLATD, README = sys.argv[1], open(sys.argv[2], encoding="utf-8").read()
 wrong = []
@@ -30,6 +32,28 @@ for command in commands:
     check([command, "--no-such-option"], 2, "stderr")
     if f"`splatd {command}" not in README:
         wrong.append(f"README.md does not show splatd {command}")
+# What is missing is named, beside an example that has it.
+for words, wanted in {
+    "serve": r"NAME\.spld.*: splatd serve \S+\.spld", "pack": r"one scan: splatd pack \S+ -o \S+\.spld",
+    "pack a.ply": r"-o NAME\.spld", "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
+    "render a.spld b.spld -o c.png": "takes one dataset", "tour": r"one dataset: splatd tour \S+ --path \S+ -o \S+",
+    "tour a.spld -o b.mp4": "--path FILE", "tour a.spld --path b.json": r"-o OUT\.mp4",
+    "info": r"one dataset: splatd info \S+\.spld", "synth": r"one SCENE: splatd synth \S+ -o \S+", "synth courtyard": "-o DIR",
+    "bench": r"one dataset: splatd bench \S+\.spld", "bench --left-out a.spld": "--cameras is missing",
+    "bench --textures a.tex": "-o OUT is missing", "compare": r"IMAGE and a TRUTH: splatd compare \S+ \S+",
+    "compare a.png": "TRUTH, which is missing", "sign": "URL.*--key FILE.*--help", "render a.spld -o b.png --size 3x": "1280x720",
+    "render a.spld -o b.png --background rad": "white", "render a.spld -o": "requires an argument.*\n.*splatd render --help",
+}.items():
+    said = check(words.split(), 2, "stderr")
+    if not re.search(wanted, said):
+        wrong.append(f"splatd {words}: {said!r} does not say {wanted!r}")
+with tempfile.TemporaryDirectory() as folder:
+    scan = pathlib.Path(folder, "scan.xyz")
+    scan.write_text("".join(f"{x} {y} 0\n" for x in range(20) for y in range(20)))
+    before, same = scan.read_bytes(), pathlib.Path(folder, "same.xyz")
+    same.symlink_to(scan)
+    if "-o NAME.spld" not in check(["pack", str(same), "-o", str(scan)], 2, "stderr") or scan.read_bytes() != before:
+        wrong.append("splatd pack writes over its scan")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")

@@ -38,7 +38,8 @@ int spl_percent_decode(const char *text, size_t length, char *out, size_t capaci
 }
 
 /* Plain decimal numbers; strtod alone would also take hex floats, blanks, "nan" and "infinity". */
-static int parse_number(const char *text, size_t length, const char *name, double *out, struct spl_error *err)
+static int parse_number(const char *text, size_t length, const char *name, bool several, double *out,
+                        struct spl_error *err)
 {
     char copy[text_max];
     memcpy(copy, text, length); // the caller's buffer has the same size
@@ -51,18 +52,20 @@ static int parse_number(const char *text, size_t length, const char *name, doubl
     if (length && strspn(copy, "0123456789+-.eE") == length)
         number = strtod(copy, &end);
     if (end != copy + length || !length)
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is not a number", name, copy);
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is not a number%s", name, copy,
+                              several ? "; join them by commas, without blanks" : "");
     *out = number;
     return 0;
 }
 
-static int parse_numbers(struct spl_value *value, const char *text, const char *name, struct spl_error *err)
+static int parse_numbers(struct spl_value *value, const char *text, const char *name, bool several,
+                         struct spl_error *err)
 {
     for (const char *p = text;;) {
         size_t length = strcspn(p, ",");
         double ignored;
         bool room = value->count < SPL_VALUE_NUMBERS;
-        int rc = parse_number(p, length, name, room ? &value->n[value->count] : &ignored, err);
+        int rc = parse_number(p, length, name, several, room ? &value->n[value->count] : &ignored, err);
         if (rc)
             return rc;
         value->count++;
@@ -96,7 +99,7 @@ static int parse_pair(struct values *values, const char *pair, size_t length, en
     spl_kind_get_count((enum spl_value_kind)kind, &least, &most);
     if (!most)
         return spl_value_from_text(value, kind, name, text, err);
-    if ((rc = parse_numbers(value, text, name, err)))
+    if ((rc = parse_numbers(value, text, name, most > 1, err)))
         return rc;
     return spl_value_check(value, (enum spl_value_kind)kind, name, err);
 }

@@ -7,6 +7,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "image/color.h"
+
 #define LAYER_NAMES "color, depth, range, normal, id, coverage"
 
 const struct param_info spl_params[PARAM_COUNT] = {
@@ -37,7 +39,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
-    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; api/openapi.yaml lists those of a view", name);
+    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; /v1/openapi.json lists those of a view", name);
     return PARAM_COUNT;
 }
 
@@ -51,21 +53,11 @@ int spl_hex_digit(char c)
 
 static int parse_color(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
-    if (!strcmp(text, "transparent")) {
-        value->n[3] = 0; // the rest is 0 already
-        return 0;
-    }
-    const char *digits = text[0] == '#' ? text + 1 : !strncasecmp(text, "0x", 2) ? text + 2 : text;
-    size_t length = strlen(digits);
-    bool good = length == 6 || length == 8;
-    for (size_t i = 0; good && i < length; i++)
-        good = spl_hex_digit(digits[i]) >= 0;
-    if (!good)
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write RRGGBB, RRGGBBAA or transparent",
-                              name, text);
-    value->n[3] = 255;
-    for (size_t i = 0; i < length / 2; i++)
-        value->n[i] = spl_hex_digit(digits[2 * i]) * 16 + spl_hex_digit(digits[2 * i + 1]);
+    uint8_t rgba[4];
+    if (!spl_color_from_text(text, rgba))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write " SPL_COLOR_FORMS, name, text);
+    for (int i = 0; i < 4; i++)
+        value->n[i] = rgba[i];
     return 0;
 }
 

@@ -12,6 +12,8 @@
 #include "cloud/path.h"
 #include "image/video.h"
 
+static const char *const sides[] = {"width", "height"};
+
 static int fail_type(const char *name, const char *wanted, const json_t *json, struct spl_error *err)
 {
     return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name, wanted, spl_json_type_name(json));
@@ -27,8 +29,8 @@ static int check_keys(json_t *object, const char *where, const char *const *know
         while (*k && strcmp(*k, name))
             k++;
         if (!*k)
-            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of %s; api/tours.md lists them", name,
-                                  where);
+            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of %s; /v1/openapi.json lists them",
+                                  name, where);
     }
     return 0;
 }
@@ -98,9 +100,12 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
         return fail_type("settings", "an object", settings, err);
     if (json_object_get(settings, "camera"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
-    if (!json_object_get(settings, "width") != !json_object_get(settings, "height"))
-        return spl_fail_field(err, SPL_E_INPUT, "settings.width", "width and height are given together or not at all");
-    char *text = settings ? json_dumps(settings, JSON_COMPACT) : strdup("");
+    json_t *sized = settings ? json_copy((json_t *)settings) : json_object();
+    for (int i = 0; sized && i < 2; i++) // what is left out follows from the path, and is held against the limits there
+        if (json_object_get(sized, sides[!i]) && !json_object_get(sized, sides[i]))
+            json_object_set_new(sized, sides[i], json_integer(1));
+    char *text = sized ? json_dumps(sized, JSON_COMPACT) : NULL;
+    json_decref(sized);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the settings");
     int rc = spl_view_request_from_json(text, strlen(text), defaults, limits, view, &why);
@@ -128,13 +133,14 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
     struct spl_camera_defaults own = *defaults;
     own.near = camera->near;
     own.far = camera->far;
-    bool sized = json_object_get(json_object_get(body, "settings"), "width");
-    struct spl_path_options options = {.width = sized ? camera->width : 0,
-                                       .height = sized ? camera->height : 0,
+    const json_t *settings = json_object_get(body, "settings");
+    struct spl_path_options options = {.width = json_object_get(settings, sides[0]) ? camera->width : 0,
+                                       .height = json_object_get(settings, sides[1]) ? camera->height : 0,
                                        .defaults = &own,
                                        .limits = &limits->image};
     if (!json)
-        return spl_fail_field(err, SPL_E_INPUT, "path", "a tour needs a path; api/tours.md lists the formats");
+        return spl_fail_field(err, SPL_E_INPUT, "path",
+                              "a tour needs a path; TourRequest in /v1/openapi.json has the formats");
     return spl_camera_path_from_json(json, &options, path, err);
 }
 

@@ -20,6 +20,10 @@
     "0.60698607043454015,-0.19761352719368059,0.76975113132005719,0,"                                                  \
     "0.13077993598406572,-0.93054759679636629,-0.34202014332566873,0,"                                                 \
     "-0.06410832213881687,0.16613728300474614,4.6401280721795111,1]"
+#define EXTRINSIC_ROWS                                                                                                 \
+    "[[0.78387787227503695,0.60698607043454015,0.13077993598406572,-0.06410832213881687],"                             \
+    "[0.30826946648440512,-0.19761352719368059,-0.93054759679636629,0.16613728300474614],"                             \
+    "[-0.53898554469575628,0.76975113132005719,-0.34202014332566873,4.6401280721795111],[0,0,0,1]]"
 #define POSE                                                                                                           \
     "\"matrix\":[0.78387787227503695,0.30826946648440512,-0.53898554469575628,2.5,"                                    \
     "0.60698607043454015,-0.19761352719368059,0.76975113132005719,-3.5,"                                               \
@@ -71,6 +75,10 @@ static void every_form_hits_the_golden_pixel(void **state)
          412.5, 273.125, 1, INFINITY},
         {OPEN3D(EXTRINSIC, INTRINSIC), 412.5, 273.125, 1, INFINITY},
         {ROS("\"k\":" K ",\"d\":[0,0,0,0,0],\"distortion_model\":\"plumb_bob\""), 412.5, 273.125, 1, INFINITY},
+        {OPEN3D(EXTRINSIC_ROWS, SIZE ",\"intrinsic_matrix\":[[500,0,330.75],[0,510,228],[0,0,1]]"), 412.5, 273.125, 1,
+         INFINITY},
+        {ROS("\"k\":[[500,0,330.75],[0,510,228],[0,0,1]]"), 412.5, 273.125, 1, INFINITY},
+        {ROS("\"p\":[[500,0,330.75,0],[0,510,228,0],[0,0,1,0]]"), 412.5, 273.125, 1, INFINITY},
         {ROS("\"p\":" P ",\"d\":[]"), 412.5, 273.125, 1, INFINITY},
         {ROS("\"k\":" K ",\"p\":" P), 412.5, 273.125, 1, INFINITY},
         {FRAME("\"w\":640,\"h\":480,\"fl_x\":500,\"fl_y\":510,\"cx\":331.25,\"cy\":228.5,\"k1\":0,\"p2\":0,"
@@ -148,6 +156,7 @@ static void faults_carry_the_members_name(void **state)
         {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"aspectRatio\":0"), "gltf.perspective.aspectRatio"},
         {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"aspectRatio\":1e300"), "gltf.perspective.aspectRatio"},
         {GLTF("\"matrix\":[1,2,3]," LENS), "gltf.matrix"},
+        {GLTF("\"matrix\":" ROWS "," LENS), "gltf.matrix"},                          /* flat by its standard */
         {GLTF("\"matrix\":[1,0,0,4,0,1,0,5,0,0,1,6,0,0,0,1]," LENS), "gltf.matrix"}, /* row-major */
         {GLTF("\"matrix\":[1,0,0,0,0,1,0,0,0,0,-1,0,0,0,0,1]," LENS), "gltf.matrix"},
         {GLTF("\"matrix\":[2,0,0,0,0,2,0,0,0,0,2,0,0,0,0,1]," LENS), "gltf.matrix"},
@@ -163,6 +172,10 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{\"gltf\":{\"matrix\":" I16 "," LENS "},\"eye\":[1,2,3]}}", "eye"},
         {"{\"gltf\":{},\"camera\":{}}", "gltf"},
         {OPEN3D("[1]", INTRINSIC), "open3d.extrinsic"},
+        {OPEN3D("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[1,2,3,1]]", INTRINSIC), "open3d.extrinsic"}, /* columns as rows */
+        {OPEN3D(I16, SIZE ",\"intrinsic_matrix\":[[5,0,0],[0,5,0],[2,2,1]]"), "open3d.intrinsic.intrinsic_matrix"},
+        {OPEN3D(I16, SIZE ",\"intrinsic_matrix\":[[5,0,2],[0,5,2]]"), "open3d.intrinsic.intrinsic_matrix"},
+        {ROS("\"p\":[[500,0,330.75,0],[0,510,228,0]]"), "ros.p"},
         {OPEN3D("[1,0,0,5,0,1,0,0,0,0,1,0,0,0,0,1]", INTRINSIC), "open3d.extrinsic"},
         {OPEN3D("[1,0,0,0,0,1,0,0,0,0,-1,0,0,0,0,1]", INTRINSIC), "open3d.extrinsic"},
         {OPEN3D("[1,0,0,0,0,1,0,0,0,0,1,0,0,0,1e13,1]", INTRINSIC), "open3d.extrinsic"},
@@ -211,8 +224,8 @@ static void faults_carry_the_members_name(void **state)
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"k4\":0.1", ROWS), "nerfstudio.k4"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"p2\":null", ROWS), "nerfstudio.p2"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"camera_model\":\"OPENCV_FISHEYE\"", ROWS), "nerfstudio.camera_model"},
-        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", I16), "nerfstudio.transform_matrix"},
-        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]"), "nerfstudio.transform_matrix"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[1,0,0,0,0,1,0,0,0,0,1,0]"), "nerfstudio.transform_matrix"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0],[0,1,0],[0,0,1]]"), "nerfstudio.transform_matrix"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"),
          "nerfstudio.transform_matrix"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[4,5,6,1]]"),

@@ -256,7 +256,7 @@ static void queries_are_refused_by_name(void **state)
         {"quality=0", "quality"},
         {"quality=101", "quality"},
         {"quality=90.5", "quality"},
-        {"background=red", "background"},
+        {"background=rad", "background"},
         {"background=12345", "background"},
         {"background=%231234567", "background"},
         {"BackgroundColor=0xGG0000", "BackgroundColor"},
@@ -344,6 +344,136 @@ static void bodies_are_refused_by_name(void **state)
     assert_non_null(strstr(err.message, "line 3"));
 }
 
+/* 16:9, to the nearest pixel, halves up; the camera's own ratio where it has one. Beyond the caps the side that was
+ * given is at fault. */
+static void a_side_that_is_left_out_follows(void **state)
+{
+    (void)state;
+#define GLTF(aspect, rest) "{\"camera\":{\"gltf\":{\"perspective\":{\"yfov\":1,\"znear\":1" aspect "}}}" rest "}"
+    static const struct {
+        const char *text;
+        uint32_t width, height;
+    } sizes[] = {
+        {"width=320", 320, 180},
+        {"height=180", 320, 180},
+        {"width=8", 8, 5},
+        {"width=7", 7, 4},
+        {"width=1", 1, 1},
+        {"height=1", 2, 1},
+        {"height=4608", 8192, 4608},
+        {"width=320&height=320", 320, 320},
+        {"width=320&fx=300&cx=9&cy=9", 320, 180},
+        {"{\"width\":640}", 640, 360},
+        {"{\"camera\":{\"height\":90}}", 160, 90},
+        {GLTF("", ",\"width\":320"), 320, 180},
+        {GLTF(",\"aspectRatio\":1.5", ",\"width\":300"), 300, 200},
+        {GLTF(",\"aspectRatio\":1.5", ",\"height\":300"), 450, 300},
+    };
+    struct spl_view_request r;
+    struct spl_error err;
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        const char *text = sizes[i].text;
+        if ((*text == '{' ? json : query)(text, &r, &err))
+            fail_msg("%s: %s", text, err.message);
+        if (r.view.camera.width != sizes[i].width || r.view.camera.height != sizes[i].height)
+            fail_msg("%s: %u x %u", text, r.view.camera.width, r.view.camera.height);
+    }
+    static const struct refusal queries[] = {
+        {"width=0", "width"},      {"height=0", "height"},  {"height=4609", "height"},
+        {"height=8192", "height"}, {"width=9000", "width"}, {"width=8192&height=0", "height"},
+    };
+    static const struct refusal bodies[] = {
+        {GLTF(",\"aspectRatio\":0.001", ",\"width\":300"), "width"},
+        {GLTF(",\"aspectRatio\":1000", ",\"height\":300"), "height"},
+        {GLTF(",\"aspectRatio\":1000", ""), "gltf.perspective.aspectRatio"},
+    };
+    assert_refused(query, queries, sizeof queries / sizeof *queries);
+    assert_refused(json, bodies, sizeof bodies / sizeof *bodies);
+#undef GLTF
+}
+
+static void matrices_are_taken_as_rows(void **state)
+{
+    (void)state;
+#define FLAT "1,0,0,0.5, 0,0,-1,-5, 0,1,0,2, 0,0,0,1"
+#define ROW3 "[1,0,0,0.5],[0,0,-1,-5],[0,1,0,2]"
+#define MATRIX(m) "{\"camera\":{\"matrix\":[" m "],\"convention\":\"opengl\",\"fov\":50}}"
+    struct spl_view_request flat, rows;
+    struct spl_error err;
+    assert_int_equal(json(MATRIX(FLAT), &flat, &err), 0);
+    static const char *const same[] = {MATRIX(ROW3 ",[0,0,0,1]"), MATRIX(ROW3)};
+    for (size_t i = 0; i < sizeof same / sizeof *same; i++) {
+        if (json(same[i], &rows, &err))
+            fail_msg("%s: %s", same[i], err.message);
+        assert_memory_equal(&flat.view.camera, &rows.view.camera, sizeof flat.view.camera);
+    }
+    static const struct refusal bodies[] = {
+        {MATRIX("1,0,0,0.5, 0,0,-1,-5, 0,1,0,2"), "matrix"},
+        {MATRIX(ROW3 ",[0,0,0]"), "matrix"},
+        {MATRIX(ROW3 ",0"), "matrix"},
+        {MATRIX(ROW3 ",[0,0,0,1],[0,0,0,1]"), "matrix"},
+        {MATRIX(ROW3 ",[1,2,3,1]"), "matrix"},
+        {MATRIX("[1,0,0,0.5],[0,0,-1,-5],[0,1,0,\"2\"]"), "matrix"},
+        {MATRIX("[[1]],[0,0,-1,-5],[0,1,0,2]"), "matrix"},
+        {MATRIX("[" FLAT "]"), "matrix"},
+        {MATRIX(""), "matrix"},
+    };
+    assert_refused(json, bodies, sizeof bodies / sizeof *bodies);
+}
+
+static void colours_have_names(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        uint8_t rgba[4];
+    } colours[] = {
+        {"background=white", {255, 255, 255, 255}},
+        {"background=RebeccaPurple", {102, 51, 153, 255}},
+        {"background=aliceblue", {240, 248, 255, 255}},
+        {"background=yellowgreen", {154, 205, 50, 255}},
+        {"background=Transparent", {0, 0, 0, 0}},
+        {"BackgroundColor=tan", {210, 180, 140, 255}},
+        {"background=decade", {0xde, 0xca, 0xde, 255}}, /* digits, no name */
+        {"{\"background\":\"grey\"}", {128, 128, 128, 255}},
+    };
+    struct spl_view_request r;
+    struct spl_error err;
+    for (size_t i = 0; i < sizeof colours / sizeof *colours; i++) {
+        const char *text = colours[i].text;
+        if ((*text == '{' ? json : query)(text, &r, &err))
+            fail_msg("%s: %s", text, err.message);
+        assert_memory_equal(r.view.background, colours[i].rgba, 4);
+    }
+    static const struct refusal refusals[] = {{"background=", "background"},
+                                              {"background=whit", "background"},
+                                              {"background=whites", "background"},
+                                              {"background=%23white", "background"},
+                                              {"background=0xwhite", "background"}};
+    assert_refused(query, refusals, sizeof refusals / sizeof *refusals);
+}
+
+static void refusals_say_what_to_write(void **state)
+{
+    (void)state;
+    static const char *const rows[][2] = {
+        {"eye=1, 2,3", "by commas, without blanks"},
+        {"eye=(1,2,3)", "by commas"},
+        {"eye=0,0,5&target=0,0,0", "up=0,1,0"},
+        {"eye=0,5,0&target=0,0,0&up=0,1,0", "up=0,0,1"},
+        {"background=#fff", "a CSS name such as white, RRGGBB"},
+        {"zoom=3", "/v1/openapi.json"},
+        {"height=8192", "the width that follows from height is 14564; at most 8192"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view_request r;
+        struct spl_error err;
+        assert_int_equal(query(rows[i][0], &r, &err), SPL_E_INPUT);
+        if (!strstr(err.message, rows[i][1]))
+            fail_msg("%s: '%s' does not say '%s'", rows[i][0], err.message, rows[i][1]);
+    }
+}
+
 static void percent_decoding_is_exact(void **state)
 {
     (void)state;
@@ -361,10 +491,17 @@ static void percent_decoding_is_exact(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_given_is_the_default_view), cmocka_unit_test(every_parameter_arrives),
-        cmocka_unit_test(ogc_names_mean_the_same),           cmocka_unit_test(camera_forms_agree),
-        cmocka_unit_test(queries_are_refused_by_name),       cmocka_unit_test(bodies_are_refused_by_name),
-        cmocka_unit_test(percent_decoding_is_exact),         cmocka_unit_test(demands_arrive),
+        cmocka_unit_test(nothing_given_is_the_default_view),
+        cmocka_unit_test(every_parameter_arrives),
+        cmocka_unit_test(ogc_names_mean_the_same),
+        cmocka_unit_test(camera_forms_agree),
+        cmocka_unit_test(queries_are_refused_by_name),
+        cmocka_unit_test(bodies_are_refused_by_name),
+        cmocka_unit_test(percent_decoding_is_exact),
+        cmocka_unit_test(demands_arrive),
+        cmocka_unit_test(a_side_that_is_left_out_follows),
+        cmocka_unit_test(matrices_are_taken_as_rows),
+        cmocka_unit_test(colours_have_names),                cmocka_unit_test(refusals_say_what_to_write),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

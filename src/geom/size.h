@@ -1,0 +1,20 @@
+/* Sizes of images of which one side, or both, are left out. */
+#ifndef SPL_GEOM_SIZE_H
+#define SPL_GEOM_SIZE_H
+
+#include <math.h>
+
+enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
+
+/* Fills the sides of `size`, width and height, that are 0: both from `shape`, one from the other at the ratio of
+ * `shape`, to the nearest pixel, halves up, at least 1. A shape of 0 x 0 leaves them 0. No upper limit: the caller
+ * has one. */
+static inline void spl_size_follow(double size[2], const double shape[2])
+{
+    const double given[2] = {size[0], size[1]};
+    for (int i = 0; i < 2; i++)
+        if (given[i] == 0 && shape[i] > 0)
+            size[i] = fmax(1, round(given[!i] > 0 ? given[!i] * shape[i] / shape[!i] : shape[i]));
+}
+
+#endif

@@ -1,0 +1,126 @@
+"""The examples of the documents and of every --help, as they are printed there: each curl gets an answer from a daemon, each
+splatd and splatd.sh does what it says on small inputs. A splatd command may fail for one reason only, that a file is not
+there which its reader would have (a scan, photographs); benchmarks and daemons run in an empty folder, so that they get as
+far as their arguments."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__)
+ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve()
+sys.path.insert(0, str(HERE.parents[1] / "http"))
+from harness import REAL, TEXTURED, WALL, Daemon, run
+
+COMMANDS = "serve pack render tour info synth bench compare devices sign".split()
+SERVICE = "http://127.0.0.1:8080"
+# What an example of a reader's own site needs, which no test has.
+ELSEWHERE = re.compile(r"https://|\$TOKEN|docker |kubectl ")
+# (command, what its example has, what is put behind it so that it does not take long)
+SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--size 16x12"),
+           ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"),
+           ("render", "", "--size 32")]
+
+
+def help_of(command):
+    return subprocess.run([REAL, command, "--help"], capture_output=True, text=True, check=True, timeout=60).stdout
+
+
+def complete(text):
+    """Whether quotes are closed and the line does not go on."""
+    plain = re.sub(r"'[^']*'|\"(\\.|[^\"\\])*\"", "", text)
+    return not text.endswith("\\") and "'" not in plain and '"' not in plain
+
+
+def examples():
+    """(where, command) of every line of code that begins with splatd, splatd.sh or curl, joined with those it goes on in."""
+    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "deploy/operating.md")}
+    texts.update((str(file.relative_to(ROOT)), file.read_text(encoding="utf-8")) for file in sorted((ROOT / "api").rglob("*.md")))
+    for command in COMMANDS:
+        words = help_of(command)
+        texts[f"splatd {command} --help"] = re.sub(r"^usage:(.*\n)(       .*\n)*", "", words)
+    for where, text in texts.items():
+        lines = re.sub(r"^```.*$", "", text, flags=re.M).splitlines()
+        while lines:
+            line = lines.pop(0)
+            if not re.match(r"\s*(splatd(\.sh)?|curl) [\w'\"$-]", line) or not (line[0] == " " or "curl" in line):
+                continue
+            while not complete(line) and lines:
+                line += "\n" + lines.pop(0)
+            if not ELSEWHERE.search(line) and "..." not in line and "…" not in re.sub("#.*", "", line):
+                yield where, line.strip()
+
+
+def bash(command, folder, **environment):
+    return subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, errors="replace", timeout=120,
+                          env={**os.environ, **environment})
+
+
+def test_requests():
+    functions = 'curl() { command curl -sS --fail-with-body -o got "$@"; }; splatd.sh() { "$CLIENT" "$@"; }; '
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as tours:
+        datasets = [str(pathlib.Path(folder, name)) for name in ("hall.spld", "courtyard.spld")]
+        for file in datasets:
+            shutil.copy(WALL, file)
+        pathlib.Path(folder, "camera_path.json").write_text(PATH)
+        with Daemon(REAL, "--tours", tours, datasets=datasets) as d:
+            here = f"http://127.0.0.1:{d.port}"
+            asked = 0
+            for where, command in examples():
+                if not re.match(r"curl|splatd\.sh", command):
+                    continue
+                asked += 1
+                url = f"{here}/v1/datasets/{'courtyard/view' if 'serve' in where else 'hall'}"
+                done = bash(functions + command.replace(SERVICE, here), folder, url=url, SPLATD_URL=here,
+                            CLIENT=str(ROOT / "api/clients/splatd.sh"))
+                refused = "without libavcodec" in done.stdout + pathlib.Path(folder, "got").read_text(errors="replace")
+                assert done.returncode == 0 or refused, (where, command, done.stdout[-500:], done.stderr[-500:])
+            assert asked >= 12, asked
+            for file in [ROOT / "README.md", *(ROOT / "api").rglob("*.md")]:
+                for address in re.findall(r"(?<!\()" + re.escape(SERVICE) + r"(/[^\s\"'`#)<]*)", file.read_text(encoding="utf-8")):
+                    if not address.endswith("/tours"):
+                        assert d.ask(address).status == 200, (file, address)
+
+
+PATH = """{"camera_path": [{"camera_to_world": [0,0,1,3, 1,0,0,0, 0,1,0,1, 0,0,0,1], "fov": 60},
+ {"camera_to_world": [0,0,1,2, 1,0,0,0, 0,1,0,1, 0,0,0,1], "fov": 60}], "render_width": 64, "render_height": 48, "fps": 24}"""
+
+
+def test_commands():
+    with tempfile.TemporaryDirectory() as full, tempfile.TemporaryDirectory() as empty:
+        pathlib.Path(full, "camera_path.json").write_text(PATH)
+        pathlib.Path(full, "groundtruth.txt").write_text("1 3 0 1 0 0 0 1\n2 3 0 2 0 0 0 1\n")
+        pathlib.Path(full, "keys.json").write_text('{"keyframes": [{"camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "fov": 60}},'
+                                                   ' {"camera": {"eye": [2, 1, 1], "target": [0, 0, 1], "fov": 60}}], "fps": 2}')
+        key = pathlib.Path(full, "url.key")
+        key.write_text("0123456789abcdef0123456789abcdef\n")
+        key.chmod(0o600)
+        made = bash(f"{REAL} synth courtyard --points 3000 --format ply -o . && mv courtyard.ply hall.ply", full)
+        assert made.returncode == 0, made
+        ran = set()
+        for where, example in examples():
+            for command in re.split(r"&&|\|", example):
+                found = re.match(r"\s*splatd (\w+)(.*)", command, re.S)
+                if not found:
+                    continue
+                name, rest = found.groups()
+                assert name in COMMANDS, (where, command)
+                for file, source in ("hall.spld", TEXTURED), ("courtyard.spld", WALL):  # others may have written over them
+                    shutil.copy(source, pathlib.Path(full, file))
+                folder = empty if name in ("bench", "serve") else full
+                rest = re.sub(r"\s{2,}#.*", "", rest.replace("\\\n", " "))
+                rest, arrow, target = rest.partition(" >")
+                rest += " ".join(["", *(more for which, has, more in SMALLER if which == name and has in rest)])
+                done = bash(f"{REAL} {name}{rest} {arrow}{target}", folder)
+                absent = re.search(r"no such file|No such file|is no file", done.stderr)
+                unbuilt = name == "tour" and "libavcodec" in done.stderr
+                assert done.returncode == 0 or absent or unbuilt, (where, command, done.returncode, done.stderr)
+                if done.returncode == 0:
+                    ran.add(name)
+        assert ran == {"pack", "render", "tour", "info", "synth", "devices", "sign"}, ran
+
+
+run(globals())
