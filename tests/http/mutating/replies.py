@@ -1,0 +1,210 @@
+"""What a connection must carry back for the requests that went into it.
+
+Strict, where clients are mild: exact line ends, no header of framing twice, chunks to the byte, nothing after HEAD, 204 and 304,
+each reply with the X-Request-Id of the request whose turn it is, and nothing left over. `fault()` is a pure function of
+what was sent, what was received and how the connection ended, so that --self-test can plant whatever it likes."""
+import dataclasses
+import json
+import re
+
+STATUS_LINE = re.compile(rb"HTTP/1\.1 ([1-5]\d\d) [\x20-\x7e]*\r\n")
+FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([\x20-\x7e]*)\r\n")
+CHUNK = re.compile(rb"([0-9a-fA-F]{1,8})\r\n")
+SINGLE = {"content-length", "transfer-encoding", "connection", "x-request-id", "content-type", "date"}
+
+# What a request may hope for.
+ANSWER = "answer"  # framed as it should be: one reply, with its id
+EITHER = "either"  # broken without being ambiguous: that reply, or a refusal as below
+REFUSE = "refuse"  # where it ends is a matter of opinion: 4xx or 5xx, closed, and nothing behind it is read
+REST = "rest"  # from here on the bytes are no requests of ours; replies need only look like some
+
+
+@dataclasses.dataclass
+class Sent:
+    data: bytes
+    method: str = "GET"
+    id: str = ""
+    expect: str = ANSWER
+    version: str = "1.1"
+    closes: bool = False  # asks for the end of the connection
+    may_close: bool = False  # may be answered before all of its body is read, and the connection closed then
+    may_break: bool = False  # a stream whose source can go away, which only a broken end can say
+    continues: bool = False  # asked to be told to go on
+    statuses: tuple = ()  # () = any that is no fault by itself
+    tags: tuple = ()  # what was done to it
+
+
+@dataclasses.dataclass
+class Reply:
+    status: int
+    headers: dict
+    body: bytes
+    end: int  # position behind it
+    framed: bool  # False: it ends with the connection
+
+
+class Short(Exception):
+    """The bytes end before the reply does."""
+
+
+class Fault(Exception):
+    pass
+
+
+def _match(pattern, data, at, what):
+    found = pattern.match(data, at)
+    if not found:
+        line_end = data.find(b"\n", at)
+        if line_end < 0 and len(data) - at < 20000:
+            raise Short(what)
+        raise Fault(f"no {what}: {data[at:at + 80]!r}")
+    return found
+
+
+def _chunks(data, at):
+    body = b""
+    while True:
+        found = _match(CHUNK, data, at, "chunk size")
+        at, length = found.end(), int(found[1], 16)
+        if not length:
+            while data[at:at + 2] != b"\r\n":
+                at = _match(FIELD, data, at, "trailer").end()
+            return body, at + 2
+        if len(data) < at + length + 2:
+            raise Short("chunk")
+        if data[at + length:at + length + 2] != b"\r\n":
+            raise Fault(f"a chunk of {length} bytes is followed by {data[at + length:at + length + 20]!r}")
+        body += data[at:at + length]
+        at += length + 2
+
+
+def read_reply(data, at, method, ended):
+    """The reply that begins at `at`; raises Short or Fault."""
+    found = _match(STATUS_LINE, data, at, "status line")
+    at, status, headers = found.end(), int(found[1]), {}
+    while data[at:at + 2] != b"\r\n":
+        found = _match(FIELD, data, at, "header")
+        name, value = found[1].decode().lower(), found[2].decode().strip()
+        if name in headers and name in SINGLE:
+            raise Fault(f"header {name} stands twice in one reply")
+        headers[name], at = value, found.end()
+    at += 2
+    length, coding = headers.get("content-length"), headers.get("transfer-encoding")
+    if length is not None and coding is not None:
+        raise Fault("a reply with Content-Length and Transfer-Encoding")
+    if length is not None and not re.fullmatch(r"\d{1,18}", length):
+        raise Fault(f"a reply with Content-Length: {length}")
+    if status < 200 or status == 204:
+        if coding or length not in (None, "0"):
+            raise Fault(f"a {status} with a body")
+        return Reply(status, headers, b"", at, True)
+    if method == "HEAD" or status == 304:
+        return Reply(status, headers, b"", at, True)
+    if coding is not None:
+        if coding.lower() != "chunked":
+            raise Fault(f"a reply with Transfer-Encoding: {coding}")
+        body, at = _chunks(data, at)
+        return Reply(status, headers, body, at, True)
+    if length is not None:
+        if len(data) < at + int(length):
+            raise Short("body")
+        return Reply(status, headers, data[at:at + int(length)], at + int(length), True)
+    if ended not in ("eof", "half"):
+        raise Short("body that ends with the connection")
+    return Reply(status, headers, data[at:], len(data), False)
+
+
+def stays_open(reply, version):
+    words = [word.strip().lower() for word in reply.headers.get("connection", "").split(",")]
+    return reply.framed and "close" not in words and (version == "1.1" or "keep-alive" in words)
+
+
+def _check_reply(sent, reply):
+    """Of a whole reply that is taken for the one to `sent`."""
+    own, status = reply.headers.get("x-request-id"), reply.status
+    refused = status >= 400 and not stays_open(reply, sent.version)
+    if sent.expect == REFUSE and not refused:
+        raise Fault(f"answered with {status} and {'goes on' if stays_open(reply, sent.version) else 'ends'}, "
+                    "though nobody knows where this request ends")
+    if sent.id and own != sent.id and not (own is None and refused and sent.expect != ANSWER):
+        raise Fault(f"the reply to {sent.id} is that to {own}, status {status}")
+    if status in (500, 502, 504) or status >= 500 and "x-request-id" not in reply.headers and sent.expect == ANSWER:
+        raise Fault(f"status {status}: {reply.body[:200]!r}")
+    if sent.statuses and status not in sent.statuses and not (sent.expect != ANSWER and refused):
+        raise Fault(f"status {status}, expected {sent.statuses}: {reply.body[:200]!r}")
+    if sent.version == "1.0" and "transfer-encoding" in reply.headers:
+        raise Fault("chunks for HTTP/1.0")
+    if sent.closes and stays_open(reply, sent.version):
+        raise Fault("asked to close, and says that the connection stays open")
+    if own and status >= 400 and reply.body:
+        problem = json.loads(reply.body)
+        if problem["instance"] != f"urn:splatd:request:{own}" or problem["status"] != status:
+            raise Fault(f"a problem about {problem['instance']} in the reply to {own}")
+
+
+def _check_rest(sents, at, data):
+    """What came for bytes that only the daemon knows how to read."""
+    ids = [sent.id for sent in sents if sent.id]
+    if at < len(data) and not data.startswith(b"HTTP/1.1 ", at):
+        raise Fault(f"bytes that begin no reply: {data[at:at + 80]!r}")
+    for own in re.findall(rb"\r\nX-Request-Id: m([\w.-]+)\r\n", data[at:]):
+        own = "m" + own.decode()
+        if own not in ids:
+            raise Fault(f"the reply to {own} came twice or too late")
+        ids = ids[ids.index(own) + 1:]
+
+
+def _walk(sents, data, ended):
+    """`ended`: eof, reset, timeout (the daemon's end was waited for in vain), left (we went first), half (we closed our side
+    first and it then closed its own: who does so counts as gone)."""
+    at = 0
+    for number, sent in enumerate(sents):
+        if sent.expect == REST:
+            _check_rest(sents[number:], at, data)
+            return
+        while True:
+            if at == len(data):  # no reply any more: who may end so?
+                if ended in ("left", "half") or ended == "reset" and any(s.may_close or s.expect != ANSWER for s in sents[:number + 1]):
+                    return
+                if ended == "eof" and (sent.expect == EITHER or sent.may_break):
+                    return
+                raise Fault(f"no reply to {sent.id or number}: {ended}")
+            try:
+                reply = read_reply(data, at, sent.method, ended)
+            except Short as short:
+                if ended == "left" or sent.may_break or ended == "reset" and (sent.may_close or sent.expect != ANSWER):
+                    return
+                raise Fault(f"the reply to {sent.id or number} ends within its {short}: {data[at:][-80:]!r}, {ended}") from None
+            at = reply.end
+            if reply.status == 100 and sent.continues:
+                sent = dataclasses.replace(sent, continues=False)
+                continue
+            break
+        if reply.status < 200:
+            raise Fault(f"a {reply.status} that nobody asked for")
+        _check_reply(sent, reply)
+        if not stays_open(reply, sent.version):
+            if reply.status < 400 and not sent.closes and sent.version == "1.1" and not sent.may_close \
+                    and sent.expect == ANSWER and sent.method != "HEAD":
+                raise Fault(f"closed behind a reply of {reply.status}, though nobody asked for it")
+            if at < len(data):
+                raise Fault(f"bytes behind the reply to {sent.id or number} that was the last: {data[at:at + 80]!r}")
+            if ended == "timeout":
+                raise Fault("said that it closes, and did not")
+            return
+        sent_all = number + 1
+    if at < len(data):
+        raise Fault(f"bytes behind the last reply, to {sents[sent_all - 1].id}: {data[at:at + 80]!r}")
+    if ended == "timeout":
+        raise Fault("still open")
+
+
+def fault(sents, data, ended):
+    """What is wrong, in a line; None when nothing is."""
+    try:
+        _walk(sents, data, ended)
+    except Fault as found:
+        return str(found)
+    except (ValueError, KeyError, TypeError) as found:  # of a problem document
+        return f"a body that is not what its headers say: {found!r}"
+    return None
