@@ -30,52 +30,62 @@ def use_build(build):
         os.environ.setdefault(f"SPLATD_{name}", str(path))
 
 
-def attack(binary, seconds, seed=1, numbers=None, without=(), only=(), left="."):
-    """None, or a report of the fault; what shows it again lies in the folder `left` then."""
+def report(binary, run, what, exchange, received, left):
+    """(tags, text) of a fault; what shows it again lies in the folder `left` then."""
     from mutating import attack as attacking, wire
-    from mutating.watch import Victim
-    began = time.monotonic()
-    numbers = numbers or itertools.count()
-    run = attacking.Attack(Victim(binary), seed, numbers, without, only)
-    if run.run(seconds):
-        print(f"  {run.sent} requests on {run.done} connections in {time.monotonic() - began:.0f} s, seed {seed}: "
-              f"{dict(sorted(run.endings.items()))}, {len(run.tags)} mutations, {run.victim.worst_rss >> 20} MiB", flush=True)
-        return None
-    what, exchange, received = run.faults[0]
     suspects = exchange if isinstance(exchange, list) else [exchange] if exchange else []
-    short = attacking.shortest(binary, suspects) if suspects else None
-    path = pathlib.Path(left, f"mutate-{seed}-{run.done}.json")
-    wire.save(path, seed, [short] if short else suspects[::-1], what)
+    short = attacking.shortest(binary, suspects, isinstance(exchange, list)) if suspects else None
     shown = [short] if short else suspects[:8]
-    tags = [tag for e in shown[:1] for tag in e.tags()]
-    return {"what": what, "tags": tags, "path": str(path), "text": "\n".join(
-        [f"{what}\nseed {seed}, after {run.done} connections; --replay {path}"
-         f"{'' if short else '; it did not show again with one connection alone: these were under way or just before'}",
-         *(f" {e.name}\n{wire.show(e, received if len(suspects) == 1 else b'', {})}" for e in shown)])}
+    path = pathlib.Path(left, f"mutate-{run.seed}-{(shown or run.recent)[0].name.split()[-1] if shown or run.recent else 0}.json")
+    wire.save(path, run.seed, [short] if short else suspects[::-1], what)
+    lines = [what, f"seed {run.seed}, after {run.done} connections; --replay {path}"]
+    if suspects and not short:
+        lines.append("it did not show again with one connection alone; under way or just before were")
+    if short:
+        _, _, received = attacking.try_again(binary, [short]) or ("", None, b"")
+    for one in shown:
+        lines.append(f" {one.name}\n{wire.show(one, received if len(shown) == 1 else b'', {})}")
+    return tuple(shown[0].tags() if shown else ()), "\n".join(lines)
+
+
+def attack(binary, seconds, seed=1, first=0, without=(), only=(), left="."):
+    """None, or what is said of the first fault."""
+    from mutating import attack as attacking
+    from mutating.watch import Victim
+    began, run = time.monotonic(), attacking.Attack(Victim(binary), seed, itertools.count(first), without, only)
+    if not run.run(seconds):
+        return report(binary, run, *run.faults[0], left)[1]
+    stalls = f", longest stall {run.victim.stalls * 1000:.0f} ms" if run.victim.stalls else ""
+    print(f"  {run.sent} requests on {run.done} connections in {time.monotonic() - began:.0f} s, seed {seed}: "
+          f"{dict(sorted(run.endings.items()))}, {len(run.tags)} mutations, {run.victim.worst_rss >> 20} MiB{stalls}", flush=True)
+    return None
 
 
 def keep_going(binary, options):
-    """Kind of fault -> how often; the first of each is told in full."""
+    """Kinds of faults are counted, and told in full once."""
+    from mutating import attack as attacking, wire
+    from mutating.watch import Victim
     numbers, seen, end = itertools.count(options.first), {}, time.monotonic() + options.seconds
-    without = set(options.without)
     while (left := end - time.monotonic()) > 1:
-        report = attack(binary, left, options.seed, numbers, without, options.only)
-        if report:
-            kind = (tuple(report["tags"]), re.sub(r"m\d+\.\d+|\d{4,}", "#", report["what"])[:60])
-            seen[kind] = seen.get(kind, 0) + 1
-            if seen[kind] == 1:
-                print(f"FAULT {report['text']}\n", flush=True)
-            if seen[kind] >= 2 and len(report["tags"]) == 1:
-                without.update(report["tags"])
-    for (tags, what), count in seen.items():
-        print(f"{count:4} {'+'.join(tags)}: {what}")
+        run = attacking.Attack(Victim(binary), options.seed, numbers, options.without, options.only, keep_going=True,
+                               wait_s=options.wait)
+        run.run(left)
+        print(f"  {run.sent} requests on {run.done} connections, {len(run.faults)} faults", flush=True)
+        for what, exchange, received in run.faults:
+            kind = re.sub(r"[A-Z]+ m\d+\.\d+|\d{4,}|(?<=b').*", "#", what)[:90]
+            seen.setdefault(kind, []).append((run, what, exchange, received))
+    for kind, found in sorted(seen.items()):
+        print(f"{len(found):4} {kind}")
+    for kind, found in sorted(seen.items())[:options.told]:
+        least = min(found, key=lambda row: len(row[2].sents) if isinstance(row[2], wire.Exchange) else 99)
+        print(f"FAULT {report(binary, *least, '.')[1]}\n", flush=True)
     return 1 if seen else 0
 
 
 def replay(binary, path):
     from mutating import attack as attacking, wire
     found = attacking.try_again(binary, wire.load(path))
-    print(f"{found[0]}\n{wire.show(found[1], found[2], {})}" if found else "nothing is wrong")
+    print(f"{found[0]}\n{wire.show(found[1], found[2], {}) if found[1] else ''}" if found else "nothing is wrong")
     return 1 if found else 0
 
 
@@ -89,6 +99,8 @@ def main():
     parser.add_argument("--without", default=[], type=lambda text: text.split(","))
     parser.add_argument("--only", default=[], type=lambda text: text.split(","))
     parser.add_argument("--keep-going", action="store_true")
+    parser.add_argument("--wait", type=float, default=5, help="seconds for the daemon to close, with --keep-going")
+    parser.add_argument("--told", type=int, default=40, help="kinds of faults that are told in full, with --keep-going")
     parser.add_argument("--replay", metavar="FILE")
     parser.add_argument("--self-test", action="store_true")
     options = parser.parse_args()
@@ -101,9 +113,9 @@ def main():
         return replay(binary, options.replay)
     if options.keep_going:
         return keep_going(binary, options)
-    report = attack(binary, options.seconds, options.seed, itertools.count(options.first), options.without, options.only)
-    print(report["text"] if report else "nothing is wrong")
-    return 1 if report else 0
+    said = attack(binary, options.seconds, options.seed, options.first, options.without, options.only)
+    print(said or "nothing is wrong")
+    return 1 if said else 0
 
 
 if __name__ == "__main__":

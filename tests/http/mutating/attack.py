@@ -11,10 +11,13 @@ THREADS, CHECK_EVERY = 6, 150
 
 
 class Attack:
-    """Of one daemon, until a fault, a number of seconds or of exchanges. `numbers` goes on where another one ended."""
+    """Of one daemon, for a number of seconds or until a fault; with `keep_going` until it is dead. `numbers` goes on where
+    another one ended."""
 
-    def __init__(self, victim, seed, numbers, without=(), only=()):
+    def __init__(self, victim, seed, numbers, without=(), only=(), keep_going=False,
+                 wait_s=wire.WAIT_S):
         self.victim, self.seed, self.numbers, self.without, self.only = victim, seed, numbers, without, only
+        self.keep_going, self.wait_s = keep_going, wait_s
         self.lock, self.stopped = threading.Lock(), False
         self.done, self.sent, self.endings, self.tags = 0, 0, {}, {}
         self.faults = []  # (what, exchange or None, received)
@@ -23,7 +26,7 @@ class Attack:
     def _note(self, what, exchange=None, received=b""):
         with self.lock:
             self.faults.append((what, exchange, received))
-            self.stopped = True
+            self.stopped = not self.keep_going
 
     def _next(self):
         with self.lock:
@@ -39,7 +42,7 @@ class Attack:
             number, exchange = self._next()
             if exchange is None:
                 return
-            wrong, received, ended = wire.judge(self.victim.port, exchange, self.victim.names(number))
+            wrong, received, ended = wire.judge(self.victim.port, exchange, self.victim.names(number), self.wait_s)
             if wrong and self.victim_died():
                 return
             with self.lock:
@@ -83,7 +86,8 @@ class Attack:
 
 
 def try_again(binary, exchanges, wait_s=15):
-    """What is wrong when these are sent to a daemon of their own, one after the other; None when nothing is."""
+    """(what is wrong, the exchange or None where it is with the daemon, what came back) when these are sent to a daemon of their
+    own, one after the other; None when nothing is wrong."""
     victim, found = Victim(binary), None
     try:
         for number, exchange in enumerate(exchanges):
@@ -93,21 +97,25 @@ def try_again(binary, exchanges, wait_s=15):
                 break
     finally:
         said = victim.finish()
-    return ("\n".join(said), exchanges[-1], b"") if said else found
+    return ("\n".join(said), None, b"") if said else found
 
 
-def shortest(binary, exchanges, budget_s=60):
+def shortest(binary, exchanges, deadly, budget_s=60):
     """The exchange of these that shows a fault by itself, with as few requests, cuts and oddities as still show it; None when
     none of them does within the time."""
     end = time.monotonic() + budget_s
-    found = next((e for e in itertools.islice(exchanges, 20) if time.monotonic() < end and try_again(binary, [e])), None)
+
+    def shows(exchange):
+        again = try_again(binary, [exchange]) if time.monotonic() < end else None
+        return again and (again[1] is None) == deadly
+    found = next(filter(shows, itertools.islice(exchanges, 20)), None)
     if not found:
         return None
 
     def better(**changes):
         nonlocal found
         candidate = dataclasses.replace(found, **changes)
-        if candidate != found and time.monotonic() < end and try_again(binary, [candidate]):
+        if candidate != found and shows(candidate):
             found = candidate
             return True
         return False

@@ -25,6 +25,12 @@ def is_sanitised(binary):
         return b"__asan_init" in (data := file.read()) or b"__tsan_init" in data
 
 
+def _of_note(lines):
+    """A sanitiser's report without its pictures of memory."""
+    return [line for line in lines if re.search(r"ERROR|SUMMARY|runtime error|    #[0-7] |^(READ|WRITE|freed|previously)", line)
+            or "Sanitizer" not in "".join(lines)][:30]
+
+
 class Victim:
     """A daemon with all that there is to attack: tokens, a directory that takes datasets, tours."""
 
@@ -45,6 +51,7 @@ class Victim:
         except BaseException:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise
+        self.said = []  # on stderr, and no line of the log
         self.tours, self.lines_seen, self.stalls, self.worst_rss = [], 0, 0.0, 0
         self.port = self.d.port
         self.rss_at_start, self.files_at_start = self.rss(), self.files()
@@ -82,6 +89,11 @@ class Victim:
                 assert status == 503, (status, body)
                 return
             self.tours.append(json.loads(body)["name"])
+            end = time.monotonic() + 20
+            while json.loads(ask("GET", f"/v1/tours/{self.tours[-1]}")[1]).get("state") not in ("done", "failed"):
+                if time.monotonic() > end:
+                    break  # others have the device
+                time.sleep(0.02)
 
     def is_dead(self):
         return self.d.process.poll() is not None
@@ -120,8 +132,8 @@ class Victim:
             except ValueError:
                 known = False
             if not known:
-                found.append(f"no line of the log: {line.strip()[:300]}")
-        return found
+                self.said.append(line)
+        return [f"no line of the log: {said}"] if (said := self.said[-1:] and "".join(_of_note(self.said))) else []
 
     def finish(self):
         """Ends it; what is wrong once nobody asks any more."""
@@ -140,8 +152,7 @@ class Victim:
             time.sleep(0.1)  # the last lines
             found += self.unknown_lines()
             if code:
-                said = [line for line in self.d.lines if not (self.json and line.startswith("{"))][-60:]
-                found.append(f"exit code {code}:\n" + "".join(said))
+                found.append(f"exit code {code}")
         finally:
             if self.d.process.poll() is None:
                 self.d.process.kill()

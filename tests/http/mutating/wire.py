@@ -134,7 +134,7 @@ def _talk(s, exchange, data, received, wait_s):
 def show(exchange, received, names):
     """For people, and short."""
     def cut(data):
-        return repr(data if len(data) < 3000 else data[:1500] + b" ... %d bytes ... " % (len(data) - 2000) + data[-500:])
+        return repr(data if len(data) < 1500 else data[:700] + b" ... %d bytes ... " % (len(data) - 1000) + data[-300:])
     lines = [f"  {'+'.join(sent.tags) or 'plain'} (expected: {sent.expect}): {cut(sent.data)}" for sent in exchange.sents]
     return "\n".join([f"  ending {exchange.ending}, reading {exchange.reads}, {len(exchange.cuts)} cuts, "
                       f"{min(exchange.stop_at, len(exchange.data(names)))} bytes", *lines, f"  received {cut(received)}"])
