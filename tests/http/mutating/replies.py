@@ -79,12 +79,12 @@ def _chunks(data, at):
 
 
 def _behind_double_head(data, at):
-    """Where the reply at `at` really begins. libmicrohttpd 0.9.75 answers a Content-Length that is no number with its head
-    twice, so that Content-Length ends within the text; the connection is closed behind it and nothing is read out of step."""
+    """Where the reply at `at` really begins. libmicrohttpd 0.9.75 refuses a Content-Length that is no number, and cookies that its
+    pool has no room for, with its head twice, so that Content-Length ends within the text; the connection is closed behind it and nothing is read out of step."""
     end = data.find(b"\r\n\r\n", at) + 4
     head = data[at:end]
     double = end > 4 and data.startswith(head, end) and b"X-Request-Id" not in head and b"\r\nConnection: close\r\n" in head
-    return end if double and re.match(rb"HTTP/1\.1 4(00|13) ", head) else at
+    return end if double and re.match(rb"HTTP/1\.1 4(00|13|31) ", head) else at
 
 
 def read_reply(data, at, method, ended):
