@@ -30,6 +30,12 @@ static bool is_token(const char *text, size_t length)
     return length > 0;
 }
 
+/* "Content-Length26" is what libmicrohttpd makes of a name whose value stands folded on the next line. */
+static bool begins_longer(const char *name, size_t length, const char *framing)
+{
+    return length > strlen(framing) && !strncasecmp(name, framing, strlen(framing));
+}
+
 static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *name, size_t name_length,
                             const char *value, size_t value_length)
 {
@@ -40,6 +46,10 @@ static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *
         framing->field = "headers";
         snprintf(framing->fault, sizeof framing->fault,
                  "a header's name holds a space or another character that none has");
+    } else if (begins_longer(name, name_length, MHD_HTTP_HEADER_CONTENT_LENGTH) ||
+               begins_longer(name, name_length, MHD_HTTP_HEADER_TRANSFER_ENCODING)) {
+        framing->field = "headers";
+        snprintf(framing->fault, sizeof framing->fault, "the header %.40s is none, nor may one be folded", name);
     } else if (!strcasecmp(name, MHD_HTTP_HEADER_CONTENT_LENGTH)) {
         framing->lengths++;
     } else if (!strcasecmp(name, MHD_HTTP_HEADER_TRANSFER_ENCODING)) {

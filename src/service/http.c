@@ -16,7 +16,7 @@
 #include "service/access/door.h"
 #include "service/state.h"
 
-enum { drain_max = 8 * body_max, idle_s = 30 };
+enum { drain_max = 8 * body_max, idle_s = 30, eager_pumps_max = 16 };
 
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
@@ -223,16 +223,21 @@ static void on_poll(uv_poll_t *poll, int status, int events)
     spl_http_pump(poll->data);
 }
 
+/* libmicrohttpd wants to go on at once while a connection has bytes in its buffer, also where it can make nothing of
+ * them (a chunk's first line that fills it), so it gets its turns after everything else, and a rest now and then. A
+ * timer of 0 ms that starts itself would be all that libuv runs. */
 void spl_http_pump(struct spl_service *service)
 {
     if (!service->daemon)
         return;
     MHD_run(service->daemon);
     MHD_UNSIGNED_LONG_LONG timeout_ms;
-    if (MHD_get_timeout(service->daemon, &timeout_ms) == MHD_YES)
-        uv_timer_start(&service->http_timer, on_timer, timeout_ms, 0);
-    else
+    if (MHD_get_timeout(service->daemon, &timeout_ms) != MHD_YES)
         uv_timer_stop(&service->http_timer);
+    else if (!timeout_ms && ++service->eager_pumps % eager_pumps_max)
+        uv_async_send(&service->wake);
+    else
+        uv_timer_start(&service->http_timer, on_timer, timeout_ms ? timeout_ms : 1, 0);
 }
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)

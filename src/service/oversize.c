@@ -27,6 +27,8 @@ static void refuse_on_socket(struct request *request, unsigned status, const cha
                  "{\"type\": \"urn:splatd:error:limit\", \"title\": \"%s\", \"status\": %u, \"detail\": \"%s\", "
                  "\"instance\": \"urn:splatd:request:%s\", \"field\": \"%s\"}",
                  title, status, detail, request->id, field);
+    if (!strcmp(request->method, MHD_HTTP_METHOD_HEAD))
+        text[0] = '\0'; // its length is told all the same
     length = snprintf(reply, sizeof reply,
                       "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
                       "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",

@@ -120,6 +120,7 @@ struct spl_service {
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
     uv_timer_t http_timer;              /* MHD's own timeouts */
+    unsigned eager_pumps;               /* times that MHD wanted to go on at once */
     uv_timer_t wait_timer;              /* deadlines and departures, while requests wait */
     uv_timer_t slow_timer;              /* connections that take too long */
     uv_timer_t drain_timer;             /* while stopping */

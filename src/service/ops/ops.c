@@ -95,7 +95,7 @@ static void pump(struct spl_service *service)
         return;
     MHD_run(service->ops);
     if (MHD_get_timeout(service->ops, &timeout_ms) == MHD_YES)
-        uv_timer_start(&service->ops_timer, on_timer, timeout_ms, 0);
+        uv_timer_start(&service->ops_timer, on_timer, timeout_ms ? timeout_ms : 1, 0); // of 0 ms: see spl_http_pump()
     else
         uv_timer_stop(&service->ops_timer);
 }

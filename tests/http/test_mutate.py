@@ -1,0 +1,28 @@
+"""Every route under requests that are spoiled on their way: mutate.py, for a bounded time and with a fixed seed.
+
+By option, through the environment: SPLATD_MUTATE_S=1200 is the long form, SPLATD_MUTATE_SEED=N another attack. In a build
+with sanitisers both daemons run under them. A fault leaves mutate-….json, which mutate.py --replay sends again."""
+import os
+
+import mutate
+from harness import FAKE, REAL, run
+from mutating import wrong_server
+
+SECONDS, SEED = float(os.environ.get("SPLATD_MUTATE_S", 15)), int(os.environ.get("SPLATD_MUTATE_SEED", 1))
+
+
+def test_the_judge_finds_planted_faults():
+    assert wrong_server.self_test() == 0
+
+
+def test_spoiled_requests():
+    said = mutate.attack(FAKE, SECONDS * 0.8, SEED)
+    assert not said, said
+
+
+def test_spoiled_requests_where_frames_are_rendered():
+    said = mutate.attack(REAL, SECONDS * 0.2, SEED, first=1_000_000)
+    assert not said, said
+
+
+run(globals())
