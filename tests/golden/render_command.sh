@@ -77,7 +77,7 @@ refuses 2 '--fov' courtyard.spld --fov 60deg -o a.png
 refuses 2 '--fov and --fx' courtyard.spld --fov 60 --fx 500 -o a.png
 refuses 2 '--fy' courtyard.spld --fy 500 -o a.png
 refuses 2 '--size' courtyard.spld --size 0x0 -o a.png
-refuses 2 '--size' courtyard.spld --size 640 -o a.png
+refuses 2 '--size' courtyard.spld --size 640x -o a.png
 refuses 2 'width' courtyard.spld --size 1000000x1000000 -o a.png
 refuses 2 'far' courtyard.spld --near 5 --far 5 -o a.png
 refuses 2 '--method' courtyard.spld --method mesh -o a.png
@@ -85,7 +85,7 @@ refuses 2 '--layer' courtyard.spld --layer Color -o a.png
 refuses 2 '--lod' courtyard.spld --lod -1 -o a.png
 refuses 2 'supersample' courtyard.spld --supersample 3 -o a.png
 refuses 2 '--background' courtyard.spld --background '#ff00' -o a.png
-refuses 2 '--background' courtyard.spld --background red -o a.png
+refuses 2 '--background' courtyard.spld --background rad -o a.png
 refuses 2 '--quality' courtyard.spld --quality 0 -o a.png
 refuses 2 '--depth-scale' courtyard.spld --depth-scale 0 -o a.png
 refuses 2 '--memory-limit' courtyard.spld --memory-limit 1G -o a.png

@@ -122,7 +122,7 @@ static void test_exit_codes(void **state)
     (void)state;
     char output[8192];
     assert_int_equal(run("2>&1", output, sizeof output), 2);
-    assert_non_null(strstr(output, "at least one NAME.spld"));
+    assert_non_null(strstr(output, "at least one dataset: splatd info hall.spld"));
     assert_int_equal(run("--jsno one.spld 2>&1", output, sizeof output), 2);
     assert_non_null(strstr(output, "'splatd info --help' shows how"));
     assert_int_equal(run("--help", output, sizeof output), 0);
