@@ -54,6 +54,11 @@ struct spl_view {
 /* Fills everything but the camera with defaults: splat, color, lod 1, supersample 1, all atoms, opaque black. */
 void spl_view_init(struct spl_view *view);
 
+/* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is the
+ * pixels, which are enlarged, encoded and sent all the same. */
+uint64_t spl_view_get_samples(const struct spl_view *view);
+uint64_t spl_view_get_frame_bytes(const struct spl_view *view); /* what the images of its layers take in memory */
+
 /* Checks ranges; the field at fault is named as in the HTTP interface. */
 int spl_view_check(const struct spl_view *view, struct spl_error *err);
 
@@ -92,9 +97,10 @@ struct spl_renderer_options {
     bool require_gpu;           /* refuse software devices */
     bool debug;                 /* validation layers, GL debug output */
     uint64_t memory_limit;      /* bytes of device memory, 0 = 3/4 of what the device reports */
-    uint64_t scratch_samples;   /* largest tile in samples, 0 = 4 Mi */
+    uint64_t scratch_samples;   /* largest tile in samples, 0 = SPL_TILE_SAMPLES */
     uint64_t first_page_bytes;  /* largest first page of datasets to come, for the least limit; 0 = unknown */
 };
+#define SPL_TILE_SAMPLES (4ull << 20)
 
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err);
@@ -131,6 +137,25 @@ void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_
  * destroy it and make a new one. */
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err);
+
+/* The same frame in steps of a tile at most, for a renderer that has others to make in between: any number may be
+ * under way, pages and versions of other datasets may come and go, and each gets the bytes that it has alone. `dataset`
+ * is borrowed and stays added until the end. begin() checks the view; on success the caller ends the steps. */
+struct spl_frame_steps;
+int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                    struct spl_frame_steps **out, struct spl_error *err);
+
+/* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count). *more: there are others. Times
+ * in the frame's stats are those of its own steps. Fails as spl_renderer_render() does; then the steps can only be
+ * ended. */
+int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err);
+
+/* Of spl_view_get_samples(), what is still to be made: a guess for whoever shares out turns. */
+uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);
+
+/* Frees the steps; NULL-safe, also after the renderer has gone. `frame`, if not NULL, takes what was made: the whole
+ * frame after the last step, else all zero. */
+void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame);
 
 uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer);  /* device bytes held */
 

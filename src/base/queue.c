@@ -1,13 +1,12 @@
 /* A ring of pointers under one mutex, with one condition for "not empty" and one for "not full".
  *
  * Invariant: 0 <= length <= capacity, items[(first + i) % capacity] for i < length are the items in order of arrival.
- * behind[0, behind_length) wait until the ring is empty. Conditions run on CLOCK_MONOTONIC, so that a jump of the wall
- * clock neither shortens nor stretches a wait. Any thread. */
+ * Conditions run on CLOCK_MONOTONIC, so that a jump of the wall clock neither shortens nor stretches a wait. Any
+ * thread. */
 #include "base/queue.h"
 
 #include <pthread.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -19,8 +18,6 @@ struct spl_queue {
     size_t first, length; // guarded by: mutex
     bool closed;          // guarded by: mutex
     bool interrupted;     // guarded by: mutex
-    size_t behind_length; // guarded by: mutex
-    void *behind[SPL_QUEUE_BEHIND];
     void *items[]; // guarded by: mutex
 };
 
@@ -83,19 +80,6 @@ bool spl_queue_try_push(struct spl_queue *queue, void *item)
     return room;
 }
 
-bool spl_queue_try_push_behind(struct spl_queue *queue, void *item)
-{
-    spl_assert(item);
-    pthread_mutex_lock(&queue->mutex);
-    bool room = !queue->closed && queue->behind_length < SPL_QUEUE_BEHIND;
-    if (room) {
-        queue->behind[queue->behind_length++] = item;
-        pthread_cond_signal(&queue->filled);
-    }
-    pthread_mutex_unlock(&queue->mutex);
-    return room;
-}
-
 int spl_queue_push(struct spl_queue *queue, void *item, uint64_t deadline_ns, struct spl_error *err)
 {
     spl_assert(item);
@@ -118,7 +102,7 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
 {
     void *item = NULL;
     pthread_mutex_lock(&queue->mutex);
-    while (!queue->closed && !queue->length && !queue->behind_length && !queue->interrupted)
+    while (!queue->closed && !queue->length && !queue->interrupted)
         if (!wait_until(&queue->filled, &queue->mutex, deadline_ns))
             break;
     if (queue->length) {
@@ -128,10 +112,6 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
         pthread_cond_signal(&queue->drained);
     } else {
         queue->interrupted = false;
-        if (queue->behind_length) {
-            item = queue->behind[0];
-            memmove(queue->behind, queue->behind + 1, --queue->behind_length * sizeof *queue->behind);
-        }
     }
     pthread_mutex_unlock(&queue->mutex);
     return item;

@@ -20,11 +20,6 @@ void spl_queue_destroy(struct spl_queue *queue);
 /* Never waits for room. False when the queue is full or closed; the caller then keeps `item` (not NULL). */
 bool spl_queue_try_push(struct spl_queue *queue, void *item);
 
-/* The same into a small lane of its own, whose items are popped only while the queue itself is empty. False when that
- * lane, of SPL_QUEUE_BEHIND, is full. Length and capacity do not count it. */
-enum { SPL_QUEUE_BEHIND = 4 };
-bool spl_queue_try_push_behind(struct spl_queue *queue, void *item);
-
 /* Waits for room until `deadline_ns`: SPL_E_TIMEOUT when there was none, SPL_E_CANCELLED when the queue was closed. On
  * failure the caller keeps `item` (not NULL). */
 int spl_queue_push(struct spl_queue *queue, void *item, uint64_t deadline_ns, struct spl_error *err);

@@ -48,10 +48,12 @@ struct spl_camera_defaults {
     double eye[3], target[3], up[3], fov, near, far;
 };
 
-/* Caps on an image's size; no camera can lift them. */
+/* Caps on an image's size; no camera can lift them. What more there is to an image than its camera is judged by those
+ * who know of it. */
 struct spl_camera_limits {
     uint32_t side_px;
     uint64_t pixels;
+    uint64_t samples, bytes; /* of a view: spl_view_get_samples(), and its layers in memory; 0 = any */
 };
 
 /* Marks a value as given under `name`; refuses the second time. */

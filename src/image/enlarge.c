@@ -11,6 +11,7 @@ struct job {
     const struct spl_image *small;
     struct spl_image *large;
     double scale;
+    uint32_t first; /* row */
 };
 
 /* The four neighbours of a pixel: [0] is the nearest. */
@@ -98,7 +99,7 @@ static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worke
     (void)worker;
     const struct job *j = context;
     const void *from = j->small->pixels;
-    for (size_t y = begin; y < end; y++) {
+    for (size_t y = j->first + begin; y < j->first + end; y++) {
         struct axis row = place((uint32_t)y, j->scale, j->small->height);
         for (uint32_t x = 0; x < j->large->width; x++) {
             struct axis column = place(x, j->scale, j->small->width);
@@ -125,8 +126,8 @@ static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worke
     }
 }
 
-void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large)
+void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin, uint32_t end)
 {
-    struct job job = {.small = small, .large = large, .scale = scale};
-    spl_parallel_for(0, large->height, 32, enlarge_rows, &job);
+    struct job job = {.small = small, .large = large, .scale = scale, .first = begin};
+    spl_parallel_for(0, end - begin, 32, enlarge_rows, &job);
 }

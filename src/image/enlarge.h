@@ -4,9 +4,9 @@
 
 #include <splatd/image.h>
 
-/* Fills the pixels of `large` (same layer and type; size set, pixels allocated by the caller) from `small`, of which
- * each pixel stands for 1/scale × 1/scale of `large`'s; scale in (0, 1). Bilinear between pixel centres; what is empty
- * has no weight and an edge gives no value in between:
+/* Fills the rows [begin, end) of `large` (same layer and type; size set, pixels allocated by the caller) from `small`,
+ * of which each pixel stands for 1/scale × 1/scale of `large`'s; scale in (0, 1). Bilinear between pixel centres; what
+ * is empty has no weight and an edge gives no value in between:
  *     color     by alpha, so that the transparent side of an edge lends no colour
  *     depth, range   over those of the four neighbours that lie within 1 % / scale of the nearest pixel's: an edge,
  *               not a slant
@@ -14,6 +14,7 @@
  *     coverage  over all four
  *     id        the nearest pixel's
  * Pure; uses all cores. */
-void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large);
+void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin,
+                       uint32_t end);
 
 #endif

@@ -112,6 +112,13 @@ static bool matches(const struct spl_setting *setting, const struct spl_demand *
     return spl_setting_equal(setting, &kept);
 }
 
+/* Is it within what one view may cost? Below one sample a pixel the pixels are, which the view's size has settled. */
+static bool is_affordable(const struct spl_setting *setting, const struct spl_demand *demand)
+{
+    double side = setting->supersample > 1 ? setting->supersample : 1;
+    return !demand->samples_max || side * side * demand->width * demand->height <= (double)demand->samples_max;
+}
+
 /* The demand with atoms that were measured: the next more than those kept, else the most; so its time is no promise
  * too much. The same where no method with textures matches. */
 static struct spl_demand get_measured(const struct spl_planner *planner, const struct spl_demand *demand)
@@ -193,10 +200,14 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
 {
     struct standing best = {0};
     const struct spl_candidate *chosen = NULL;
+    bool matched = false;
     struct spl_demand measured = get_measured(planner, demand);
     for (size_t i = 0; i < planner->count; i++) {
         const struct spl_candidate *c = &planner->candidates[i];
         if (!matches(&c->setting, &measured))
+            continue;
+        matched = true;
+        if (!is_affordable(&c->setting, demand))
             continue;
         struct standing s = assess(planner, i, demand);
         if (chosen && !better(demand, c, &s, chosen, &best))
@@ -204,6 +215,10 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
         chosen = c;
         best = s;
     }
+    if (!chosen && matched)
+        return spl_fail_field(err, SPL_E_INPUT, "width",
+                              "every measured setting takes more than %llu samples for %u x %u pixels; ask for fewer",
+                              (unsigned long long)demand->samples_max, demand->width, demand->height);
     if (!chosen)
         return refuse(demand, err);
     *choice = (struct spl_choice){.setting = chosen->setting,

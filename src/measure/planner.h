@@ -19,6 +19,7 @@ struct spl_demand {
     double psnr;      /* dB; NAN: any accuracy */
     double extra_ms;  /* >= 0: what the budget must hold beside the frame, the encoding */
     uint32_t width, height;
+    uint64_t samples_max; /* that a setting may need for it; 0 = any */
     enum spl_layer layer;
     bool keep_method, keep_lod, keep_supersample, keep_atoms; /* only settings that equal `kept` in these */
     struct spl_setting kept;
@@ -60,7 +61,7 @@ void spl_planner_finish(struct spl_planner *planner);
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
  * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
- * what is learned may bring them to the front. SPL_E_INPUT names the kept parameter that no setting has. Atoms that
+ * what is learned may bring them to the front; one that needs more samples than samples_max is none. SPL_E_INPUT names the kept parameter that no setting has. Atoms that
  * nobody measured are kept: they are drawn in place of the next more, or the most, that were measured, whose time they
  * are taken to need, and nothing is promised of their accuracy; methods without textures have any number of them. */
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,

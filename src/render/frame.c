@@ -1,20 +1,13 @@
-/* A frame: the image is cut into tiles; each tile selects, uploads, records, waits, and is copied into the images. */
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+/* One tile of a frame: it selects, uploads, records, waits, and is copied into the images. Nothing of it is left on the
+ * device but pages, so that tiles of other frames may come between. */
+#include "render/frame.h"
 
 #include "base/clock.h"
-#include "base/memory.h"
-#include "image/enlarge.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
-#include "render/renderer.h"
-#include "render/tiling.h"
 #include "render/wires.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
-/* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
-static const double constant_looks = 65000, constant_work = 3e9;
 
 static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
     [SPL_METHOD_SPLAT] = &spl_method_splat,
@@ -28,17 +21,7 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID,       [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
 };
 
-struct frame_job {
-    struct spl_renderer *renderer;
-    struct spl_resident_dataset *resident;
-    const struct spl_view *view;
-    struct spl_frame *frame;
-    struct spl_tiling tiling;
-    const struct spl_wires *wires; /* method fill */
-    struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
-};
-
-static bool ask_slot(struct frame_job *job, uint32_t slot)
+static bool ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
     int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, &why);
@@ -54,11 +37,11 @@ static bool ask_page(void *context, uint32_t page)
 
 static bool ask_textures(void *context, uint32_t page)
 {
-    struct frame_job *job = context;
+    struct spl_frame_job *job = context;
     return ask_slot(job, spl_dictionary_slot(job->resident)) && ask_slot(job, spl_textures_slot(job->resident, page));
 }
 
-static struct spl_select_params selection(struct frame_job *job, const struct spl_camera *camera)
+struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera)
 {
     return (struct spl_select_params){
         .dataset = job->resident->dataset,
@@ -74,10 +57,10 @@ static struct spl_select_params selection(struct frame_job *job, const struct sp
     };
 }
 
-static int select_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
-    struct spl_select_params params = selection(job, &tile->camera);
+    struct spl_select_params params = spl_frame_selection(job, &tile->camera);
     spl_residency_begin_frame(&r->residency);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
     int rc = spl_select(&params, &r->list, &why);
@@ -145,15 +128,7 @@ static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats
     }
 }
 
-static double since_ms(uint64_t *from)
-{
-    uint64_t now = spl_now_ns();
-    double ms = (double)(now - *from) * 1e-6;
-    *from = now;
-    return ms;
-}
-
-static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_error *err)
+int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
     struct spl_frame_stats *stats = &job->frame->stats;
@@ -161,10 +136,10 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     if (clock >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = select_tile(job, tile, err);
-    stats->select_ms += since_ms(&clock);
+    stats->select_ms += spl_since_ms(&clock);
     if (!rc)
         rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, err);
-    stats->upload_ms += since_ms(&clock);
+    stats->upload_ms += spl_since_ms(&clock);
     if (!rc)
         rc = record(tile, err);
     if (!rc)
@@ -176,7 +151,7 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
         return rc;
     clock = spl_now_ns();
     spl_readback_tile(tile, spl_gpu_buffer_map(r->scratch.readback), job->frame->images);
-    stats->readback_ms += since_ms(&clock);
+    stats->readback_ms += spl_since_ms(&clock);
     add_times(tile, stats);
     stats->splats_drawn += r->list.splats;
     stats->chunks_drawn += r->list.chunk_count;
@@ -184,144 +159,4 @@ static int render_tile(struct frame_job *job, struct spl_tile *tile, struct spl_
     stats->complete &= r->list.complete;
     stats->tiles++;
     return SPL_OK;
-}
-
-static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
-{
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-        if (!(view->layers >> layer & 1))
-            continue;
-        struct spl_image *image = &frame->images[layer];
-        *image = (struct spl_image){.layer = layer,
-                                    .type = spl_readback_type(layer),
-                                    .width = view->camera.width,
-                                    .height = view->camera.height};
-        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
-        if (!image->pixels)
-            return SPL_E_NOMEM;
-    }
-    return SPL_OK;
-}
-
-/* The constant operator looks at every sample of the kernel: what a software driver cannot do before the device's
- * deadline, or in the rounds that it allows an invocation, is refused before it costs the device. */
-static int check_work(const struct frame_job *job, const struct spl_camera *camera, struct spl_error *err)
-{
-    const struct spl_fill_plan *plan = &job->tiling.fill;
-    double side = 2 * floor(plan->kernel) + 1;
-    double samples = ((double)camera->width + 2 * plan->guard) * ((double)camera->height + 2 * plan->guard);
-    samples = fmin(samples, (double)job->renderer->scratch.samples);
-    if (job->view->visibility != SPL_VISIBILITY_CONSTANT)
-        return SPL_OK;
-    if (side * side > constant_looks ||
-        (spl_gpu_get_device(job->renderer->gpu)->software && side * side * samples > constant_work))
-        return spl_fail_field(
-            err, SPL_E_LIMIT, "kernel",
-            "visibility constant with a kernel of %g x %g samples takes too long in this image; ask for a "
-            "smaller kernel, or for visibility adaptive",
-            side, side);
-    return SPL_OK;
-}
-
-/* The plan is the whole image's, or tiles would show where they meet. */
-static int plan_fill(struct frame_job *job, struct spl_error *err)
-{
-    struct spl_camera camera;
-    double spacing = 1;
-    spl_tiling_get_camera(job->view, &camera);
-    struct spl_select_params params = selection(job, &camera);
-    uint64_t clock = spl_now_ns();
-    spl_residency_begin_frame(&job->renderer->residency);
-    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
-    job->frame->stats.select_ms += since_ms(&clock);
-    if (job->page_error.code)
-        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
-    spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
-    return rc ? rc : check_work(job, &camera, err);
-}
-
-/* A view with at least one sample a pixel. */
-static int render_view(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                       struct spl_frame *frame, struct spl_error *err)
-{
-    uint64_t start = spl_now_ns(), loaded = renderer->residency.pages_loaded;
-    struct frame_job job = {.renderer = renderer, .view = view, .frame = frame};
-    int rc = 0;
-    job.resident = spl_residency_get(&renderer->residency, dataset);
-    if (!job.resident)
-        return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
-    frame->stats.complete = true;
-    if (view->method == SPL_METHOD_FILL)
-        rc = plan_fill(&job, err);
-    if (!rc && view->method == SPL_METHOD_FILL)
-        rc = spl_dataset_get_wires(dataset, &job.wires, err);
-    if (!rc)
-        rc = spl_tiling_init(&job.tiling, view, renderer->scratch.samples, err);
-    if (!rc)
-        rc = make_images(frame, view, err);
-    for (uint32_t y = 0; y < view->camera.height && !rc; y += job.tiling.height)
-        for (uint32_t x = 0; x < view->camera.width && !rc; x += job.tiling.width) {
-            struct spl_tile tile = {.renderer = renderer, .resident = job.resident, .view = view};
-            spl_tiling_place(&job.tiling, x, y, &tile);
-            rc = render_tile(&job, &tile, err);
-        }
-    frame->stats.pages_loaded = renderer->residency.pages_loaded - loaded;
-    frame->stats.total_ms = since_ms(&start);
-    if (rc)
-        spl_frame_finish(frame);
-    return rc;
-}
-
-/* Renders a share of the size and enlarges it; a pixel's centre stays where it is in the world. */
-static int render_small(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                        struct spl_frame *frame, struct spl_error *err)
-{
-    double scale = view->supersample;
-    struct spl_view small = *view;
-    struct spl_frame coarse = {0};
-    uint64_t clock = spl_now_ns();
-    small.supersample = 1;
-    small.kernel = view->kernel > 0 ? fmax(view->kernel * scale, 3) : view->kernel;
-    small.camera.width = (uint32_t)ceil(view->camera.width * scale);
-    small.camera.height = (uint32_t)ceil(view->camera.height * scale);
-    small.camera.fx *= scale;
-    small.camera.fy *= scale;
-    small.camera.cx *= scale;
-    small.camera.cy *= scale;
-    int rc = render_view(renderer, dataset, &small, &coarse, err);
-    if (!rc)
-        rc = make_images(frame, view, err);
-    frame->stats = coarse.stats;
-    double rendered_ms = since_ms(&clock);
-    for (int layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
-        if (coarse.images[layer].pixels)
-            spl_image_enlarge(&coarse.images[layer], scale, &frame->images[layer]);
-    double enlarged_ms = since_ms(&clock);
-    frame->stats.readback_ms += enlarged_ms;
-    frame->stats.total_ms = rendered_ms + enlarged_ms;
-    spl_frame_finish(&coarse);
-    if (rc)
-        spl_frame_finish(frame);
-    return rc;
-}
-
-int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                        struct spl_frame *frame, struct spl_error *err)
-{
-    memset(frame, 0, sizeof *frame);
-    int rc = spl_view_check(view, err);
-    if (rc)
-        return rc;
-    struct spl_view bare = *view;
-    if (!spl_dataset_get_info(dataset)->has_surface) {
-        if (view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
-            return spl_fail_field(err, SPL_E_INPUT, "layer",
-                                  "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
-                                  "fill, which takes them from depth, or pack it without",
-                                  spl_dataset_get_info(dataset)->id);
-        bare.method = view->method == SPL_METHOD_SPLAT ? SPL_METHOD_FILL : view->method;
-        view = &bare;
-    }
-    return view->supersample < 1 ? render_small(renderer, dataset, view, frame, err)
-                                 : render_view(renderer, dataset, view, frame, err);
 }

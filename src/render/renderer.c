@@ -4,8 +4,6 @@
 #include "base/memory.h"
 #include "render/renderer.h"
 
-#define SAMPLES_DEFAULT (4ull << 20)
-
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
 {
     *out = NULL;
@@ -21,7 +19,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     int rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
         spl_residency_init(&renderer->residency, renderer->gpu);
-        uint64_t samples = options->scratch_samples ? options->scratch_samples : SAMPLES_DEFAULT;
+        uint64_t samples = options->scratch_samples ? options->scratch_samples : SPL_TILE_SAMPLES;
         rc = spl_scratch_init(&renderer->scratch, renderer->gpu, samples, options->first_page_bytes, err);
     }
     if (rc) {

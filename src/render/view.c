@@ -68,6 +68,18 @@ void spl_view_init(struct spl_view *view)
     };
 }
 
+uint64_t spl_view_get_samples(const struct spl_view *view)
+{
+    uint64_t side = view->supersample > 1 ? (uint64_t)view->supersample : 1;
+    return view->camera.width * side * view->camera.height * side;
+}
+
+uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
+{
+    uint64_t pixel = 4 * (uint64_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
+    return pixel * view->camera.width * view->camera.height;
+}
+
 int spl_view_check(const struct spl_view *view, struct spl_error *err)
 {
     int rc = spl_camera_check(&view->camera, err);

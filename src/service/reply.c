@@ -108,7 +108,8 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
         spl_log_error("request %s: %s", request->id, err->message);
     spl_reply_problem(request, status_of(err), info->name, err->field, err->message);
     if (request->response && info->retry)
-        header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", spl_pipeline_get_retry_after(request->service->pipeline));
+        header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", 
+               spl_pipeline_get_retry_after(request->service->pipeline, request->large));
 }
 
 static void add_headers(struct request *request, const char *text)

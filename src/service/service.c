@@ -233,6 +233,7 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
         .entry_count = count,
         .queue = service->options->queue,
         .encoders = service->options->encoders,
+        .samples_max = 4 * service->options->samples_max,
         .counters = &service->counters,
         .wake = wake,
         .wake_context = service,

@@ -19,7 +19,7 @@ enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
     connection_pool = 14 * 1024, /* libmicrohttpd's pool; see oversize.c */
-    reply_bytes_max = 1 << 30,   /* in all; beyond, views are refused until clients have read theirs */
+    reply_bytes_max = 1 << 30, /* of small views, and of large ones; beyond, they are refused until clients have read */
 };
 
 enum phase {
@@ -79,6 +79,7 @@ struct request {
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */
+    bool large;                    /* the view goes the large ones' way */
     struct change *change;         /* of a dataset, in progress; NULL otherwise */
     struct MHD_Response *response; // may be NULL
     unsigned status;
@@ -137,6 +138,7 @@ struct spl_service {
     struct spl_cache *cache;
     size_t waiting_count, requests_open, connections_open;
     size_t reply_bytes; /* of views that clients have not read yet and that are not in the cache */
+    size_t large_reply_bytes; /* the same of large views */
     bool loading;       /* the datasets at start are being opened; there is no pipeline yet */
     bool leaving;       /* asked to stop: /readyz says no */
     bool draining;      /* nothing more is accepted */
@@ -230,7 +232,10 @@ void spl_batch_abandon(struct batch *batch); /* its request no longer waits for 
 /* view/route.c: what views and batches of them check alike. */
 int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
                            struct spl_error *err);
-bool spl_view_has_no_room(const struct spl_service *service, struct spl_error *err); /* too much waits for clients */
+/* Too much waits for clients. */
+bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view,
+                          struct spl_error *err);
+struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);
 
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);

@@ -33,7 +33,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const struct spl_camera_defaults defaults = {
         .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY};
-    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    static const struct spl_camera_limits limits = {
+        .side_px = 8192, .pixels = 64 << 20, .samples = 256 << 20, .bytes = 1 << 30};
     struct spl_view_request request;
     struct spl_error err = {0};
     if (!size)

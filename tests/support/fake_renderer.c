@@ -1,6 +1,6 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
- * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), losses on
- * demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, and FAKE_HANG_MS that the first frame
+ * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), in steps of a
+ * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, and FAKE_HANG_MS that the first frame
  * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
  * its own code. */
 #include <splatd/render.h>
@@ -112,11 +112,40 @@ static uint64_t frame_ns(const struct spl_view *view)
     return (uint64_t)(ms * SPL_NS_PER_MS);
 }
 
-int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                        struct spl_frame *frame, struct spl_error *err)
+struct spl_frame_steps {
+    struct spl_renderer *renderer;
+    struct spl_view view;
+    struct spl_frame frame;
+    uint64_t left; /* samples */
+};
+
+int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                    struct spl_frame_steps **out, struct spl_error *err)
 {
     (void)dataset;
-    memset(frame, 0, sizeof *frame);
+    struct spl_frame_steps *steps = *out = spl_alloc(1, sizeof *steps, err);
+    if (!steps)
+        return SPL_E_NOMEM;
+    *steps = (struct spl_frame_steps){.renderer = renderer, .view = *view, .left = spl_view_get_samples(view)};
+    return 0;
+}
+
+static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (steps->view.layers >> layer & 1 &&
+            fill(&steps->frame.images[layer], (enum spl_layer)layer, &steps->view, err))
+            return SPL_E_NOMEM;
+    steps->frame.stats.complete = true;
+    return 0;
+}
+
+int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
+{
+    struct spl_renderer *renderer = steps->renderer;
+    uint64_t tile = steps->left < SPL_TILE_SAMPLES ? steps->left : SPL_TILE_SAMPLES;
+    double share = (double)tile / (double)spl_view_get_samples(&steps->view);
+    *more = false;
     if (renderer->lose_next || renderer->lost) {
         renderer->lost = true;
         return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
@@ -125,20 +154,31 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
     }
-    uint64_t until = spl_now_ns() + frame_ns(view);
+    uint64_t until = spl_now_ns() + (uint64_t)((double)frame_ns(&steps->view) * share);
     while (spl_remaining_ns(until)) {
-        if (!spl_remaining_ns(view->deadline_ns))
+        if (!spl_remaining_ns(deadline_ns))
             return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
         usleep(500);
     }
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-        if (!(view->layers >> layer & 1) || !fill(&frame->images[layer], (enum spl_layer)layer, view, err))
-            continue;
-        spl_frame_finish(frame);
-        return SPL_E_NOMEM;
+    steps->left -= tile;
+    *more = steps->left;
+    return *more ? 0 : make_images(steps, err);
+}
+
+uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
+{
+    return steps->left;
+}
+
+void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
+{
+    if (frame) {
+        *frame = steps->frame;
+        steps->frame = (struct spl_frame){0};
     }
-    frame->stats.complete = true;
-    return 0;
+    if (steps)
+        spl_frame_finish(&steps->frame);
+    free(steps);
 }
 
 uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer)

@@ -129,6 +129,7 @@ static json_t *describe_limits(const struct spl_service_options *options)
     json_t *json = json_object();
     set(json, "side_px", count(SPL_SERVICE_SIDE_MAX));
     set(json, "pixels", count(options->pixels_max));
+    set(json, "samples", count(options->samples_max));
     set(json, "body_bytes", count(body_max));
     set(json, "url_bytes", count(uri_max));
     set(json, "deadline_ms", count(options->deadline_ms));
@@ -170,10 +171,13 @@ json_t *spl_describe_status(struct request *request)
     set(json, "memory",
         json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
                   count(status.device_limit_bytes), "resident_bytes", count(spl_resident_bytes()), "reply_bytes",
-                  count(service->reply_bytes)));
+                  count(service->reply_bytes + service->large_reply_bytes)));
     set(json, "cache", describe_cache(service->cache));
     set(json, "queues",
-        json_pack("{s:o, s:o}", "render", describe_queue(status.render_length, status.render_capacity), "encode",
+        json_pack("{s:o, s:{s:o, s:o, s:o, s:o}, s:o}", "render",
+                  describe_queue(status.render_length, status.render_capacity), "large", "length",
+                  count(status.large_length), "samples", count(status.large_samples), "samples_max",
+                  count(status.large_samples_max), "bytes", count(status.large_bytes), "encode",
                   describe_queue(status.encode_length, status.encode_capacity)));
     set(json, "frame_ms", json_real(status.frame_ms));
     set(json, "connections", count(service->connections_open));

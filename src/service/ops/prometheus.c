@@ -52,7 +52,8 @@ static void print_pipeline(FILE *out, struct spl_service *service)
     spl_pipeline_get_status(service->pipeline, &status);
     if (status.device.name[0])
         print_device(out, &status.device);
-    gauge(out, "splatd_queue_length", "Views that wait for the device.", (double)status.render_length);
+    gauge(out, "splatd_queue_length", "Views that wait for the device, and large ones until they are encoded.",
+          (double)(status.render_length + status.large_length));
     gauge(out, "splatd_queue_capacity", "Views that may wait.", (double)status.render_capacity);
     gauge(out, "splatd_encode_queue_length", "Frames that wait for an encoder.", (double)status.encode_length);
     gauge(out, "splatd_encode_queue_capacity", "Frames that may wait.", (double)status.encode_capacity);
@@ -146,7 +147,8 @@ char *spl_prometheus_print(struct spl_service *service)
         spl_cache_get_status(service->cache, &cache);
     gauge(out, "splatd_cache_bytes", "Encoded replies that are kept.", (double)cache.bytes);
     gauge(out, "splatd_cache_entries", "How many they are.", (double)cache.entries);
-    gauge(out, "splatd_reply_memory_bytes", "Images that clients have not read yet.", (double)service->reply_bytes);
+    gauge(out, "splatd_reply_memory_bytes", "Images that clients have not read yet.", 
+          (double)(service->reply_bytes + service->large_reply_bytes));
     print_pipeline(out, service);
     print_process(out, service);
     print_counters(out, &service->counters);

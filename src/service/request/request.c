@@ -95,7 +95,26 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     return 0;
 }
 
-static int resolve_demand(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+/* Samples and memory, not pixels alone, are what a view costs. */
+static int check_cost(const struct spl_view *view, const struct spl_camera_limits *limits, struct spl_error *err)
+{
+    uint64_t samples = spl_view_get_samples(view), bytes = spl_view_get_frame_bytes(view);
+    const struct spl_camera *camera = &view->camera;
+    if (limits->samples && samples > limits->samples)
+        return spl_fail_field(err, SPL_E_INPUT, view->supersample > 1 ? "supersample" : "width",
+                              "%u x %u pixels with supersample %g are %llu samples; the limit is %llu", camera->width,
+                              camera->height, view->supersample, (unsigned long long)samples,
+                              (unsigned long long)limits->samples);
+    if (limits->bytes && bytes > limits->bytes)
+        return spl_fail_field(err, SPL_E_INPUT, "layers",
+                              "%d layers of %u x %u pixels are %llu bytes in memory; the limit is %llu",
+                              __builtin_popcount(view->layers), camera->width, camera->height,
+                              (unsigned long long)bytes, (unsigned long long)limits->bytes);
+    return 0;
+}
+
+static int resolve_demand(const struct values *values, const struct spl_camera_limits *limits,
+                          struct spl_view_request *out, struct spl_error *err)
 {
     static const double longest_ms = 600000;
     struct spl_demand *demand = &out->demand;
@@ -116,6 +135,7 @@ static int resolve_demand(const struct values *values, struct spl_view_request *
     demand->psnr = psnr;
     demand->width = out->view.camera.width;
     demand->height = out->view.camera.height;
+    demand->samples_max = limits->samples;
     demand->layer = out->layer;
     demand->keep_method = given(values, PARAM_method);
     demand->keep_lod = given(values, PARAM_lod);
@@ -143,8 +163,9 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
     int rc;
     if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) || (rc = resolve_encoding(values, out, err)) ||
-        (rc = resolve_demand(values, out, err)))
+        (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
-    return spl_view_check(&out->view, err);
+    rc = spl_view_check(&out->view, err);
+    return rc ? rc : check_cost(&out->view, limits, err);
 }

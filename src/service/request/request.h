@@ -59,7 +59,7 @@ struct spl_views_request {
     struct spl_view_request *views;
 };
 
-/* `limits` hold for each view, its pixels for all of them together as well. On success the caller finishes *out. */
+/* `limits` hold for each view, its pixels and samples for all of them together as well. On success the caller finishes *out. */
 int spl_views_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                 const struct spl_camera_limits *limits, struct spl_views_request *out,
                                 struct spl_error *err);

@@ -32,7 +32,7 @@ static int resolve_view(const struct values *common, json_t *json, const struct 
 static int resolve_all(const struct values *common, json_t *list, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_views_request *out, struct spl_error *err)
 {
-    uint64_t pixels = 0;
+    uint64_t pixels = 0, samples = 0;
     if (!(out->views = spl_alloc(json_array_size(list), sizeof *out->views, err)))
         return SPL_E_NOMEM;
     for (; out->count < json_array_size(list); out->count++) {
@@ -44,10 +44,14 @@ static int resolve_all(const struct values *common, json_t *list, const struct s
         if (rc)
             return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);
         pixels += (uint64_t)view->view.camera.width * view->view.camera.height;
+        samples += spl_view_get_samples(&view->view);
     }
     if (pixels > limits->pixels)
         return spl_fail_field(err, SPL_E_INPUT, "views", "%zu views have %llu pixels in all; the limit is %llu",
                               out->count, (unsigned long long)pixels, (unsigned long long)limits->pixels);
+    if (limits->samples && samples > limits->samples)
+        return spl_fail_field(err, SPL_E_INPUT, "views", "%zu views have %llu samples in all; the limit is %llu",
+                              out->count, (unsigned long long)samples, (unsigned long long)limits->samples);
     return 0;
 }
 

@@ -22,7 +22,7 @@ struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service)
 {
     const struct spl_service_options *options = service->options;
     return (struct spl_tour_limits){
-        .image = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = options->pixels_max},
+        .image = spl_view_get_limits(service),
         .frames = options->tour_frames_max,
         .pixels = options->tour_pixels_max,
     };

@@ -144,17 +144,27 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
     return spl_camera_path_from_json(json, &options, path, err);
 }
 
-static int check_limits(const struct spl_camera_path *path, const struct spl_tour_limits *limits, size_t frames,
-                        struct spl_error *err)
+/* A path may bring its own size, so a frame is judged here as well. */
+static int check_limits(const struct spl_view *settings, const struct spl_camera_path *path,
+                        const struct spl_tour_limits *limits, size_t frames, struct spl_error *err)
 {
-    uint64_t pixels = (uint64_t)path->cameras->width * path->cameras->height;
+    struct spl_view view = *settings;
+    view.camera = path->cameras[0];
+    uint64_t samples = spl_view_get_samples(&view);
+    if (limits->image.samples && samples > limits->image.samples)
+        return spl_fail_field(err, SPL_E_LIMIT, "settings.supersample", "frames of %llu samples; the limit is %llu",
+                              (unsigned long long)samples, (unsigned long long)limits->image.samples);
+    if (limits->image.bytes && spl_view_get_frame_bytes(&view) > limits->image.bytes)
+        return spl_fail_field(err, SPL_E_LIMIT, "settings.layers", "frames of %llu bytes; the limit is %llu",
+                              (unsigned long long)spl_view_get_frame_bytes(&view),
+                              (unsigned long long)limits->image.bytes);
     if (frames > limits->frames)
         return spl_fail_field(err, SPL_E_LIMIT, "frames", "%zu frames; the limit is %llu", frames,
                               (unsigned long long)limits->frames);
-    if (frames > limits->pixels / pixels)
+    if (frames > limits->pixels / samples)
         return spl_fail_field(err, SPL_E_LIMIT, "frames",
-                              "%zu frames of %llu pixels; the limit of a tour is %llu pixels", frames,
-                              (unsigned long long)pixels, (unsigned long long)limits->pixels);
+                              "%zu frames of %llu samples; the limit of a tour is %llu", frames,
+                              (unsigned long long)samples, (unsigned long long)limits->pixels);
     return 0;
 }
 
@@ -194,7 +204,7 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
         (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, &out->frames, &out->fps,
                                     err)) ||
-        (rc = check_limits(&path, limits, out->frames, err)))
+        (rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))
         rc = SPL_E_NOMEM;

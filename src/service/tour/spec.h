@@ -9,7 +9,7 @@
 
 struct spl_tour_limits {
     struct spl_camera_limits image;
-    uint64_t frames, pixels; /* of a tour, pixels of all its frames together */
+    uint64_t frames, pixels; /* of a tour; samples of all its frames together, one a pixel at least */
 };
 
 struct spl_tour_spec {

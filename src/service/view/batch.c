@@ -225,7 +225,7 @@ static int check_versions(const struct spl_views_request *views, const struct sp
 void spl_make_views(struct request *request, const struct spl_call *call)
 {
     struct spl_service *service = request->service;
-    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX, .pixels = service->options->pixels_max};
+    struct spl_camera_limits limits = spl_view_get_limits(service);
     struct spl_error err = {0};
     struct batch *batch = spl_alloc(1, sizeof *batch, &err);
     if (!batch)
@@ -236,8 +236,10 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         err.code = SPL_E_INPUT;
     if (rc || check_versions(&batch->views, call->entry->info, &err))
         goto refuse;
-    if (spl_view_has_no_room(service, &err) ||
-        !(batch->items = spl_alloc(batch->views.count, sizeof *batch->items, &err)))
+    for (size_t i = 0; i < batch->views.count; i++)
+        if (spl_view_has_no_room(service, &batch->views.views[i], &err))
+            goto refuse;
+    if (!(batch->items = spl_alloc(batch->views.count, sizeof *batch->items, &err)))
         goto refuse;
     batch->service = service;
     batch->request = request;

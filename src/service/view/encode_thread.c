@@ -1,5 +1,6 @@
-/* The encode threads: one frame in, bytes of a format out: an image, several in a container, or what a pick found. Each
- * frame's pixels are released as soon as they are encoded, so that what waits for slow clients is compressed. */
+/* The encode threads, `encoders` for small images and one for large ones, so that no small one waits for these: one
+ * frame in, bytes of a format out: an image, several in a container, or what a pick found. Each frame's pixels are
+ * released as soon as they are encoded, so that what waits for slow clients is compressed. */
 #include "base/clock.h"
 #include "service/view/bundle.h"
 #include "service/view/pick.h"
@@ -20,12 +21,23 @@ static void encode(struct spl_job *job)
     job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
 }
 
-void *spl_encode_thread_run(void *argument)
+static void *run(struct spl_pipeline *pipeline, struct spl_queue *queue)
 {
-    struct spl_pipeline *pipeline = argument;
-    for (struct spl_job *job; (job = spl_queue_pop(pipeline->encode, SPL_NEVER));) {
+    for (struct spl_job *job; (job = spl_queue_pop(queue, SPL_NEVER));) {
         encode(job);
         spl_pipeline_finish_job(pipeline, job);
     }
     return NULL;
+}
+
+void *spl_encode_thread_run(void *argument)
+{
+    struct spl_pipeline *pipeline = argument;
+    return run(pipeline, pipeline->encode);
+}
+
+void *spl_encode_large_thread_run(void *argument)
+{
+    struct spl_pipeline *pipeline = argument;
+    return run(pipeline, pipeline->encode_large);
 }

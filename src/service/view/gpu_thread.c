@@ -1,5 +1,9 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
+ * It renders a tile at a time and then asks again whose turn it is (turns.h), so a view of many tiles is interrupted by
+ * others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
+ * have had alone. Frames of tours have the turns that nobody wants.
+ *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
  * new renderer is made from the mapped datasets. Versions of datasets are added a page at a time between frames, so
  * that nobody waits for them. More than `rebuilds_max` losses within `rebuild_window_ns` end the process, for its
@@ -17,6 +21,7 @@
 #include "dataset/dataset.h"
 #include "service/view/key.h"
 #include "service/view/stages.h"
+#include "service/view/turns.h"
 
 enum { rebuilds_max = 3 };
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
@@ -27,6 +32,8 @@ struct gpu {
     uint64_t losses_ns[rebuilds_max]; /* times of the latest losses, ring */
     uint64_t losses;
     uint64_t frames, inject_every, inject_left, inject_at;
+    struct spl_turns turns;                  /* large views */
+    struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
     TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
     uint64_t pages_evicted;                  /* of this renderer, as counted so far */
 };
@@ -184,12 +191,45 @@ static struct spl_catalog_entry *find_loading(struct gpu *gpu)
     return NULL;
 }
 
+/* Takes over what waits beside small views. */
+static void take_large(struct gpu *gpu)
+{
+    for (struct spl_job *job; (job = spl_queue_pop(gpu->pipeline->large, 0));)
+        spl_turns_add(&gpu->turns, job);
+    if (!gpu->behind)
+        gpu->behind = spl_queue_pop(gpu->pipeline->behind, 0);
+}
+
+/* The job waits for no further turn. */
+static void detach(struct gpu *gpu, struct spl_job *job)
+{
+    if (job == gpu->behind)
+        gpu->behind = NULL;
+    else if (job->in_turns)
+        spl_turns_remove(&gpu->turns, job);
+}
+
+/* Hands a job back that has ended, wherever it waited. */
+static void leave(struct gpu *gpu, struct spl_job *job)
+{
+    detach(gpu, job);
+    spl_pipeline_finish_job(gpu->pipeline, job);
+}
+
 /* Answers everything that waits. */
 static void refuse_waiting(struct gpu *gpu)
 {
-    for (struct spl_job *job; (job = spl_queue_pop(gpu->pipeline->render, 0));) {
+    for (;;) {
+        take_large(gpu);
+        struct spl_job *job = spl_queue_pop(gpu->pipeline->render, 0);
+        if (!job)
+            job = TAILQ_FIRST(&gpu->turns.jobs);
+        if (!job)
+            job = gpu->behind;
+        if (!job)
+            return;
         spl_fail(&job->err, SPL_E_DEVICE_LOST, "the device was lost; it is being reopened");
-        spl_pipeline_finish_job(gpu->pipeline, job);
+        leave(gpu, job);
     }
 }
 
@@ -197,7 +237,7 @@ static void give_up(struct gpu *gpu, const struct spl_error *why)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
     pipeline->failure = *why;
-    spl_queue_close(pipeline->render);
+    spl_pipeline_close_render(pipeline);
     refuse_waiting(gpu);
     set_state(pipeline, SPL_PIPELINE_FAILED);
 }
@@ -285,60 +325,135 @@ static int plan(struct spl_job *job)
     return spl_plan_apply(job->plan, &job->request, left_ms, &job->choice, &job->promised_ms, &job->err);
 }
 
-/* Renders one job and passes it on; false when the thread must end. */
+/* Nobody waits for it any more; the error says why. */
+static bool is_over(const struct gpu *gpu, struct spl_job *job)
+{
+    if (job->behind && spl_queue_is_closed(gpu->pipeline->render)) // the next start makes it
+        return spl_fail(&job->err, SPL_E_CANCELLED, "the service is stopping") != 0;
+    return spl_job_is_over(job);
+}
+
+static int begin(struct gpu *gpu, struct spl_job *job)
+{
+    inject(gpu);
+    leave_out_normals(job);
+    return spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
+}
+
+/* What others took, before the first tile and between tiles, was waiting and no part of the frame. */
+static void resume(struct spl_job *job)
+{
+    uint64_t now = spl_now_ns(), waited = now - (job->steps ? job->paused_ns : job->accepted_ns);
+    job->queue_ms += (double)waited / SPL_NS_PER_MS;
+    job->began_ns = job->steps ? job->began_ns + waited : now;
+}
+
+static void follow(_Atomic uint64_t *mean, uint64_t took)
+{
+    uint64_t old = atomic_load(mean);
+    atomic_store(mean, old ? (7 * old + took) / 8 : took);
+}
+
+/* After the last tile. */
+static void complete(struct gpu *gpu, struct spl_job *job)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    spl_frame_end(job->steps, &job->frame);
+    job->steps = NULL;
+    gpu->frames++;
+    spl_count(pipeline->options.counters, frames);
+    follow(&pipeline->frame_ns, job->frame_ns);
+    if (job->frame.stats.pages_loaded)
+        publish_residency(gpu);
+    else
+        atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
+    job->rendered_ns = spl_now_ns();
+    job->stats = job->frame.stats;
+    const struct spl_device_info *device = spl_renderer_get_device(gpu->renderer);
+    job->renderer = atomic_load(&pipeline->renderer);
+    snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
+    bool usual = !job->request.picks && !job->request.container;
+    if (job->plan && usual && !job->stats.pages_loaded) // loading is no property of the setting
+        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
+}
+
+/* The job waits for its next turn, where it waited before or, if it was small, among the large ones. */
+static void put_aside(struct gpu *gpu, struct spl_job *job)
+{
+    job->paused_ns = spl_now_ns();
+    job->samples_left = spl_frame_get_samples_left(job->steps);
+    if (!job->behind && !job->in_turns)
+        spl_turns_add(&gpu->turns, job);
+}
+
+/* Renders a tile of one job and passes it on after the last; false when the thread must end. */
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
+    bool more = false;
     spl_pipeline_touch(pipeline);
-    job->queue_ms = (double)(spl_now_ns() - job->accepted_ns) / SPL_NS_PER_MS;
-    if (spl_job_is_over(job) || spl_pipeline_reserve_frame(pipeline, job)) {
-        spl_pipeline_finish_job(pipeline, job);
+    if (is_over(gpu, job)) {
+        leave(gpu, job);
         return true;
     }
-    job->began_ns = spl_now_ns();
-    if (plan(job)) {
-        spl_pipeline_finish_job(pipeline, job);
-        return true;
-    }
-    inject(gpu);
-    uint64_t began = spl_now_ns();
-    job->request.view.deadline_ns = job->deadline_ns;
-    leave_out_normals(job);
-    int rc = spl_renderer_render(gpu->renderer, job->dataset, &job->request.view, &job->frame, &job->err);
+    resume(job);
+    int rc = job->steps ? 0 : plan(job);
+    uint64_t clock = spl_now_ns();
+    if (!rc && !job->steps)
+        rc = begin(gpu, job);
+    if (!rc)
+        rc = spl_frame_step(job->steps, job->deadline_ns, &more, &job->err);
+    uint64_t took = spl_now_ns() - clock;
+    job->frame_ns += took;
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
-    if (!rc) {
-        gpu->frames++;
-        spl_count(pipeline->options.counters, frames);
-        job->rendered_ns = spl_now_ns();
-        uint64_t took = job->rendered_ns - began, mean = atomic_load(&pipeline->frame_ns);
-        atomic_store(&pipeline->frame_ns, mean ? (7 * mean + took) / 8 : took);
-        if (job->frame.stats.pages_loaded)
-            publish_residency(gpu);
-        else
-            atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
-        job->stats = job->frame.stats;
-        const struct spl_device_info *device = spl_renderer_get_device(gpu->renderer);
-        job->renderer = atomic_load(&pipeline->renderer);
-        snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
-        bool usual = !job->request.picks && !job->request.container;
-        if (job->plan && usual && !job->stats.pages_loaded) // loading is no property of the setting
-            spl_plan_learn(job->plan, &job->request, (double)took / SPL_NS_PER_MS);
-        rc = spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
+    if (rc) {
+        leave(gpu, job);
+        return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
     }
-    if (rc)
+    follow(&pipeline->turn_ns, took);
+    if (more) {
+        put_aside(gpu, job);
+        return true;
+    }
+    complete(gpu, job);
+    detach(gpu, job);
+    if (spl_pipeline_pass_on(pipeline, job))
         spl_pipeline_finish_job(pipeline, job);
-    return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
+    return true;
+}
+
+/* Views that nobody waits for give back their memory, whether it is their turn or not. */
+static void drop_over(struct gpu *gpu)
+{
+    struct spl_job *job, *next;
+    for (job = TAILQ_FIRST(&gpu->turns.jobs); job; job = next) {
+        next = TAILQ_NEXT(job, turn);
+        if (is_over(gpu, job))
+            leave(gpu, job);
+    }
+}
+
+/* Waits for a job, unless there is something else to do. NULL: there is, or somebody has come by another way. */
+static struct spl_job *choose(struct gpu *gpu, bool idle)
+{
+    struct spl_queue *render = gpu->pipeline->render;
+    take_large(gpu);
+    drop_over(gpu);
+    struct spl_job *job = spl_turns_next(&gpu->turns, spl_queue_get_length(render) > 0);
+    if (!job)
+        job = spl_queue_pop(render, idle && !gpu->behind ? SPL_NEVER : 0);
+    return job ? job : gpu->behind;
 }
 
 static void run(struct gpu *gpu)
 {
-    struct spl_queue *render = gpu->pipeline->render;
     for (;;) {
         take_orders(gpu);
         struct spl_catalog_entry *loading = find_loading(gpu);
-        struct spl_job *job = spl_queue_pop(render, loading ? 0 : SPL_NEVER);
-        if (!job && spl_queue_is_closed(render))
+        bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
+        struct spl_job *job = choose(gpu, !loading);
+        if (!job && closed)
             break;
         if (job && !serve(gpu, job))
             break;
@@ -357,6 +472,7 @@ void *spl_gpu_thread_run(void *argument)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
     TAILQ_INIT(&gpu.entries);
+    spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
     if (build(&gpu, &err)) {

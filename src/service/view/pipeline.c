@@ -31,39 +31,6 @@ bool spl_job_is_over(struct spl_job *job)
     return job->err.code != SPL_OK;
 }
 
-static size_t frame_bytes(const struct spl_view *view)
-{
-    size_t pixel = 4 * (size_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
-    return pixel * view->camera.width * view->camera.height;
-}
-
-int spl_pipeline_reserve_frame(struct spl_pipeline *pipeline, struct spl_job *job)
-{
-    size_t bytes = frame_bytes(&job->request.view);
-    int rc = 0;
-    pthread_mutex_lock(&pipeline->mutex);
-    while (!rc && pipeline->frame_bytes && pipeline->frame_bytes + bytes > pipeline->options.frame_bytes_max) {
-        struct timespec t = {.tv_sec = (time_t)(job->deadline_ns / SPL_NS_PER_S),
-                             .tv_nsec = (long)(job->deadline_ns % SPL_NS_PER_S)};
-        if (pthread_cond_timedwait(&pipeline->released, &pipeline->mutex, &t))
-            rc = spl_fail(&job->err, SPL_E_TIMEOUT, "the deadline passed while earlier images were being encoded");
-    }
-    if (!rc)
-        pipeline->frame_bytes += job->frame_bytes = bytes;
-    pthread_mutex_unlock(&pipeline->mutex);
-    return rc;
-}
-
-static void release_frame(struct spl_pipeline *pipeline, struct spl_job *job)
-{
-    spl_frame_finish(&job->frame);
-    pthread_mutex_lock(&pipeline->mutex);
-    pipeline->frame_bytes -= job->frame_bytes;
-    job->frame_bytes = 0;
-    pthread_cond_signal(&pipeline->released); // only the gpu thread waits
-    pthread_mutex_unlock(&pipeline->mutex);
-}
-
 void spl_pipeline_touch(struct spl_pipeline *pipeline)
 {
     atomic_store(&pipeline->moved_ns, spl_now_ns());
@@ -76,10 +43,21 @@ uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline)
     return busy && now > moved ? now - moved : 0;
 }
 
+int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job)
+{
+    if (!spl_pipeline_image_is_large(&job->request.view))
+        return spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
+    bool room = spl_queue_try_push(pipeline->encode_large, job);
+    spl_assert(room); // for all jobs that can be inside; it is closed after the gpu thread has gone
+    return 0;
+}
+
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
 {
     spl_pipeline_touch(pipeline);
-    release_frame(pipeline, job);
+    spl_frame_end(job->steps, NULL);
+    job->steps = NULL;
+    spl_frame_finish(&job->frame);
     bool room = spl_queue_try_push(pipeline->done, job);
     spl_assert(room);
     pipeline->options.wake(pipeline->options.wake_context);
@@ -136,6 +114,32 @@ struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline
     return entry;
 }
 
+/* The queue to the large encoder has room for every job that can be inside, as `done` has, so nothing waits for it. */
+static int create_queues(struct spl_pipeline *pipeline, struct spl_error *err)
+{
+    size_t queue = pipeline->options.queue, encoders = pipeline->options.encoders;
+    size_t inside = 3 * queue + 2 * encoders + 2 * SPL_PIPELINE_BEHIND + 1;
+    const struct {
+        struct spl_queue **queue;
+        size_t capacity;
+    } table[] = {
+        {&pipeline->render, queue},    {&pipeline->large, queue},         {&pipeline->behind, SPL_PIPELINE_BEHIND},
+        {&pipeline->encode, encoders}, {&pipeline->encode_large, inside}, {&pipeline->done, inside}};
+    int rc = 0;
+    for (size_t i = 0; !rc && i < sizeof table / sizeof *table; i++)
+        rc = spl_queue_create(table[i].capacity, table[i].queue, err);
+    return rc;
+}
+
+static int start_encoders(struct spl_pipeline *pipeline, struct spl_error *err)
+{
+    int rc = pthread_create(&pipeline->large_thread, NULL, spl_encode_large_thread_run, pipeline);
+    pipeline->large_started = !rc;
+    for (; !rc && pipeline->encode_started < pipeline->options.encoders; pipeline->encode_started += !rc)
+        rc = pthread_create(&pipeline->encode_threads[pipeline->encode_started], NULL, spl_encode_thread_run, pipeline);
+    return rc ? spl_fail_errno(err, rc, "cannot start an encode thread") : 0;
+}
+
 int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err)
 {
     spl_assert(options->queue && options->encoders && options->encoders <= ENCODERS_MAX);
@@ -144,28 +148,17 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
         return SPL_E_NOMEM;
     pipeline->options = *options;
     if (!options->frame_bytes_max)
-        pipeline->options.frame_bytes_max = (size_t)1 << 30;
+        pipeline->options.frame_bytes_max = SPL_FRAME_BYTES_MAX;
+    if (!options->samples_max)
+        pipeline->options.samples_max = (uint64_t)1 << 30;
     STAILQ_INIT(&pipeline->orders);
     STAILQ_INIT(&pipeline->changes);
     pthread_mutex_init(&pipeline->mutex, NULL);
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_cond_init(&pipeline->released, &monotonic);
-    pthread_condattr_destroy(&monotonic);
-    int rc;
-    if ((rc = spl_queue_create(options->queue, &pipeline->render, err)) ||
-        (rc = spl_queue_create(options->encoders, &pipeline->encode, err)) ||
-        (rc = spl_queue_create(2 * options->queue + 2 * options->encoders + 2 * SPL_QUEUE_BEHIND + 1, &pipeline->done,
-                               err)))
+    int rc = create_queues(pipeline, err);
+    if (!rc)
+        rc = start_encoders(pipeline, err);
+    if (rc)
         goto fail;
-    for (; pipeline->encode_started < options->encoders; pipeline->encode_started++) {
-        pthread_t *thread = &pipeline->encode_threads[pipeline->encode_started];
-        if ((rc = pthread_create(thread, NULL, spl_encode_thread_run, pipeline))) {
-            rc = spl_fail_errno(err, rc, "cannot start an encode thread");
-            goto fail;
-        }
-    }
     for (size_t i = 0; i < options->entry_count; i++) {
         options->entries[i]->release = on_released;
         options->entries[i]->release_context = pipeline;
@@ -196,26 +189,42 @@ static void destroy_entries(struct spl_pipeline *pipeline)
     }
 }
 
+static void close_queue(struct spl_queue *queue)
+{
+    if (queue)
+        spl_queue_close(queue);
+}
+
+void spl_pipeline_close_render(struct spl_pipeline *pipeline)
+{
+    close_queue(pipeline->large);
+    close_queue(pipeline->behind);
+    close_queue(pipeline->render); // last: the gpu thread ends when it finds it closed and empty
+}
+
 void spl_pipeline_destroy(struct spl_pipeline *pipeline)
 {
     if (!pipeline)
         return;
-    if (pipeline->render)
-        spl_queue_close(pipeline->render);
+    spl_pipeline_close_render(pipeline);
     if (pipeline->gpu_started)
         pthread_join(pipeline->gpu_thread, NULL);
-    if (pipeline->encode)
-        spl_queue_close(pipeline->encode);
+    close_queue(pipeline->encode);
+    close_queue(pipeline->encode_large);
     for (size_t i = 0; i < pipeline->encode_started; i++)
         pthread_join(pipeline->encode_threads[i], NULL);
+    if (pipeline->large_started)
+        pthread_join(pipeline->large_thread, NULL);
     if (pipeline->done)
         for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
             spl_job_destroy(job);
     destroy_entries(pipeline);
     spl_queue_destroy(pipeline->done);
+    spl_queue_destroy(pipeline->encode_large);
     spl_queue_destroy(pipeline->encode);
+    spl_queue_destroy(pipeline->behind);
+    spl_queue_destroy(pipeline->large);
     spl_queue_destroy(pipeline->render);
-    pthread_cond_destroy(&pipeline->released);
     pthread_mutex_destroy(&pipeline->mutex);
     free(pipeline);
 }
@@ -224,19 +233,23 @@ int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, stru
 {
     if (!atomic_load(&pipeline->in_flight))
         spl_pipeline_touch(pipeline); // the end of idleness is no hang
-    if (atomic_fetch_add(&pipeline->in_flight, 1) < spl_queue_get_capacity(pipeline->done) &&
-        (job->behind ? spl_queue_try_push_behind(pipeline->render, job) : spl_queue_try_push(pipeline->render, job)))
-        return 0;
-    atomic_fetch_sub(&pipeline->in_flight, 1);
-    return spl_fail(err, SPL_E_BUSY, "the queue of %zu views is full; come back later",
-                    spl_queue_get_capacity(pipeline->render));
+    int rc = SPL_E_BUSY;
+    if (atomic_fetch_add(&pipeline->in_flight, 1) < spl_queue_get_capacity(pipeline->done))
+        rc = spl_pipeline_let_in(pipeline, job, err);
+    else
+        spl_fail(err, rc, "%zu views are on their way; come back later", spl_queue_get_capacity(pipeline->done));
+    if (rc)
+        atomic_fetch_sub(&pipeline->in_flight, 1);
+    return rc;
 }
 
 struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline)
 {
     struct spl_job *job = spl_queue_pop(pipeline->done, 0);
-    if (job)
+    if (job) {
         atomic_fetch_sub(&pipeline->in_flight, 1);
+        spl_pipeline_let_out(pipeline, job);
+    }
     return job;
 }
 
@@ -265,17 +278,13 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
         .render_capacity = spl_queue_get_capacity(pipeline->render),
         .encode_length = spl_queue_get_length(pipeline->encode),
         .encode_capacity = spl_queue_get_capacity(pipeline->encode),
+        .large_length = pipeline->large_load.jobs,
+        .large_samples = pipeline->large_load.samples,
+        .large_samples_max = pipeline->options.samples_max,
+        .large_bytes = pipeline->large_load.bytes,
         .frame_ms = (double)atomic_load(&pipeline->frame_ns) / SPL_NS_PER_MS,
     };
     pthread_mutex_lock(&pipeline->mutex);
     status->device = pipeline->device;
     pthread_mutex_unlock(&pipeline->mutex);
-}
-
-unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline)
-{
-    enum { longest_s = 60 };
-    uint64_t waiting = spl_queue_get_length(pipeline->render) + 1;
-    uint64_t seconds = waiting * atomic_load(&pipeline->frame_ns) / SPL_NS_PER_S + 1;
-    return seconds < longest_s ? (unsigned)seconds : longest_s;
 }

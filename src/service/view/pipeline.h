@@ -2,6 +2,10 @@
  *
  *     submit → [render queue] → gpu → [encode queue] → encode → [done queue] → take
  *
+ * There are three ways to the device. Small views, of one tile, are counted. Large ones are let in by the samples and
+ * bytes of those inside, take turns with them tile by tile (turns.h) and have an encode thread of their own, so that
+ * they fill nothing that small ones need. Frames of tours stand behind both.
+ *
  * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
  * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and the
  * last unref() of one send it to the gpu thread, take_change() brings it back. */
@@ -9,6 +13,7 @@
 #define SPL_SERVICE_PIPELINE_H
 
 #include <stdatomic.h>
+#include <sys/queue.h>
 
 #include <splatd/render.h>
 
@@ -30,18 +35,25 @@ struct spl_job {
     void *owner;                       // owned by: loop
     void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
 
-    struct spl_frame frame; /* between gpu and encode */
+    TAILQ_ENTRY(spl_job) turn; // owned by: gpu, as the next two; while it waits for one
+    bool in_turns;
+    struct spl_frame_steps *steps; // may be NULL: not begun, or done
+    uint64_t samples_left;         /* of the frame, for its turns */
+    uint64_t paused_ns;            /* when its last tile was done */
+    struct spl_frame frame;        /* between gpu and encode */
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
-    size_t frame_bytes; // guarded by: the pipeline's mutex; pixels accounted for this job
-    double queue_ms, encode_ms;
+    bool large; /* the way that it goes; set by submit(), with what it counts for there */
+    uint64_t samples, bytes;
+    double queue_ms, encode_ms;     /* queue: what it waited for the device, between its tiles too */
     uint64_t renderer;              /* spl_renderer_hash() of what rendered it */
     char device[300];               /* the same in words */
     const char *route;              /* for statistics; static, NULL: none */
     struct spl_plan *plan;          /* of `entry`; NULL: nothing is planned */
     struct spl_choice choice;       /* where request.planned */
     double promised_ms;             /* the same */
-    uint64_t began_ns, rendered_ns; /* of the frame, planning included */
+    uint64_t began_ns, rendered_ns; /* of the frame, planning included; began_ns moves on by what others took between */
+    uint64_t frame_ns;              /* of its tiles */
     struct spl_error err;
 };
 
@@ -53,7 +65,8 @@ struct spl_pipeline_options {
     struct spl_catalog_entry *const *entries; /* resident before the state becomes READY; the caller's references */
     size_t entry_count;
     size_t queue, encoders;
-    size_t frame_bytes_max; /* host memory for frames that wait for an encoder, 0 = 1 GiB */
+    uint64_t samples_max;     /* of large views inside, 0 = four of 256 Mi; a view alone may have more */
+    uint64_t frame_bytes_max; /* host memory for the frames of those, 0 = SPL_FRAME_BYTES_MAX; the same */
     struct spl_counters *counters;
     void (*wake)(void *context); /* called from any thread: a job is done, or the state changed */
     void *wake_context;
@@ -66,7 +79,13 @@ enum spl_pipeline_state {
     SPL_PIPELINE_FAILED,     /* for good; see spl_pipeline_get_failure() */
 };
 
+#define SPL_FRAME_BYTES_MAX ((uint64_t)1 << 30)
+enum { SPL_PIPELINE_BEHIND = 4 }; /* frames of tours that may be inside */
+
 struct spl_pipeline;
+
+/* Does it go the large views' way? A planned one is judged by what its plan may choose. */
+bool spl_request_is_large(const struct spl_view_request *request);
 
 /* Starts the threads; the gpu thread makes renderer and residency and reports through `wake`. */
 int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err);
@@ -75,7 +94,7 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
  * nobody refers to. References that others hold must be gone before. NULL-safe. */
 void spl_pipeline_destroy(struct spl_pipeline *pipeline);
 
-/* Never blocks. SPL_E_BUSY when the queue is full. */
+/* Loop thread, as take(); never blocks. SPL_E_BUSY when what waits on the job's way is as much as may. */
 int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
 
 /* A finished job or NULL; never blocks. */
@@ -101,7 +120,9 @@ struct spl_pipeline_status {
     struct spl_device_info device; /* of the last renderer that worked; zero before the first */
     uint64_t device_bytes, device_limit_bytes;
     size_t render_length, render_capacity, encode_length, encode_capacity;
-    double frame_ms; /* moving mean */
+    size_t large_length;                                    /* views, from submit() to take() */
+    uint64_t large_samples, large_samples_max, large_bytes; /* theirs */
+    double frame_ms;                                        /* moving mean */
 };
 void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status);
 
@@ -109,7 +130,7 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
  * A pulse for health checks. Any thread. */
 uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline);
 
-/* Seconds after which a refused request may be repeated with hope, at least 1. */
-unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline);
+/* Seconds after which a refused view may be repeated with hope, at least 1. */
+unsigned spl_pipeline_get_retry_after(struct spl_pipeline *pipeline, bool large);
 
 #endif

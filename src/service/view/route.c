@@ -12,8 +12,7 @@ typedef int parse_fn(const char *text, size_t length, const struct spl_camera_de
 static int parse_view(struct request *request, const struct spl_call *call, parse_fn *parse,
                       struct spl_view_request *view, struct spl_error *err)
 {
-    struct spl_camera_limits limits = {.side_px = SPL_SERVICE_SIDE_MAX,
-                                       .pixels = request->service->options->pixels_max};
+    struct spl_camera_limits limits = spl_view_get_limits(request->service);
     bool posted = call->method == SPL_POST;
     const char *text = posted ? request->body : request->query;
     int rc = parse(text, posted ? request->body_length : strlen(text), &call->entry->defaults, &limits, view, err);
@@ -69,12 +68,30 @@ int spl_view_check_version(const struct spl_view_request *view, const struct spl
                           (unsigned long long)view->version, info->id, (unsigned long long)info->version);
 }
 
-bool spl_view_has_no_room(const struct spl_service *service, struct spl_error *err)
+/* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view
+ * from being made. */
+bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view, struct spl_error *err)
 {
-    if (service->reply_bytes <= reply_bytes_max)
+    bool large = spl_request_is_large(view);
+    size_t bytes = service->reply_bytes;
+    if (large) {
+        struct spl_pipeline_status status;
+        spl_pipeline_get_status(service->pipeline, &status);
+        bytes = service->large_reply_bytes + status.large_bytes;
+    }
+    uint64_t own = large ? spl_view_get_frame_bytes(&view->view) : 0;
+    if (!bytes || bytes + own <= reply_bytes_max) // one alone always gets in
         return false;
-    spl_fail(err, SPL_E_BUSY, "%zu bytes of images wait for slow clients; come back later", service->reply_bytes);
+    spl_fail(err, SPL_E_BUSY, "%zu bytes of images are on their way to clients; come back later", bytes);
     return true;
+}
+
+struct spl_camera_limits spl_view_get_limits(const struct spl_service *service)
+{
+    return (struct spl_camera_limits){.side_px = SPL_SERVICE_SIDE_MAX,
+                                      .pixels = service->options->pixels_max,
+                                      .samples = service->options->samples_max,
+                                      .bytes = SPL_FRAME_BYTES_MAX};
 }
 
 static void make(struct request *request, const struct spl_call *call, parse_fn *parse)
@@ -93,7 +110,8 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
         if (answer_at_once(request, &view, &key))
             return;
     }
-    if (spl_view_has_no_room(service, &err))
+    request->large = spl_request_is_large(&view);
+    if (spl_view_has_no_room(service, &view, &err))
         goto refuse;
     request->ticket.done = answer;
     request->ticket.route = request->route;

@@ -1,4 +1,4 @@
-/* What the pipeline's threads share; only pipeline.c, gpu_thread.c and encode_thread.c include it. */
+/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c and encode_thread.c include it. */
 #ifndef SPL_SERVICE_STAGES_H
 #define SPL_SERVICE_STAGES_H
 
@@ -9,20 +9,28 @@
 
 enum { ENCODERS_MAX = 16 };
 
+/* What is inside on one of the ways that are let in by work. */
+struct spl_load {
+    size_t jobs;
+    uint64_t samples, bytes;
+};
+
 struct spl_pipeline {
-    struct spl_pipeline_options options; // read-only
-    struct spl_queue *render, *encode, *done;
-    pthread_t gpu_thread, encode_threads[ENCODERS_MAX];
+    struct spl_pipeline_options options;       // read-only
+    struct spl_queue *render, *large, *behind; /* to the gpu thread, which waits on the first and is interrupted for the
+                                                  others */
+    struct spl_queue *encode, *encode_large, *done;
+    struct spl_load large_load, behind_load; // owned by: loop
+    pthread_t gpu_thread, encode_threads[ENCODERS_MAX], large_thread;
     size_t encode_started;
-    bool gpu_started;
+    bool gpu_started, large_started;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
-    _Atomic uint64_t device_bytes, device_limit_bytes, frame_ns, renderer;
-    _Atomic uint64_t moved_ns; /* when a thread last began or ended a step of its work */
-    atomic_int state;          /* enum spl_pipeline_state */
-    struct spl_error failure;  /* written by the gpu thread before state becomes FAILED */
+    _Atomic uint64_t device_bytes, device_limit_bytes, renderer;
+    _Atomic uint64_t frame_ns, turn_ns; /* moving means: of a frame, and of a turn, a tile at most */
+    _Atomic uint64_t moved_ns;          /* when a thread last began or ended a step of its work */
+    atomic_int state;                   /* enum spl_pipeline_state */
+    struct spl_error failure;           /* written by the gpu thread before state becomes FAILED */
     pthread_mutex_t mutex;
-    pthread_cond_t released;
-    size_t frame_bytes;                       // guarded by: mutex; pixels of all frames between gpu and encode
     struct spl_device_info device;            // guarded by: mutex
     STAILQ_HEAD(, spl_catalog_entry) orders;  // guarded by: mutex; for the gpu thread: LOADING or LEAVING
     STAILQ_HEAD(, spl_catalog_entry) changes; // guarded by: mutex; for the loop
@@ -31,6 +39,20 @@ struct spl_pipeline {
 /* Thread bodies; `argument` is the pipeline. */
 void *spl_gpu_thread_run(void *argument);
 void *spl_encode_thread_run(void *argument);
+void *spl_encode_large_thread_run(void *argument);
+
+/* admission.c: lets the job in on its way to the gpu thread and counts it, until it is let out. Loop's thread. */
+int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
+void spl_pipeline_let_out(struct spl_pipeline *pipeline, const struct spl_job *job);
+
+/* Is the image more than is encoded in no time? */
+bool spl_pipeline_image_is_large(const struct spl_view *view);
+
+/* Refuses further jobs; those inside can still be popped. */
+void spl_pipeline_close_render(struct spl_pipeline *pipeline);
+
+/* Hands a rendered job to the encoders of its kind. Waits for room among the small ones, until its deadline. */
+int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* The oldest entry that the gpu thread is to add or to let go of, or NULL. */
 struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline);
@@ -44,10 +66,6 @@ void spl_pipeline_touch(struct spl_pipeline *pipeline);
 
 /* Hands a job back to the loop, with `err` set or `encoded` filled. */
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);
-
-/* Accounts for the job's pixels before they are rendered; waits until the encoders have released enough of others', at
- * most to the job's deadline. A frame larger than the whole budget is let through alone. */
-int spl_pipeline_reserve_frame(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* Sets the error of a job that nobody waits for, or whose deadline has passed; true then. */
 bool spl_job_is_over(struct spl_job *job);

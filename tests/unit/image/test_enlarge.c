@@ -22,7 +22,7 @@ static void a_ramp_of_depth_stays_a_ramp(void **state)
     float small[4] = {10, 10.01f, 10.02f, 10.03f}, large[8];
     struct spl_image from = image(SPL_LAYER_DEPTH, SPL_PIXEL_F32, 4, 1, small);
     struct spl_image to = image(SPL_LAYER_DEPTH, SPL_PIXEL_F32, 8, 1, large);
-    spl_image_enlarge(&from, 0.5, &to);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     for (int x = 1; x < 7; x++)
         assert_true(fabs(large[x] - (10 + 0.01 * ((x + 0.5) / 2 - 0.5))) < 1e-5);
     assert_true(large[0] == 10 && fabsf(large[7] - 10.03f) < 1e-5f);
@@ -34,7 +34,7 @@ static void an_edge_of_depth_has_no_value_in_between(void **state)
     float small[4] = {2, 2, 7, NAN}, large[16];
     struct spl_image from = image(SPL_LAYER_RANGE, SPL_PIXEL_F32, 4, 1, small);
     struct spl_image to = image(SPL_LAYER_RANGE, SPL_PIXEL_F32, 16, 1, large);
-    spl_image_enlarge(&from, 0.25, &to);
+    spl_image_enlarge(&from, 0.25, &to, 0, to.height);
     for (int x = 0; x < 16; x++) {
         if (x < 8)
             assert_true(large[x] == 2);
@@ -51,7 +51,7 @@ static void transparent_pixels_lend_no_colour(void **state)
     uint8_t small[] = {200, 100, 50, 255, 0, 255, 0, 0}, large[16];
     struct spl_image from = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 2, 1, small);
     struct spl_image to = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 4, 1, large);
-    spl_image_enlarge(&from, 0.5, &to);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     const uint8_t alphas[] = {255, 191, 64, 0};
     for (int x = 0; x < 4; x++) {
         assert_int_equal(large[4 * x + 3], alphas[x]);
@@ -66,7 +66,7 @@ static void normals_are_unit_and_ids_are_whole(void **state)
     float normals[] = {1, 0, 0, 0, 1, 0, 0, 0, 0}, out[18];
     struct spl_image from = image(SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 3, 1, normals);
     struct spl_image to = image(SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 6, 1, out);
-    spl_image_enlarge(&from, 0.5, &to);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     for (int x = 0; x < 4; x++)
         assert_true(fabs(hypot(hypot(out[3 * x], out[3 * x + 1]), out[3 * x + 2]) - 1) < 1e-6);
     assert_true(fabsf(out[3] / out[4] - 3) < 1e-5f); /* a quarter of the way from x to y */
@@ -75,7 +75,7 @@ static void normals_are_unit_and_ids_are_whole(void **state)
     uint32_t ids[] = {7, UINT32_MAX, 9}, large[5 * 2];
     from = image(SPL_LAYER_ID, SPL_PIXEL_U32, 3, 1, ids);
     to = image(SPL_LAYER_ID, SPL_PIXEL_U32, 5, 2, large); /* odd: the last coarse pixel is half used */
-    spl_image_enlarge(&from, 0.5, &to);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     const uint32_t wanted[] = {7, 7, UINT32_MAX, UINT32_MAX, 9, 7, 7, UINT32_MAX, UINT32_MAX, 9};
     assert_memory_equal(large, wanted, sizeof wanted);
 }
@@ -86,7 +86,7 @@ static void coverage_fades(void **state)
     float small[] = {1, 0, 0, 0}, large[16];
     struct spl_image from = image(SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 2, 2, small);
     struct spl_image to = image(SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 4, 4, large);
-    spl_image_enlarge(&from, 0.5, &to);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     assert_true(large[0] == 1 && large[5] == 0.75f * 0.75f && large[10] == 0.25f * 0.25f && large[15] == 0);
 }
 

@@ -147,6 +147,28 @@ static void test_kept_parameters_narrow_the_choice(void **state)
     spl_planner_finish(&planner);
 }
 
+static void test_settings_that_cost_too_much_are_not_chosen(void **state)
+{
+    (void)state;
+    struct spl_planner planner;
+    struct spl_demand wanted = demand(NAN, 90);
+    struct spl_choice choice;
+    struct spl_error err = {0};
+    assert_int_equal(spl_planner_init(&planner, NULL, NULL, NULL), 0);
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.setting.supersample == 2); // the finest there is
+    wanted.samples_max = 4 * megapixel * megapixel;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.setting.supersample == 2);
+    wanted.samples_max--;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.setting.supersample == 1);
+    wanted.samples_max = megapixel * megapixel - 1; // coarser ones have as many pixels
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "width");
+    spl_planner_finish(&planner);
+}
+
 static void test_settings_of_unknown_accuracy(void **state)
 {
     (void)state;
@@ -441,6 +463,7 @@ int main(void)
         cmocka_unit_test(test_psnr_takes_the_cheapest_that_reaches_it),
         cmocka_unit_test(test_both_hold_the_budget_first),
         cmocka_unit_test(test_kept_parameters_narrow_the_choice),
+        cmocka_unit_test(test_settings_that_cost_too_much_are_not_chosen),
         cmocka_unit_test(test_settings_of_unknown_accuracy),
         cmocka_unit_test(test_unusable_settings_are_left_out),
         cmocka_unit_test(test_without_a_profile_nothing_is_promised),

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -19,12 +20,16 @@ static void no_wake(void *context)
     (void)context;
 }
 
-static size_t frame_bytes_max;
+static uint64_t samples_max, frame_bytes_max;
 
 static struct spl_pipeline *start(size_t queue)
 {
-    struct spl_pipeline_options options = {
-        .queue = queue, .encoders = 2, .frame_bytes_max = frame_bytes_max, .counters = &counters, .wake = no_wake};
+    struct spl_pipeline_options options = {.queue = queue,
+                                           .encoders = 2,
+                                           .samples_max = samples_max,
+                                           .frame_bytes_max = frame_bytes_max,
+                                           .counters = &counters,
+                                           .wake = no_wake};
     struct spl_pipeline *pipeline = NULL;
     struct spl_error err = {0};
     memset(&counters, 0, sizeof counters);
@@ -34,17 +39,29 @@ static struct spl_pipeline *start(size_t queue)
     return pipeline;
 }
 
-static struct spl_job *make_job(unsigned deadline_ms)
+static struct spl_job *make_view(const char *query, unsigned deadline_ms)
 {
     static const struct spl_camera_defaults defaults = {
         .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
-    static const struct spl_camera_limits limits = {.side_px = 64, .pixels = 4096};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
     struct spl_job *job = calloc(1, sizeof *job);
-    const char *query = "width=8&height=4&format=raw";
     assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
     return job;
+}
+
+static struct spl_job *make_job(unsigned deadline_ms)
+{
+    return make_view("width=8&height=4&format=raw", deadline_ms);
+}
+
+/* A small picture of many samples. */
+static struct spl_job *make_large(unsigned tiles)
+{
+    char query[64];
+    snprintf(query, sizeof query, "width=2048&height=%u&supersample=4", 128 * tiles);
+    return make_view(query, 60000);
 }
 
 static struct spl_job *take(struct spl_pipeline *pipeline)
@@ -71,11 +88,159 @@ static void jobs_come_back_with_bytes(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
-static void frames_beyond_the_budget_go_one_by_one(void **state)
+static void large_views_are_let_in_by_their_work(void **state)
 {
-    frame_bytes_max = 100; // less than one frame of 128 bytes
-    jobs_come_back_with_bytes(state);
-    frame_bytes_max = 0;
+    (void)state;
+    for (int by_bytes = 0; by_bytes < 2; by_bytes++) {
+        setenv("FAKE_MPX_MS", "10", 1);
+        samples_max = by_bytes ? 0 : 40 << 20;    // of 32 Mi: one
+        frame_bytes_max = by_bytes ? 8 << 20 : 0; // less than one of 8 MiB and another
+        struct spl_pipeline *pipeline = start(4);
+        struct spl_job *refused = make_large(8);
+        struct spl_error err = {0};
+        struct spl_pipeline_status status;
+        assert_int_equal(spl_pipeline_submit(pipeline, make_large(8), NULL), 0);
+        assert_int_equal(spl_pipeline_submit(pipeline, refused, &err), SPL_E_BUSY);
+        assert_non_null(strstr(err.message, "large views"));
+        for (int i = 0; i < 4; i++)
+            assert_int_equal(spl_pipeline_submit(pipeline, make_job(10000), NULL), 0);
+        spl_pipeline_get_status(pipeline, &status);
+        assert_int_equal(status.large_length, 1);
+        assert_int_equal(status.large_samples, 32 << 20);
+        for (int i = 0; i < 5; i++) {
+            struct spl_job *job = take(pipeline);
+            assert_int_equal(job->err.code, 0);
+            spl_job_destroy(job);
+        }
+        assert_int_equal(spl_pipeline_submit(pipeline, refused, NULL), 0); // there is room again
+        spl_job_destroy(take(pipeline));
+        spl_pipeline_get_status(pipeline, &status);
+        assert_int_equal(status.large_length + status.large_samples + status.large_bytes, 0);
+        spl_pipeline_destroy(pipeline);
+    }
+    unsetenv("FAKE_MPX_MS");
+    samples_max = frame_bytes_max = 0;
+}
+
+static void as_many_large_views_as_small_ones_at_most(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "100", 1);
+    struct spl_pipeline *pipeline = start(2);
+    struct spl_job *refused = make_large(2);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, make_large(2), NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, refused, NULL), SPL_E_BUSY);
+    assert_int_equal(spl_pipeline_submit(pipeline, make_job(10000), NULL), 0);
+    spl_job_destroy(refused);
+    unsetenv("FAKE_FRAME_MS");
+    spl_pipeline_destroy(pipeline);
+    assert_int_equal(counters.frames, 3);
+}
+
+static void small_views_go_between_tiles_and_cost_the_large_one_waiting_only(void **state)
+{
+    (void)state;
+    setenv("FAKE_MPX_MS", "10", 1);
+    setenv("FAKE_FRAME_MS", "5", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *large = make_large(16), *larger = make_large(32);
+    uint64_t others_ns = 0;
+    assert_int_equal(spl_pipeline_submit(pipeline, larger, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, large, NULL), 0);
+    for (int i = 0; i < 6; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, make_job(60000), NULL), 0);
+    for (int i = 0; i < 6; i++) { // first of all, though they came last
+        struct spl_job *job = take(pipeline);
+        assert_true(job != large && job != larger);
+        others_ns += job->frame_ns;
+        spl_job_destroy(job);
+    }
+    assert_ptr_equal(take(pipeline), large); // less was left of it
+    assert_ptr_equal(take(pipeline), larger);
+    uint64_t waited_ns = (uint64_t)(large->queue_ms * SPL_NS_PER_MS);
+    assert_true(waited_ns >= others_ns);
+    assert_true(large->rendered_ns - large->began_ns <= large->rendered_ns - large->accepted_ns - waited_ns + 1000);
+    assert_true(large->frame_ns <= large->rendered_ns - large->began_ns);
+    assert_int_equal(large->err.code + larger->err.code, 0);
+    spl_job_destroy(large);
+    spl_job_destroy(larger);
+    unsetenv("FAKE_FRAME_MS");
+    unsetenv("FAKE_MPX_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_large_view_ends_between_tiles_when_nobody_waits(void **state)
+{
+    (void)state;
+    setenv("FAKE_MPX_MS", "20", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *left = make_large(64), *late = make_large(64), *job;
+    late->deadline_ns = spl_now_ns() + 50 * SPL_NS_PER_MS;
+    assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, make_job(60000), NULL), 0);
+    spl_job_destroy(take(pipeline)); // now one of the others is begun
+    atomic_store(&left->dropped, true);
+    for (int i = 0; i < 2; i++) {
+        job = take(pipeline);
+        assert_int_equal(job->err.code, job == left ? SPL_E_CANCELLED : SPL_E_TIMEOUT);
+        assert_null(job->steps);
+        spl_job_destroy(job);
+    }
+    assert_int_equal(counters.frames, 1);
+    unsetenv("FAKE_MPX_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
+static void a_loss_between_tiles_ends_the_large_view_too(void **state)
+{
+    (void)state;
+    setenv("FAKE_MPX_MS", "10", 1);
+    setenv("SPLATD_INJECT_LOSS_AFTER", "6x1", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *large = make_large(64), *job;
+    assert_int_equal(spl_pipeline_submit(pipeline, large, NULL), 0);
+    for (int i = 0; i < 6; i++) { // every fourth turn is the large one's, so it has begun
+        assert_int_equal(spl_pipeline_submit(pipeline, make_job(60000), NULL), 0);
+        job = take(pipeline);
+        assert_int_equal(job->err.code, 0);
+        spl_job_destroy(job);
+    }
+    assert_int_equal(spl_pipeline_submit(pipeline, make_job(60000), NULL), 0); // meets the loss
+    for (int i = 0; i < 2; i++) {
+        job = take(pipeline);
+        assert_int_equal(job->err.code, SPL_E_DEVICE_LOST);
+        spl_job_destroy(job);
+    }
+    while (spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY)
+        usleep(1000);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    assert_int_equal(spl_pipeline_submit(pipeline, make_large(2), NULL), 0);
+    job = take(pipeline);
+    assert_int_equal(job->err.code, 0);
+    spl_job_destroy(job);
+    unsetenv("FAKE_MPX_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
+/* Of a tour; the next start makes it. */
+static void a_frame_behind_does_not_hold_up_the_end(void **state)
+{
+    (void)state;
+    setenv("FAKE_MPX_MS", "20", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *behind = make_large(64);
+    behind->behind = true;
+    behind->deadline_ns = SPL_NEVER;
+    assert_int_equal(spl_pipeline_submit(pipeline, behind, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, make_large(2), NULL), 0); // goes first, or between its tiles
+    struct spl_job *job = take(pipeline);
+    assert_true(job != behind && !job->err.code);
+    spl_job_destroy(job);
+    spl_pipeline_destroy(pipeline);
+    unsetenv("FAKE_MPX_MS");
+    assert_int_equal(counters.frames, 1);
 }
 
 static void a_full_queue_refuses(void **state)
@@ -90,7 +255,7 @@ static void a_full_queue_refuses(void **state)
         accepted++;
     assert_int_equal(rc, SPL_E_BUSY);
     assert_in_range(accepted, 2, 3);
-    assert_in_range(spl_pipeline_get_retry_after(pipeline), 1, 60);
+    assert_in_range(spl_pipeline_get_retry_after(pipeline, false), 1, 60);
     spl_job_destroy(job);
     unsetenv("FAKE_FRAME_MS");
     spl_pipeline_destroy(pipeline); // what was accepted is finished and released
@@ -259,7 +424,12 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(jobs_come_back_with_bytes),
-        cmocka_unit_test(frames_beyond_the_budget_go_one_by_one),
+        cmocka_unit_test(large_views_are_let_in_by_their_work),
+        cmocka_unit_test(as_many_large_views_as_small_ones_at_most),
+        cmocka_unit_test(small_views_go_between_tiles_and_cost_the_large_one_waiting_only),
+        cmocka_unit_test(a_large_view_ends_between_tiles_when_nobody_waits),
+        cmocka_unit_test(a_loss_between_tiles_ends_the_large_view_too),
+        cmocka_unit_test(a_frame_behind_does_not_hold_up_the_end),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),

@@ -1,0 +1,37 @@
+/* A frame in the making, shared by steps.c (the whole) and frame.c (one tile). Everything belongs to the renderer's
+ * thread. */
+#ifndef SPL_RENDER_FRAME_H
+#define SPL_RENDER_FRAME_H
+
+#include "base/clock.h"
+#include "render/renderer.h"
+#include "render/tiling.h"
+#include "render/wires.h"
+
+struct spl_frame_job {
+    struct spl_renderer *renderer;
+    struct spl_resident_dataset *resident; /* valid until a dataset is added or removed: looked up for each tile */
+    const struct spl_view *view;           /* at least one sample a pixel */
+    struct spl_frame *frame;
+    struct spl_tiling tiling;
+    const struct spl_wires *wires; /* method fill */
+    struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
+};
+
+/* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
+struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera);
+
+/* Renders `tile` into the job's images and adds to its stats. Blocks until it is done; SPL_E_TIMEOUT where the view's
+ * deadline had passed before. */
+int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
+
+/* Milliseconds since *from, which becomes now. */
+static inline double spl_since_ms(uint64_t *from)
+{
+    uint64_t now = spl_now_ns();
+    double ms = (double)(now - *from) * 1e-6;
+    *from = now;
+    return ms;
+}
+
+#endif

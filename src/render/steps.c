@@ -1,0 +1,248 @@
+/* A frame from its first tile to its last, one tile a step.
+ *
+ * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the place of the
+ * next tile and the fill plan, which is the whole image's, are all on the host. So frames may take turns, and a tile
+ * is the same whatever was drawn before it. Belongs to the renderer's thread. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "image/enlarge.h"
+#include "render/frame.h"
+#include "render/readback.h"
+
+/* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
+static const double constant_looks = 65000, constant_work = 3e9;
+enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
+
+struct spl_frame_steps {
+    const struct spl_dataset *dataset;
+    struct spl_view wanted, view; /* as asked for; as rendered, with at least one sample a pixel */
+    struct spl_frame frame;       /* of `view` */
+    struct spl_frame enlarged;    /* of `wanted`, where it has less than a sample a pixel */
+    struct spl_frame_job job;
+    uint32_t x, y; /* corner of the next tile; y = height: all are there */
+    uint32_t row;  /* of `enlarged`, the next */
+};
+
+static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        if (!(view->layers >> layer & 1))
+            continue;
+        struct spl_image *image = &frame->images[layer];
+        *image = (struct spl_image){.layer = layer,
+                                    .type = spl_readback_type(layer),
+                                    .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
+        if (!image->pixels)
+            return SPL_E_NOMEM;
+    }
+    return SPL_OK;
+}
+
+/* The constant operator looks at every sample of the kernel: what a software driver cannot do before the device's
+ * deadline, or in the rounds that it allows an invocation, is refused before it costs the device. */
+static int check_work(const struct spl_frame_job *job, const struct spl_camera *camera, struct spl_error *err)
+{
+    const struct spl_fill_plan *plan = &job->tiling.fill;
+    double side = 2 * floor(plan->kernel) + 1;
+    double samples = ((double)camera->width + 2 * plan->guard) * ((double)camera->height + 2 * plan->guard);
+    samples = fmin(samples, (double)job->renderer->scratch.samples);
+    if (job->view->visibility != SPL_VISIBILITY_CONSTANT)
+        return SPL_OK;
+    if (side * side > constant_looks ||
+        (spl_gpu_get_device(job->renderer->gpu)->software && side * side * samples > constant_work))
+        return spl_fail_field(
+            err, SPL_E_LIMIT, "kernel",
+            "visibility constant with a kernel of %g x %g samples takes too long in this image; ask for a "
+            "smaller kernel, or for visibility adaptive",
+            side, side);
+    return SPL_OK;
+}
+
+/* The plan is the whole image's, or tiles would show where they meet. */
+static int plan_fill(struct spl_frame_job *job, struct spl_error *err)
+{
+    struct spl_camera camera;
+    double spacing = 1;
+    spl_tiling_get_camera(job->view, &camera);
+    struct spl_select_params params = spl_frame_selection(job, &camera);
+    uint64_t clock = spl_now_ns();
+    spl_residency_begin_frame(&job->renderer->residency);
+    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
+    job->frame->stats.select_ms += spl_since_ms(&clock);
+    if (job->page_error.code)
+        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
+    return rc ? rc : check_work(job, &camera, err);
+}
+
+/* A share of the size, to be enlarged; a pixel's centre stays where it is in the world. */
+static void make_coarse(struct spl_view *view)
+{
+    double scale = view->supersample;
+    view->supersample = 1;
+    view->kernel = view->kernel > 0 ? fmax(view->kernel * scale, 3) : view->kernel;
+    view->camera.width = (uint32_t)ceil(view->camera.width * scale);
+    view->camera.height = (uint32_t)ceil(view->camera.height * scale);
+    view->camera.fx *= scale;
+    view->camera.fy *= scale;
+    view->camera.cx *= scale;
+    view->camera.cy *= scale;
+}
+
+static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    steps->job.resident = spl_residency_get(&steps->job.renderer->residency, steps->dataset);
+    return steps->job.resident ? SPL_OK : spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
+}
+
+static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    struct spl_frame_job *job = &steps->job;
+    const struct spl_view *view = &steps->view;
+    int rc = find_resident(steps, err);
+    if (!rc && view->method == SPL_METHOD_FILL)
+        rc = plan_fill(job, err);
+    if (!rc && view->method == SPL_METHOD_FILL)
+        rc = spl_dataset_get_wires(steps->dataset, &job->wires, err);
+    if (!rc)
+        rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
+    if (!rc)
+        rc = make_images(&steps->frame, view, err);
+    if (!rc && steps->wanted.supersample < 1)
+        rc = make_images(&steps->enlarged, &steps->wanted, err);
+    return rc;
+}
+
+int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                    struct spl_frame_steps **out, struct spl_error *err)
+{
+    uint64_t clock = spl_now_ns(), loaded = renderer->residency.pages_loaded;
+    *out = NULL;
+    int rc = spl_view_check(view, err);
+    if (rc)
+        return rc;
+    bool bare = !spl_dataset_get_info(dataset)->has_surface;
+    if (bare && view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
+        return spl_fail_field(err, SPL_E_INPUT, "layer",
+                              "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
+                              "fill, which takes them from depth, or pack it without",
+                              spl_dataset_get_info(dataset)->id);
+    struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
+    if (!steps)
+        return SPL_E_NOMEM;
+    steps->dataset = dataset;
+    steps->wanted = *view;
+    if (bare && view->method == SPL_METHOD_SPLAT)
+        steps->wanted.method = SPL_METHOD_FILL;
+    steps->view = steps->wanted;
+    if (view->supersample < 1)
+        make_coarse(&steps->view);
+    steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    steps->frame.stats.complete = true;
+    if ((rc = prepare(steps, err))) {
+        spl_frame_end(steps, NULL);
+        return rc;
+    }
+    steps->frame.stats.pages_loaded = renderer->residency.pages_loaded - loaded;
+    steps->frame.stats.total_ms = spl_since_ms(&clock);
+    *out = steps;
+    return SPL_OK;
+}
+
+static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    const struct spl_camera *camera = &steps->view.camera;
+    struct spl_frame_job *job = &steps->job;
+    int rc = find_resident(steps, err); // others may have been added or removed
+    if (rc)
+        return rc;
+    struct spl_tile tile = {.renderer = job->renderer, .resident = job->resident, .view = &steps->view};
+    spl_tiling_place(&job->tiling, steps->x, steps->y, &tile);
+    if ((rc = spl_frame_render_tile(job, &tile, err)))
+        return rc;
+    steps->x += job->tiling.width;
+    if (steps->x < camera->width)
+        return SPL_OK;
+    steps->x = 0;
+    steps->y = camera->height - steps->y > job->tiling.height ? steps->y + job->tiling.height : camera->height;
+    return SPL_OK;
+}
+
+static void enlarge(struct spl_frame_steps *steps)
+{
+    const struct spl_camera *camera = &steps->wanted.camera;
+    uint32_t rows = enlarged_pixels / camera->width + 1, left = camera->height - steps->row;
+    uint32_t end = steps->row + (rows < left ? rows : left);
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (steps->enlarged.images[layer].pixels)
+            spl_image_enlarge(&steps->frame.images[layer], steps->wanted.supersample, &steps->enlarged.images[layer],
+                              steps->row, end);
+    steps->row = end;
+}
+
+int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
+{
+    struct spl_frame_stats *stats = &steps->frame.stats;
+    struct spl_residency *residency = &steps->job.renderer->residency;
+    uint64_t clock = spl_now_ns(), enlarging = clock, loaded = residency->pages_loaded;
+    int rc = SPL_OK;
+    steps->view.deadline_ns = deadline_ns;
+    if (steps->y < steps->view.camera.height) {
+        rc = make_tile(steps, err);
+    } else if (clock >= deadline_ns) {
+        rc = spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+    } else {
+        enlarge(steps);
+        stats->readback_ms += spl_since_ms(&enlarging);
+    }
+    stats->pages_loaded += residency->pages_loaded - loaded;
+    stats->total_ms += spl_since_ms(&clock);
+    *more = !rc && spl_frame_get_samples_left(steps);
+    return rc;
+}
+
+uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
+{
+    const struct spl_camera *camera = &steps->view.camera, *wanted = &steps->wanted.camera;
+    uint64_t side = (uint64_t)steps->view.supersample, rows = camera->height - steps->y;
+    uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
+    uint64_t enlarged = steps->wanted.supersample < 1 ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+    return (camera->width * rows - steps->x * drawn) * side * side + enlarged;
+}
+
+void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
+{
+    if (frame)
+        *frame = (struct spl_frame){0};
+    if (!steps)
+        return;
+    struct spl_frame *made = steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+    if (frame && !spl_frame_get_samples_left(steps)) {
+        steps->enlarged.stats = steps->frame.stats;
+        *frame = *made;
+        *made = (struct spl_frame){0};
+    }
+    spl_frame_finish(&steps->frame);
+    spl_frame_finish(&steps->enlarged);
+    free(steps);
+}
+
+int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                        struct spl_frame *frame, struct spl_error *err)
+{
+    struct spl_frame_steps *steps;
+    bool more = true;
+    int rc = spl_frame_begin(renderer, dataset, view, &steps, err);
+    while (!rc && more)
+        rc = spl_frame_step(steps, view->deadline_ns, &more, err);
+    spl_frame_end(steps, rc ? NULL : frame);
+    if (rc)
+        memset(frame, 0, sizeof *frame);
+    return rc;
+}
