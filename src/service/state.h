@@ -74,7 +74,8 @@ struct request {
     bool abandoned; /* the client has left: close without a reply */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     uint64_t deadline_ns;
-    struct batch *batch;           // may be NULL: it waits for one view
+    struct batch *batch;           // may be NULL; the views that it waits for
+    struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */
@@ -214,6 +215,9 @@ void spl_pick(struct request *request, const struct spl_call *call);
 void spl_make_views(struct request *request, const struct spl_call *call);
 void spl_batch_go_on(struct batch *batch);   /* asks for the next views where it may; never blocks */
 void spl_batch_abandon(struct batch *batch); /* its request no longer waits for it; NULL-safe */
+
+/* tour/create.c: its request no longer waits for it; NULL-safe. */
+void spl_tour_wish_abandon(struct spl_tour_wish *wish);
 
 /* view/route.c: what views and batches of them check alike. */
 int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
