@@ -11,6 +11,7 @@
 #include "service/datasets/catalog.h"
 #include "service/ops/access_log.h"
 #include "service/ops/latency.h"
+#include "service/ops/turns.h"
 #include "service/service.h"
 #include "service/view/cache.h"
 #include "service/view/pipeline.h"
@@ -75,7 +76,8 @@ struct request {
     bool suspended; /* libmicrohttpd does not go on with it */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     uint64_t deadline_ns;
-    struct batch *batch;           // may be NULL: it waits for one view
+    struct batch *batch;           // may be NULL; the views that it waits for
+    struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */
@@ -117,6 +119,7 @@ struct spl_service {
     int ops_fd;    /* passed by the supervisor; -1 = none, or once MHD has it */
 
     uv_loop_t loop;
+    struct spl_turns turns;
     uv_async_t wake;
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
@@ -228,6 +231,9 @@ void spl_pick(struct request *request, const struct spl_call *call);
 void spl_make_views(struct request *request, const struct spl_call *call);
 void spl_batch_go_on(struct batch *batch);   /* asks for the next views where it may; never blocks */
 void spl_batch_abandon(struct batch *batch); /* its request no longer waits for it; NULL-safe */
+
+/* tour/create.c: its request no longer waits for it; NULL-safe. */
+void spl_tour_wish_abandon(struct spl_tour_wish *wish);
 
 /* view/route.c: what views and batches of them check alike. */
 int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,

@@ -1,4 +1,4 @@
-/* Requests that wait for views: their MHD connection is suspended until all is ready, the deadline passes or the client
+/* Requests that wait for views, or for the pool to read a path: their MHD connection is suspended until all is ready, the deadline passes or the client
  * leaves.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
@@ -41,6 +41,7 @@ static void let_go(struct request *request)
 {
     spl_ticket_drop(&request->ticket);
     spl_batch_abandon(request->batch);
+    spl_tour_wish_abandon(request->wish);
     spl_waiting_resume(request);
 }
 
@@ -73,7 +74,7 @@ void spl_waiting_complete(struct spl_service *service)
 static void give_up(struct request *request)
 {
     struct spl_error err = {0};
-    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %llu ms passed before the view was ready",
+    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %llu ms passed before the reply was ready",
              (unsigned long long)request->service->options->deadline_ms);
     spl_count(&request->service->counters, deadline_missed);
     spl_reply_error(request, &err);

@@ -13,7 +13,7 @@ import threading
 import zipfile
 
 import openapi
-from harness import FAKE, REAL, WALL, Daemon, eventually, run, Reply
+from harness import FAKE, REAL, WALL, Daemon, eventually, run, together, Reply
 
 TOURS = "/v1/datasets/wall/tours"
 SMALL = dict(width=64, height=48)
@@ -302,6 +302,84 @@ def test_quotas():
         for _ in range(32):
             begin(d, body(5000))
         assert "32 tours are still to be made" in begin(d, body(), 503)["detail"]
+
+
+def disk_bytes(folder):
+    return sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+
+
+def idle(text):
+    """A body of one camera whose path has `text` where nobody looks."""
+    path = json.dumps({**nerfstudio()[1], "keyframes": "HERE"}).replace('"HERE"', text)
+    return f'{{"path": {path}, "frames": 5000, "settings": {json.dumps(SMALL)}}}'
+
+
+def test_what_is_kept_of_a_path_is_bounded_before_it_is_accepted():
+    deep = idle("[" * 2040 + ",".join("1" * 260000) + "]" * 2040)
+    texts = idle('"' + '\\\\' * 490000 + '"')
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "1M") as d:
+        refused = begin(d, deep, 503)
+        assert "remove some" in refused["detail"] and "1048576 bytes" in refused["detail"], refused
+        assert begin(d, idle("[" * 60 + "]" * 70), 400)["field"] == "body"
+        assert not list(folder.iterdir()) and d.ask("/v1/tours").json()["bytes"] == 0
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "8M", FAKE_FRAME_MS=100) as d:
+        assert begin(d, deep, 400)["field"] == "body"
+        for _ in range(2):
+            tour = begin(d, texts)
+        eventually(lambda: disk_bytes(folder) > 3.8e6)
+        assert all(reply.status == 202 or reply.status == 503 for reply in together(8, lambda _: d.post(texts, TOURS)))
+        eventually(lambda: sum(f.stat().st_size for f in folder.rglob("*") if f.name[0] != ".") >= d.ask("/v1/tours").json()["bytes"] > 6e6)
+        assert disk_bytes(folder) < 8 << 20
+        d.process.send_signal(signal.SIGKILL)
+        d.wait_exit()
+        with Daemon(FAKE, "--tours", str(folder), "--tour-disk", "8M") as again:  # listed, counted, gone on with
+            tours = again.ask("/v1/tours").json()
+            assert tour["name"] in [t["name"] for t in tours["tours"]] and tours["bytes"] > 6e6, tours
+            assert again.ask(tour["uri"]).json()["state"] == "rendering"
+            for t in tours["tours"]:
+                assert again.ask(t["uri"], "DELETE").status == 204
+            eventually(lambda: not list(folder.iterdir()))
+
+
+def test_a_tour_of_the_version_before_goes_on():
+    with Folder() as folder:
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            wanted = frames_of(d, ended(d, begin(d, depth_tour(6))["uri"]))
+        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=1000) as d:
+            tour = begin(d, depth_tour(6))
+            file = folder / tour["name"] / "tour.json"
+            eventually(file.exists)
+            d.process.send_signal(signal.SIGKILL)
+            d.wait_exit()
+        state = json.loads(file.read_text())
+        assert state["format_version"] == 2 and json.loads(state["body"]) == depth_tour(6)
+        file.write_text(json.dumps({**state, "format_version": 1, "body": json.loads(state["body"])}))
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            assert frames_of(d, ended(d, tour["uri"])) == wanted
+
+
+def test_a_client_that_leaves_while_its_path_is_read():
+    preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_SLOW_DISK"]]))
+    with Folder() as folder, Folder() as elsewhere:
+        gate = elsewhere / "gate"
+        gate.touch()  # for the dataset
+        with Daemon(FAKE, "--tours", str(folder), "--deadline", "1000", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
+                    SLOW_DISK_NAME="tour.json", UV_THREADPOOL_SIZE=1) as d:
+            gate.unlink()
+            first = begin(d, body(2))  # its state is being written by the pool's one thread
+            try:
+                leaving = d.connect()
+                leaving.request("POST", TOURS, json.dumps(body(3)))
+                eventually(lambda: b"\nsplatd_requests_open 1\n" in d.ops("/metrics").body)
+                leaving.close()
+                eventually(lambda: d.status()["counters"]["clients_left"] == 1)
+                assert "deadline" in begin(d, body(4), 503)["detail"]
+                assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2]
+            finally:
+                gate.touch()
+            ended(d, first["uri"])
+            ended(d, begin(d, body(5))["uri"])
+            assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2, 5]
 
 
 def test_a_tour_has_failed_when_its_last_frame_is_written():

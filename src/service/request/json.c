@@ -7,6 +7,7 @@
 #include <jansson.h>
 #include <string.h>
 
+#include "service/request/body.h"
 #include "service/request/values.h"
 
 static int parse_value(struct spl_value *value, int kind, const json_t *json, const char *name, struct spl_error *err)
@@ -69,15 +70,13 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
 int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
                          struct spl_error *err)
 {
-    json_error_t where;
     if (!length)
         return 0;
-    json_t *document = json_loadb(body, length, JSON_REJECT_DUPLICATES, &where);
+    json_t *document = spl_body_parse(body, length, SPL_BODY_VALUES, err);
     int rc;
     if (!document)
-        rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
-                            where.text);
-    else if (!json_is_object(document))
+        return SPL_E_INPUT;
+    if (!json_is_object(document))
         rc = spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
                             spl_json_type_name(document));
     else

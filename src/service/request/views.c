@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "service/request/body.h"
 #include "service/request/values.h"
 
 static int resolve_view(const struct values *common, json_t *json, const struct spl_camera_defaults *defaults,
@@ -74,15 +75,9 @@ int spl_views_request_from_json(const char *body, size_t length, const struct sp
                                 struct spl_error *err)
 {
     struct values common = {0};
-    json_error_t where;
-    json_t *list = NULL, *document = json_loadb(length ? body : "", length, JSON_REJECT_DUPLICATES, &where);
+    json_t *list = NULL, *document = spl_body_parse(body, length, SPL_BODY_VALUES, err);
     *out = (struct spl_views_request){0};
-    int rc;
-    if (!document)
-        rc = spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
-                            where.text);
-    else
-        rc = read_document(document, &common, &list, err);
+    int rc = document ? read_document(document, &common, &list, err) : SPL_E_INPUT;
     struct spl_value *container = &common.v[PARAM_container];
     out->container = container->given ? (enum spl_container)container->n[0] : SPL_CONTAINER_MULTIPART;
     *container = (struct spl_value){0}; // of the batch, not of its views

@@ -48,8 +48,9 @@ static void end(struct spl_tour *tour, enum spl_tour_state state)
     tour->age_s = 0;
     free(tour->spec.cameras);
     tour->spec.cameras = NULL;
-    json_decref(tour->body); // may be large, and nothing is made of it any more
-    tour->body = json_null();
+    free(tour->body); // may be large, and nothing is made of it any more
+    tour->body = NULL;
+    tour->body_length = 0;
     spl_log_info("tour %s: %s after %zu of %zu frames%s%s", tour->name, spl_tour_state_names[state], tour->frames_done,
                  tour->spec.frames, tour->failure.code ? ": " : "", tour->failure.message);
     spl_tour_work_state(tour);
@@ -272,32 +273,45 @@ static int make_name(struct spl_tours *tours, char name[SPL_TOUR_NAME + 1], stru
     return 0;
 }
 
-int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, json_t *body,
-                  struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err)
+int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl_error *err)
 {
-    uint64_t disk = tours->service->options->tour_disk_max;
-    struct spl_tour *other;
-    size_t unfinished = 0;
+    uint64_t disk = tours->service->options->tour_disk_max, more = spl_tour_state_bytes_max(length);
+    const struct spl_tour *other;
+    size_t unfinished = tours->wishes;
     TAILQ_FOREACH(other, &tours->all, link)
     unfinished += !spl_tour_has_ended(other);
     if (unfinished >= SPL_TOURS_UNFINISHED)
         return spl_fail(err, SPL_E_BUSY, "%zu tours are still to be made; come back later", unfinished);
     if (tours->count >= SPL_TOURS_MAX)
         return spl_fail(err, SPL_E_BUSY, "%zu tours are kept; remove some", tours->count);
-    if (tours->bytes >= disk)
-        return spl_fail(err, SPL_E_BUSY, "tours fill all of the %llu bytes that they may; remove some",
-                        (unsigned long long)disk);
+    if (tours->bytes + tours->writing_bytes + more > disk)
+        return spl_fail(err, SPL_E_BUSY,
+                        "tours fill %llu of the %llu bytes that they may, and this path takes up to %llu; "
+                        "remove some",
+                        (unsigned long long)(tours->bytes + tours->writing_bytes), (unsigned long long)disk,
+                        (unsigned long long)more);
+    return 0;
+}
+
+int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, char **body, size_t body_length,
+                  struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err)
+{
+    int rc = spl_tours_find_room(tours, body_length, err);
+    if (rc)
+        return rc;
     struct spl_tour *tour = spl_alloc(1, sizeof *tour, err);
     if (!tour)
         return SPL_E_NOMEM;
     tour->frames = spl_alloc(spec->frames, 1, err);
-    int rc = tour->frames ? make_name(tours, tour->name, err) : SPL_E_NOMEM;
+    rc = tour->frames ? make_name(tours, tour->name, err) : SPL_E_NOMEM;
     if (rc) {
         spl_tour_free(tour);
         return rc;
     }
     tour->tours = tours;
-    tour->body = json_incref(body);
+    tour->body = *body;
+    tour->body_length = body_length;
+    *body = NULL;
     tour->spec = *spec;
     *spec = (struct spl_tour_spec){0};
     tour->created_s = time(NULL);

@@ -36,15 +36,13 @@ static void take_up(struct spl_tour *tour)
     struct spl_tour_limits limits = spl_tour_get_limits(service);
     struct spl_tour_spec spec;
     struct spl_error err = {0};
-    json_t *body = entry ? json_deep_copy(tour->body) : NULL; // the parser adds to it
     if (!entry)
         spl_fail(&err, SPL_E_NOT_FOUND, "dataset '%s' is no longer served", tour->dataset);
-    else if (!spl_tour_spec_from_json(body, &entry->defaults, &limits, &spec, &err) &&
+    else if (!spl_tour_spec_from_text(tour->body, tour->body_length, &entry->defaults, &limits, &spec, &err) &&
              spec.frames != tour->spec.frames) {
         spl_tour_spec_finish(&spec);
         spl_fail(&err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);
     }
-    json_decref(body);
     if (err.code) {
         spl_tour_fail(tour, &err);
         return;

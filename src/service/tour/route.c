@@ -44,43 +44,11 @@ static void refuse_early(struct request *request, const char *detail)
     spl_reply_problem(request, MHD_HTTP_CONFLICT, "not-ready", "", detail);
 }
 
-static json_t *parse_body(struct request *request, struct spl_error *err)
-{
-    json_error_t where;
-    json_t *body =
-        json_loadb(request->body_length ? request->body : "", request->body_length, JSON_REJECT_DUPLICATES, &where);
-    if (!body)
-        spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
-                       where.text);
-    return body;
-}
-
 void spl_create_tour(struct request *request, const struct spl_call *call)
 {
     struct spl_tours *tours = get_tours(request);
-    struct spl_tour_limits limits = spl_tour_get_limits(request->service);
-    struct spl_tour_spec spec = {0};
-    struct spl_error err = {0};
-    struct spl_tour *tour;
-    if (!tours)
-        return;
-    json_t *body = parse_body(request, &err), *copy = body ? json_deep_copy(body) : NULL;
-    if (body && !copy)
-        spl_fail(&err, SPL_E_NOMEM, "out of memory for a path");
-    if (err.code || spl_tour_spec_from_json(copy, &call->entry->defaults, &limits, &spec, &err) ||
-        spl_tours_add(tours, call->entry, body, &spec, &tour, &err)) {
-        spl_reply_error(request, &err);
-    } else {
-        char location[64];
-        snprintf(location, sizeof location, "/v1/tours/%s", tour->name);
-        spl_reply_json(request, spl_tour_describe(tour));
-        request->status = MHD_HTTP_ACCEPTED;
-        if (request->response)
-            MHD_add_response_header(request->response, MHD_HTTP_HEADER_LOCATION, location);
-    }
-    spl_tour_spec_finish(&spec);
-    json_decref(copy);
-    json_decref(body);
+    if (tours)
+        spl_tour_wish_add(request, tours, call->entry);
 }
 
 void spl_list_tours(struct request *request, const struct spl_call *call)

@@ -11,6 +11,7 @@
 #include "base/memory.h"
 #include "cloud/path.h"
 #include "image/video.h"
+#include "service/request/body.h"
 
 static const char *const sides[] = {"width", "height"};
 
@@ -215,6 +216,16 @@ done:
     spl_camera_path_finish(&path);
     if (rc)
         spl_tour_spec_finish(out);
+    return rc;
+}
+
+int spl_tour_spec_from_text(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                            const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err)
+{
+    *out = (struct spl_tour_spec){0};
+    json_t *document = spl_body_parse(body, length, SPL_BODY_PATH_VALUES, err);
+    int rc = document ? spl_tour_spec_from_json(document, defaults, limits, out, err) : SPL_E_INPUT;
+    json_decref(document);
     return rc;
 }
 

@@ -26,6 +26,10 @@ struct spl_tour_spec {
 int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defaults,
                             const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err);
 
+/* The same from a body's text. */
+int spl_tour_spec_from_text(const char *body, size_t length, const struct spl_camera_defaults *defaults,
+                            const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err);
+
 void spl_tour_spec_finish(struct spl_tour_spec *spec);
 
 #endif

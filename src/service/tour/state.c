@@ -4,6 +4,8 @@
  * was accepted is parsed again only when frames are still to be made. A folder that is not understood is left alone and
  * named in the log. Loop's thread, at start. */
 #include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +17,7 @@
 #include "service/tour/tour.h"
 #include "service/view/bundle.h"
 
-enum { state_bytes_max = 16 << 20, format_version = 1 };
+enum { state_bytes_max = 16 << 20, state_bytes_own = 4 << 10, format_version = 2 };
 
 const char *const spl_tour_state_names[] = {"rendering", "video", "done", "failed", NULL};
 
@@ -41,10 +43,16 @@ void spl_tour_free(struct spl_tour *tour)
 {
     if (!tour)
         return;
-    json_decref(tour->body);
+    free(tour->body);
     spl_tour_spec_finish(&tour->spec);
     free(tour->frames);
     free(tour);
+}
+
+/* In JSON's text a body's quotes, backslashes and line ends take two bytes each, everything else as many as before. */
+uint64_t spl_tour_state_bytes_max(size_t body_length)
+{
+    return state_bytes_own + 2 * (uint64_t)body_length;
 }
 
 json_t *spl_tour_to_json(const struct spl_tour *tour)
@@ -54,12 +62,14 @@ json_t *spl_tour_to_json(const struct spl_tour *tour)
     json_t *failure = tour->state == SPL_TOUR_FAILED
                           ? json_pack("{s:i, s:s}", "code", tour->failure.code, "message", tour->failure.message)
                           : json_null();
-    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:O}", "format_version",
+    json_t *body =
+        tour->body ? json_stringn_nocheck(tour->body, tour->body_length) : json_null(); // it was parsed: UTF-8
+    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:o}", "format_version",
                      format_version, "dataset", tour->dataset, "version", tour->version, "state",
                      spl_tour_state_names[tour->state], "created", (json_int_t)tour->created_s, "ended",
                      (json_int_t)tour->ended_s, "frames", (json_int_t)spec->frames, "width", (int)camera->width,
                      "height", (int)camera->height, "fps", spec->fps, "layers", (int)spec->view.view.layers, "format",
-                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", tour->body);
+                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", body);
 }
 
 static int read_state(const char *text)
@@ -70,21 +80,35 @@ static int read_state(const char *text)
     return spl_tour_state_names[i] ? i : -1;
 }
 
+/* Version 1 kept the body's values, version 2 keeps its text. */
+static int read_body(struct spl_tour *tour, const json_t *body, struct spl_error *err)
+{
+    if (json_is_null(body))
+        return 0;
+    tour->body = json_is_string(body) ? strdup(json_string_value(body))
+                                      : json_dumps(body, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    if (!tour->body)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
+    tour->body_length = strlen(tour->body);
+    return 0;
+}
+
 static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
 {
     const char *dataset, *version, *state, *format;
     json_int_t created, ended, frames;
     int known, width, height, video, layers;
-    json_t *failure;
+    json_t *failure, *body;
     const char *message;
     struct spl_tour_spec *spec = &tour->spec;
     if (json_unpack(json, "{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:F, s:i, s:s, s:b, s:o, s:o}",
                     "format_version", &known, "dataset", &dataset, "version", &version, "state", &state, "created",
                     &created, "ended", &ended, "frames", &frames, "width", &width, "height", &height, "fps", &spec->fps,
-                    "layers", &layers, "format", &format, "video", &video, "failure", &failure, "body", &tour->body) ||
-        known != format_version)
+                    "layers", &layers, "format", &format, "video", &video, "failure", &failure, "body", &body) ||
+        known < 1 || known > format_version)
         return spl_fail(err, SPL_E_CORRUPT, "tour.json is not what this version writes");
-    json_incref(tour->body);
+    if (read_body(tour, body, err))
+        return SPL_E_NOMEM;
     bool zip = !strcmp(format, "zip");
     int format_number = zip ? 0 : spl_format_from_name(format);
     int state_number = read_state(state);
@@ -111,23 +135,40 @@ static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
     return 0;
 }
 
-/* Which frames lie there, and how large everything is. */
-static void look_at_files(struct spl_tour *tour)
+/* The number of a frame whose file has this name; SIZE_MAX for anything else. */
+static size_t frame_of(const struct spl_tour *tour, const char *file)
 {
-    char path[4096], name[32];
+    char name[32];
+    size_t frame = strtoul(file, NULL, 10);
+    if (frame >= tour->spec.frames)
+        return SIZE_MAX;
+    spl_tour_file_name(tour, frame, name);
+    return strcmp(name, file) ? SIZE_MAX : frame;
+}
+
+/* Which frames lie there, and how large everything is. What lies there is listed, not looked for: of a thousand tours
+ * that failed early, ten million frames do not. */
+static int look_at_files(struct spl_tour *tour, struct spl_error *err)
+{
+    char path[4096];
     struct stat status;
-    for (size_t i = 0; i < tour->spec.frames; i++) {
-        spl_tour_file_name(tour, i, name);
-        snprintf(path, sizeof path, "%s/%s/%s", tour->tours->directory, tour->name, name);
-        if (stat(path, &status))
+    snprintf(path, sizeof path, "%s/%s", tour->tours->directory, tour->name);
+    DIR *dir = opendir(path);
+    if (!dir)
+        return spl_fail_errno(err, errno, "%s: cannot be listed", path);
+    for (struct dirent *item; (item = readdir(dir));) {
+        size_t frame = frame_of(tour, item->d_name);
+        bool video = spl_tour_has_ended(tour) && !strcmp(item->d_name, "video.mp4");
+        if ((frame == SIZE_MAX && !video) || fstatat(dirfd(dir), item->d_name, &status, 0))
             continue;
-        tour->frames[i] = SPL_FRAME_DONE;
+        tour->bytes += (uint64_t)status.st_size;
+        if (video)
+            continue;
+        tour->frames[frame] = SPL_FRAME_DONE;
         tour->frames_done++;
-        tour->bytes += (uint64_t)status.st_size;
     }
-    snprintf(path, sizeof path, "%s/%s/video.mp4", tour->tours->directory, tour->name);
-    if (spl_tour_has_ended(tour) && !stat(path, &status))
-        tour->bytes += (uint64_t)status.st_size;
+    closedir(dir);
+    return 0;
 }
 
 int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err)
@@ -154,7 +195,8 @@ int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **o
         goto done;
     }
     tour->bytes = tour->state_bytes = length;
-    look_at_files(tour);
+    if ((rc = look_at_files(tour, err)))
+        goto done;
     int64_t age_s = time(NULL) - tour->ended_s;
     tour->age_s = age_s > 0 ? (uint64_t)age_s : 0; // from here on by a clock that does not jump
     tour->ended_ns = spl_now_ns();

@@ -29,7 +29,8 @@ struct spl_tour {
     TAILQ_ENTRY(spl_tour) link; // spl_tours.all, oldest first
     struct spl_tours *tours;
     char name[SPL_TOUR_NAME + 1], dataset[256], version[17];
-    json_t *body;              /* as it was accepted; null once it has ended */
+    char *body; // owned; as it was accepted, NULL once it has ended
+    size_t body_length;
     struct spl_tour_spec spec; /* cameras NULL once it has ended */
     enum spl_tour_state state;
     struct spl_error failure; /* set before it has ended where frames are still being written */
@@ -51,8 +52,8 @@ struct spl_tours {
     char *directory;
     int lock; /* of the directory, held for life */
     TAILQ_HEAD(spl_tour_list, spl_tour) all;
-    size_t count, in_flight, writing;
-    uint64_t bytes, writing_bytes;
+    size_t count, in_flight, writing, wishes;
+    uint64_t bytes, writing_bytes; /* on disk; at most on the way there */
     bool stopping, making_video;
     uv_timer_t sweep_timer, stream_timer;
     LIST_HEAD(, spl_tour_stream) streams;
@@ -76,9 +77,11 @@ void spl_tours_sweep(struct spl_tours *tours);
 
 struct spl_tour *spl_tours_find(struct spl_tours *tours, const char *name); /* NULL when there is none */
 
-/* Adds a tour of `body` (a new reference is taken) and begins it; takes spec. SPL_E_BUSY: too many, or the disk quota
- * is used up. */
-int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, json_t *body,
+/* SPL_E_BUSY: too many, or the disk quota has no room for what is kept of a body of `length` bytes. */
+int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl_error *err);
+
+/* Adds a tour and begins it; takes *body, malloc'd, and spec. Errors as above. */
+int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, char **body, size_t body_length,
                   struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err);
 
 /* Cancels what is going on and takes the tour off the list and the disk. */
@@ -94,6 +97,7 @@ struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service);
 
 /* state.c: tour.json and back. */
 json_t *spl_tour_to_json(const struct spl_tour *tour); /* new reference, NULL without memory */
+uint64_t spl_tour_state_bytes_max(size_t body_length); /* of tour.json, while it has the body */
 int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err);
 void spl_tour_free(struct spl_tour *tour);
 const char *spl_tour_format_name(const struct spl_tour *tour); /* of a frame: "jpeg", "zip" */
@@ -131,6 +135,9 @@ void spl_tour_streams_wake(struct spl_tour *tour); /* something has changed */
 void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *file, const char *type,
                          const char *tag);
 void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
+
+/* create.c: has a thread of the pool read the request's body; the request waits, and gets 202 or why not. */
+void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const struct spl_catalog_entry *entry);
 
 /* route.c */
 void spl_create_tour(struct request *request, const struct spl_call *call);

@@ -21,9 +21,10 @@ struct work {
     struct spl_tour *tour; // held; NULL for a removal
     struct spl_tours *tours;
     char name[SPL_TOUR_NAME + 1], file[32];
-    void *bytes; // owned
-    size_t length, frame;
+    json_t *state;              // owned
+    uint64_t reserved;          /* of tours->writing_bytes, for the state */
     struct spl_encoded encoded; // owned
+    size_t length, frame;
     uint64_t video_bytes;
     struct spl_error err;
 };
@@ -32,7 +33,7 @@ static void finish(struct work *work)
 {
     struct spl_tour *tour = work->tour;
     spl_encoded_finish(&work->encoded);
-    free(work->bytes);
+    json_decref(work->state);
     free(work);
     if (!tour)
         return;
@@ -60,11 +61,24 @@ static void queue(struct work *work, uv_work_cb run, uv_after_work_cb after)
     uv_queue_work(&work->tours->service->loop, &work->uv, run, after); // fails without a callback only
 }
 
-static void write_bytes(uv_work_t *uv)
+static void write_frame(uv_work_t *uv)
 {
     struct work *work = uv->data;
-    const void *bytes = work->bytes ? work->bytes : work->encoded.bytes;
-    spl_tour_store_write(work->tours->directory, work->name, work->file, bytes, work->length, &work->err);
+    spl_tour_store_write(work->tours->directory, work->name, work->file, work->encoded.bytes, work->length, &work->err);
+}
+
+/* The document is nobody else's by now. */
+static void write_state(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    char *text = json_dumps(work->state, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    if (!text) {
+        spl_fail(&work->err, SPL_E_NOMEM, "out of memory for the tour's state");
+        return;
+    }
+    work->length = strlen(text);
+    spl_tour_store_write(work->tours->directory, work->name, work->file, text, work->length, &work->err);
+    free(text);
 }
 
 static void after_state(uv_work_t *uv, int status)
@@ -73,6 +87,7 @@ static void after_state(uv_work_t *uv, int status)
     struct work *work = uv->data;
     struct spl_tour *tour = work->tour;
     tour->state_writing = false;
+    tour->tours->writing_bytes -= work->reserved;
     spl_tour_state_written(tour, work->length, &work->err);
     if (tour->state_again && !tour->removed)
         spl_tour_work_state(tour);
@@ -87,21 +102,20 @@ void spl_tour_work_state(struct spl_tour *tour)
     if (tour->state_writing)
         return;
     json_t *json = spl_tour_to_json(tour);
-    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    json_decref(json);
-    struct work *work = text ? begin(tour, &err) : NULL;
+    struct work *work = json ? begin(tour, &err) : NULL;
     if (!work) {
-        free(text);
+        json_decref(json);
         spl_log_error("tour %s: out of memory for its state", tour->name);
         spl_fail(&err, SPL_E_NOMEM, "out of memory for the tour's state");
         spl_tour_fail(tour, &err); // nothing where it has ended
         return;
     }
-    work->bytes = text;
-    work->length = strlen(text);
+    work->state = json;
+    work->reserved = spl_tour_state_bytes_max(tour->body_length);
     strcpy(work->file, "tour.json");
     tour->state_writing = true;
-    queue(work, write_bytes, after_state);
+    tour->tours->writing_bytes += work->reserved;
+    queue(work, write_state, after_state);
 }
 
 static void after_frame(uv_work_t *uv, int status)
@@ -125,7 +139,7 @@ void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded
     work->length = work->encoded.length;
     work->frame = frame;
     spl_tour_file_name(tour, frame, work->file);
-    queue(work, write_bytes, after_frame);
+    queue(work, write_frame, after_frame);
 }
 
 static int add_frames(struct work *work, struct spl_video *video)

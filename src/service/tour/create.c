@@ -1,0 +1,108 @@
+/* POST …/tours. A path can be a MiB of numbers and become a hundred thousand cameras, so a thread of the pool reads it
+ * while the request waits like one for a view; the loop looks whether there is room before and again after.
+ *
+ * Invariant: what is asked for belongs to the pool until after(), whether its request still waits or not. Owned by the
+ * loop's thread, but for read_path(). */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/tour/tour.h"
+
+struct spl_tour_wish {
+    uv_work_t work;
+    struct request *request; // NULL once it has been given up
+    struct spl_tours *tours;
+    char dataset[256];
+    uint64_t version;
+    struct spl_camera_defaults defaults;
+    struct spl_tour_limits limits;
+    char *body; // owned
+    size_t body_length;
+    struct spl_tour_spec spec;
+    struct spl_error err;
+};
+
+static void read_path(uv_work_t *work)
+{
+    struct spl_tour_wish *wish = work->data;
+    spl_tour_spec_from_text(wish->body, wish->body_length, &wish->defaults, &wish->limits, &wish->spec, &wish->err);
+}
+
+static void reply(struct request *request, struct spl_tour_wish *wish)
+{
+    const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->catalog, wish->dataset);
+    struct spl_error *err = &wish->err;
+    struct spl_tour *tour;
+    char location[64];
+    if (!err->code && (!entry || entry->info->version != wish->version))
+        spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' was replaced or dropped just now", wish->dataset);
+    if (err->code || spl_tours_add(wish->tours, entry, &wish->body, wish->body_length, &wish->spec, &tour, err)) {
+        spl_reply_error(request, err);
+        return;
+    }
+    spl_reply_json(request, spl_tour_describe(tour));
+    request->status = MHD_HTTP_ACCEPTED;
+    snprintf(location, sizeof location, "/v1/tours/%s", tour->name);
+    if (request->response)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_LOCATION, location);
+}
+
+static void destroy(struct spl_tour_wish *wish)
+{
+    if (!wish)
+        return;
+    spl_tour_spec_finish(&wish->spec);
+    free(wish->body);
+    free(wish);
+}
+
+static void after(uv_work_t *work, int status)
+{
+    (void)status;
+    struct spl_tour_wish *wish = work->data;
+    struct request *request = wish->request;
+    wish->tours->wishes--;
+    if (request) {
+        request->wish = NULL;
+        reply(request, wish);
+        spl_waiting_resume(request);
+        spl_http_pump(request->service);
+    }
+    destroy(wish);
+}
+
+void spl_tour_wish_abandon(struct spl_tour_wish *wish)
+{
+    if (!wish)
+        return;
+    wish->request->wish = NULL;
+    wish->request = NULL;
+}
+
+void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const struct spl_catalog_entry *entry)
+{
+    struct spl_service *service = request->service;
+    struct spl_error err = {0};
+    struct spl_tour_wish *wish = NULL;
+    if (spl_tours_find_room(tours, request->body_length, &err) || !(wish = spl_alloc(1, sizeof *wish, &err))) {
+        spl_reply_error(request, &err);
+        return;
+    }
+    wish->work.data = wish;
+    wish->request = request;
+    wish->tours = tours;
+    snprintf(wish->dataset, sizeof wish->dataset, "%s", entry->info->id);
+    wish->version = entry->info->version;
+    wish->defaults = entry->defaults;
+    wish->limits = spl_tour_get_limits(service);
+    wish->body = request->body;
+    wish->body_length = request->body_length;
+    request->body = NULL;
+    request->body_length = request->body_capacity = 0;
+    request->wish = wish;
+    tours->wishes++;
+    spl_waiting_add(request, spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
+    uv_queue_work(&service->loop, &wish->work, read_path, after); // fails without a callback only
+}

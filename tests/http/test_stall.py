@@ -1,0 +1,154 @@
+"""No request holds up the others: bodies of a whole MiB of every shape to every route that takes one, what tours leave
+on disk listed, read and fetched, and in all of it no turn of the loop of 50 ms, nor memory or disk beyond what was said.
+
+A turn is judged by the processor time that it took, which others on the machine do not change; by the clock it may have
+been as much longer as the kernel says that the loop's thread waited for a processor."""
+import json
+import os
+import pathlib
+import re
+import tempfile
+
+from harness import FAKE, VIEW, Daemon, eventually, run
+
+MIB = 1 << 20
+TOURS = "/v1/datasets/wall/tours"
+SMALL = {"width": 64, "height": 48}
+STALL_S = 0.05 * (20 if os.environ.get("SPLATD_SANITIZED") == "1" else 1)
+
+
+def waited_s(d):
+    """How long the loop's thread, the first, was ready to run and did not."""
+    return int(pathlib.Path(f"/proc/{d.process.pid}/task/{d.process.pid}/schedstat").read_text().split()[1]) / 1e9
+
+
+def metrics(d):
+    """What has no labels."""
+    return {name: float(value) for name, value in re.findall(r"^(\w+) (\S+)$", d.ops("/metrics").body.decode(), re.M)}
+
+
+def peak_bytes(d):
+    return int(re.search(r"VmHWM:\s+(\d+) kB", pathlib.Path(f"/proc/{d.process.pid}/status").read_text())[1]) << 10
+
+
+class Watch:
+    """Blames whatever has made a turn longer than any before it."""
+
+    def __init__(self, d):
+        self.d, self.told, self.longest = d, 0, []
+
+    def blame(self, what):
+        busiest = metrics(self.d)["splatd_loop_stall_cpu_seconds"]
+        if busiest > self.told:
+            self.longest.append(f"{what}: {1000 * busiest:.1f} ms")
+        self.told = busiest
+
+    def judge(self):
+        got = metrics(self.d)
+        print(f"     turns: {1000 * got['splatd_loop_stall_cpu_seconds']:.1f} ms of processor time, "
+              f"{1000 * got['splatd_loop_stall_seconds']:.1f} ms by the clock; {self.longest[-1:]}")
+        assert got["splatd_loop_stall_cpu_seconds"] < STALL_S, self.longest
+        assert got["splatd_loop_stall_seconds"] < STALL_S + waited_s(self.d), (got["splatd_loop_stall_seconds"], waited_s(self.d))
+
+
+def filled(head, piece, tail, separator=","):
+    """`head`, as many of `piece` as a MiB has room for ('#' is its number), `tail`."""
+    pieces, room, i = [], MIB - len((head + tail).encode()), 0
+    while room > 0:
+        pieces.append(piece.replace("#", str(i)))
+        room -= len((pieces[-1] + separator).encode())
+        i += 1
+    return (head + separator.join(pieces[:-1]) + tail).encode()
+
+
+def shapes():
+    """Valid JSON but for what a name says, and nothing that a route would take."""
+    for name, piece in {"empty arrays": "[]", "empty objects": "{}", "nested objects": '{"":{}}', "small numbers": "1",
+                        "numbers": "0.12345678901234567e-300", "strings": '""', "nothing": "null"}.items():
+        yield name, filled('{"camera":[', piece, "]}")
+    yield "members", filled("{", '"#":0', "}")
+    yield "members that hold objects", filled('{"camera":{', '"#":{}', "}}")
+    yield "one member again and again", filled("{", '"camera":{}', "}")
+    yield "a name", filled('{"', "a", '":0}', "")
+    yield "a string", filled('{"v":"', "a", '"}', "")
+    yield "escapes", filled('{"v":"', "\\u00e9", '"}', "")
+    yield "a whole number", filled('{"lod":', "7", "}", "")
+    yield "a number", filled('{"lod":0.', "7", "}", "")
+    yield "a number of zeros", filled('{"lod":0.', "0", "1}", "")
+    yield "blanks", filled("{", " ", "}", "")
+    yield "lines", filled("{", "\n", "}", "")
+    yield "no end", filled("", "[1],", "", "")
+    yield "no end of a string", filled('{"', "\\\\", "", "")
+    yield "deep", b'{"camera":' + b"[" * 2000 + b"]" * 2000 + b" " * (MIB - 5000) + b"}"
+    yield "too deep", b"[" * MIB
+    yield "deep again and again", filled('{"camera":[', "[" * 1000 + "]" * 1000, "]}")
+    yield "no JSON", os.urandom(MIB)
+    yield "views", filled('{"views":[', '{"camera":{"eye":[3,0,1],"target":[0,0,1]},"near":1e-6}', "]}")
+    yield "views that hold much", filled('{"width":8,"height":8,"views":[' + "{}," * 255, '{"camera":{"eye":[3]}}', "]}")
+    yield "256 views", json.dumps({"width": 8, "height": 8, "format": "png", "views": [
+        {"camera": {"eye": [3, 0, 1 + 1e-3 * i], "target": [0, 0, 1], "fov": 60}} for i in range(256)]}).encode()
+
+
+def paths():
+    """Bodies of tours: each format, as much of it as a MiB holds; and what no format looks at, refused where it is much."""
+    settings = f'"settings":{json.dumps(SMALL)},"frames":100000'
+    matrix = "[1.0,0.0,0.0,3.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,0.0,0.0,1.0]"
+    yield "keyframes", filled('{%s,"path":{"keyframes":[' % settings, '{"camera":{"eye":[3,0,1],"target":[0,#,1]}}', "]}}")
+    yield "frames", filled('{%s,"path":{"frames":[' % settings, '{"camera":{"eye":[3,0,1],"target":[0,#,1]}}', "]}}")
+    yield "one keyframe", json.dumps({"path": {"keyframes": [{"camera": {"eye": [3, 0, 1], "target": [0, 0, 1]}}]}, "frames": 100000, "settings": SMALL}).encode()
+    yield "nerfstudio", filled('{%s,"path":{"render_width":64,"render_height":48,"camera_path":[' % settings,
+                               '{"camera_to_world":%s,"fov":60}' % matrix, "]}}")
+    yield "Open3D", filled('{%s,"path":{"parameters":[' % settings,
+                           '{"extrinsic":[1,0,0,0,0,1,0,0,0,0,1,0,#,2,3,1],"intrinsic":{"width":64,"height":48,'
+                           '"intrinsic_matrix":[50,0,0,0,50,0,31.5,23.5,1]}}', "]}}")
+    yield "COLMAP", filled('{%s,"path":{"cameras_txt":"1 PINHOLE 64 48 50 50 32 24\\n","images_txt":"' % settings,
+                           "1# 1 0 0 0 0 0 0 1 #\\n\\n", '"}}', "")
+    yield "TUM", filled('{%s,"path":"' % settings, "# 0 0 # 0 0 0 1\\n", '"}', "")
+    small = '{%s,"path":{"camera_type":"perspective","render_width":64,"render_height":48,"camera_path":[{"camera_to_world":%s,"fov":60}],' \
+        '"keyframes":' % (settings, matrix)
+    yield "idle and deep", filled(small + "[", "[" * 1000 + "1" + "]" * 1000, "]}}")
+    yield "idle and deepest", (small + "[" * 2040 + ",".join("1" * 500000) + "]" * 2040 + "}}").encode()
+    yield "idle arrays", filled(small + "[", "[]", "]}}")
+    yield "idle objects", filled(small + "[", '{"":{}}', "]}}")
+    yield "ignored members", filled(small + "{", '"#":0', "}}}")
+    yield "ignored text", filled(small + '"', "\\\"", '"}}', "")
+
+
+def test_bodies_of_a_mib_stall_nobody():
+    with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder, Daemon(FAKE, "--tours", folder, "--deadline", "60000") as d:
+        watch = Watch(d)
+        for path in (VIEW, VIEW + "s", VIEW.replace("view", "pick"), TOURS):
+            for name, body in shapes():
+                assert len(body) <= MIB, name
+                reply = d.post(body, path)
+                assert reply.status in (200, 400), (path, name, reply.status)
+                watch.blame(f"{name} to {path}")
+        assert d.ask("/v1/datasets/wall", "PUT", os.urandom(MIB)).status in (403, 401)
+        watch.blame("PUT")
+        watch.judge()
+        assert not os.listdir(folder) and peak_bytes(d) < 400 * MIB, peak_bytes(d) / MIB
+
+
+def test_paths_of_a_mib_stall_nobody():
+    with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder, Daemon(FAKE, "--tours", folder, "--tour-frames", "100000", "--tour-pixels", "1000000000",
+                                    "--deadline", "60000") as d:
+        watch = Watch(d)
+        for name, body in paths():
+            assert len(body) <= MIB, name
+            reply = d.post(body, TOURS)
+            watch.blame(name)
+            assert reply.status == (400 if name.startswith("idle") else 202), (name, reply.status, reply.body)
+            if reply.status == 400:
+                continue
+            tour = reply.json()
+            assert tour["frames"] == 100000, (name, tour)
+            eventually(lambda: pathlib.Path(folder, tour["name"], "tour.json").exists())
+            assert pathlib.Path(folder, tour["name"], "tour.json").stat().st_size < 2 * MIB + 4096, name
+            assert d.ask(tour["uri"], "DELETE").status == 204
+            watch.blame(name + ", deleted")
+        watch.judge()
+        eventually(lambda: not os.listdir(folder))
+        assert peak_bytes(d) < 600 * MIB, peak_bytes(d) / MIB
+
+
+run(globals())
