@@ -55,7 +55,7 @@ def attack(binary, seconds, seed=1, first=0, without=(), only=(), left="."):
     began, run = time.monotonic(), attacking.Attack(Victim(binary), seed, itertools.count(first), without, only)
     if not run.run(seconds):
         return report(binary, run, *run.faults[0], left)[1]
-    stalls = f", longest stall {run.victim.stalls * 1000:.0f} ms" if run.victim.stalls else ""
+    stalls = f", longest turn {run.victim.stalls * 1000:.0f} ms" if run.victim.stalls else ""
     print(f"  {run.sent} requests on {run.done} connections in {time.monotonic() - began:.0f} s, seed {seed}: "
           f"{dict(sorted(run.endings.items()))}, {len(run.tags)} mutations, {run.victim.worst_rss >> 20} MiB{stalls}", flush=True)
     return None

@@ -107,7 +107,7 @@ def test_whoever_leaves_in_a_chunk_leaves_nothing():
     with serving() as d:
         for cut in (1 << 20, (1 << 20) + 1, 1500000, 2 << 20):
             with socket.create_connection(("127.0.0.1", d.port), 20) as s:
-                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n"
+                s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n"
                           f"Authorization: Bearer {ADMIN}\r\n\r\n".encode())
                 s.sendall(b"".join(b"3e8\r\n" + LARGE[at:at + 1000] + b"\r\n" for at in range(0, cut, 1000)))
                 eventually(lambda: "gone" in listed(d))

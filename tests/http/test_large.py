@@ -114,7 +114,7 @@ def test_too_many_large_views_are_refused_and_small_ones_are_not():
 def test_a_large_view_that_nobody_waits_for_ends():
     with Daemon(FAKE, "--deadline", "120000", FAKE_MPX_MS=200) as d:  # 13 s
         s = socket.create_connection(("127.0.0.1", d.port))
-        s.sendall(f"GET {fresh(LARGE)} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+        s.sendall(f"GET {fresh(LARGE)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
         eventually(lambda: d.status()["queues"]["large"]["length"] == 1)
         for _ in range(4):  # it has begun
             assert d.ask(fresh(SMALL)).status == 200

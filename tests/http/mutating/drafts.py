@@ -22,7 +22,7 @@ class Draft:
     target: bytes = b"/v1/datasets/wall"
     id: str = ""
     version: str = "1.1"
-    fields: list = dataclasses.field(default_factory=lambda: [b"Host: x"])  # raw lines
+    fields: list = dataclasses.field(default_factory=lambda: [b"Host: localhost"])  # raw lines
     body: bytes = None
     framing: list = None  # raw lines; None: Content-Length where there is a body
     sent_body: bytes = None  # with its chunks; None: as it is
@@ -61,7 +61,7 @@ class Draft:
 
 def canary(own):
     """Must be answered when nothing before it has gone wrong, and ends the connection."""
-    return Draft(id=own, fields=[b"Host: x", b"Connection: close"], closes=True, statuses=(200,)).sent()
+    return Draft(id=own, fields=[b"Host: localhost", b"Connection: close"], closes=True, statuses=(200,)).sent()
 
 
 def _json_body(r, operation):

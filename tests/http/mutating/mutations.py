@@ -190,6 +190,7 @@ def _lines_end(mark):
 def _hosts(*lines):
     def mutate(r, d):
         d.fields = [f for f in d.fields if not f.startswith(b"Host")] + list(lines)
+        d.statuses = ()
         d.worse(EITHER)
     return mutate
 
@@ -226,7 +227,7 @@ FIELDS = {
     "nul": _field(b"X-Nul: a\0b", expect=EITHER), "nul-name": _field(b"X-\0: a", expect=EITHER),
     "8-bit": _field(b"X-8: \xff\xfe\x80", expect=EITHER), "8-bit-name": _field(b"X-\xe9\xff: a", expect=EITHER),
     "cr": _field(b"X-Cr: a\rb", expect=EITHER), "no-colon": _field(b"nothing here", expect=EITHER),
-    "no-name": _field(b": a", expect=EITHER, statuses=(), rest_behind=True, half=True), "space-colon": _field(b"X-Space : a", expect=EITHER),
+    "no-name": _field(b": a", expect=EITHER, statuses=(), rest_behind=True, half=True), "space-colon": _field(b"X-Space : a", expect=EITHER, statuses=()),
     "bare-lf": _lines_end(b"\n"), "bare-cr": _lines_end(b"\r"), "cr-cr-lf": _lines_end(b"\r\r\n"),
     "no-host": _hosts(), "two-hosts": _hosts(b"Host: a", b"Host: b"), "host-odd": _hosts(b"Host: \x7f@:99999/%00"),
 }

@@ -106,7 +106,7 @@ class Victim:
                 reply = self.d.ops(path, timeout=30)
                 if reply.status != 200:
                     found.append(f"{path} says {reply.status}")
-            for sample in re.findall(r"(?m)^splatd_loop_stall_seconds[^ ]*max[^ ]* ([\d.e+-]+)$", reply.body.decode()):
+            for sample in re.findall(r"(?m)^splatd_loop_stall_cpu_seconds ([\d.e+-]+)$", reply.body.decode()):
                 self.stalls = max(self.stalls, float(sample))
             rss, files = self.rss(), self.files()
             self.keep_tours()
@@ -120,7 +120,7 @@ class Victim:
             found.append(f"{files} descriptors, {self.files_at_start} at the start")
         limit = STALL_S * (10 if self.slow else 1)  # sanitisers slow down what the loop computes, not what it waits for
         if self.stalls > limit:
-            found.append(f"the loop stood still for {self.stalls * 1000:.0f} ms")
+            found.append(f"a turn of the loop took {self.stalls * 1000:.0f} ms of processor time")
         return found + self.unknown_lines()
 
     def unknown_lines(self):
