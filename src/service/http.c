@@ -207,16 +207,34 @@ static void on_poll(uv_poll_t *poll, int status, int events)
     spl_http_pump(poll->data);
 }
 
+static void on_again(uv_idle_t *again)
+{
+    uv_idle_stop(again);
+    spl_http_pump(again->data);
+}
+
+/* Not by a timer of 0 ms: libuv runs timers until none is due, so that nothing but MHD would have its turn while a
+ * client reads as fast as we write. An idle handle runs once a turn. */
+void spl_http_run(struct MHD_Daemon *daemon, uv_timer_t *timer, uv_timer_cb on_timeout, uv_idle_t *again,
+                  uv_idle_cb on_turn)
+{
+    MHD_UNSIGNED_LONG_LONG timeout_ms;
+    MHD_run(daemon);
+    bool wants = MHD_get_timeout(daemon, &timeout_ms) == MHD_YES;
+    if (wants && timeout_ms)
+        uv_timer_start(timer, on_timeout, timeout_ms, 0);
+    else
+        uv_timer_stop(timer);
+    if (wants && !timeout_ms)
+        uv_idle_start(again, on_turn);
+    else
+        uv_idle_stop(again);
+}
+
 void spl_http_pump(struct spl_service *service)
 {
-    if (!service->daemon)
-        return;
-    MHD_run(service->daemon);
-    MHD_UNSIGNED_LONG_LONG timeout_ms;
-    if (MHD_get_timeout(service->daemon, &timeout_ms) == MHD_YES)
-        uv_timer_start(&service->http_timer, on_timer, timeout_ms, 0);
-    else
-        uv_timer_stop(&service->http_timer);
+    if (service->daemon)
+        spl_http_run(service->daemon, &service->http_timer, on_timer, &service->http_again, on_again);
 }
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)

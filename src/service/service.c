@@ -163,6 +163,9 @@ static int init_loop(struct spl_service *service, struct spl_error *err)
         uv_timer_init(&service->loop, timers[i]);
         timers[i]->data = service;
     }
+    uv_idle_init(&service->loop, &service->http_again);
+    uv_idle_init(&service->loop, &service->ops_again);
+    service->http_again.data = service->ops_again.data = service;
     for (size_t i = 0; i < 2; i++) {
         uv_signal_init(&service->loop, &service->signals[i]);
         service->signals[i].data = service;

@@ -119,6 +119,7 @@ struct spl_service {
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
     uv_timer_t http_timer;              /* MHD's own timeouts */
+    uv_idle_t http_again;               /* it has more to do at once */
     uv_timer_t wait_timer;              /* deadlines and departures, while requests wait */
     uv_timer_t slow_timer;              /* connections that take too long */
     uv_timer_t drain_timer;             /* while stopping */
@@ -127,6 +128,7 @@ struct spl_service {
     struct MHD_Daemon *ops;             // may be NULL
     uv_poll_t ops_poll;
     uv_timer_t ops_timer;
+    uv_idle_t ops_again;
 
     struct MHD_Daemon *daemon; // may be NULL
     LIST_HEAD(, connection) connections;
@@ -147,6 +149,9 @@ int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
 void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
+/* Lets a daemon do what it can without waiting, and has one of the handles call back when it wants to go on. */
+void spl_http_run(struct MHD_Daemon *daemon, uv_timer_t *timer, uv_timer_cb on_timer, uv_idle_t *again,
+                  uv_idle_cb on_again);
 
 /* connections.c: every connection, and how long its phases may take. */
 void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
@@ -176,7 +181,7 @@ void spl_waiting_refuse_all(struct spl_service *service);
 /* loading.c: opens the datasets at start beside the loop, then calls spl_service_go_on() or stops the loop. */
 int spl_loading_start(struct spl_service *service, struct spl_error *err);
 
-/* service.c: cache, tours and pipeline, once the datasets are open. */
+/* service.c: cache, tours and pipeline, once datasets and tours are open. */
 int spl_service_go_on(struct spl_service *service, struct spl_error *err);
 
 /* library.c: datasets that come, change and go while the service runs. */
