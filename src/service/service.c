@@ -238,8 +238,7 @@ int spl_service_go_on(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_service_options *options = service->options;
     int rc = spl_cache_create(options->cache_bytes, &service->cache, err);
-    if (!rc && *options->tours)
-        rc = spl_tours_open(service, options->tours, err);
+    spl_tours_start(service->tours);
     return rc ? rc : start_pipeline(service, err);
 }
 

@@ -8,6 +8,7 @@ import os
 import pathlib
 import re
 import tempfile
+import time
 
 from harness import FAKE, VIEW, Daemon, eventually, run
 
@@ -149,6 +150,60 @@ def test_paths_of_a_mib_stall_nobody():
         watch.judge()
         eventually(lambda: not os.listdir(folder))
         assert peak_bytes(d) < 600 * MIB, peak_bytes(d) / MIB
+
+
+def keep(folder, number, frames, kind="png", files=1, bytes=100, **more):
+    """A tour that has ended, as it lies on disk."""
+    home = pathlib.Path(folder, f"{number:016x}")
+    home.mkdir()
+    state = {"format_version": 2, "dataset": "wall", "version": "0" * 16, "state": "done", "created": 1700000000 + number,
+             "ended": int(time.time()), "frames": frames, "width": 8192, "height": 8192, "fps": 30.0, "layers": 1,
+             "format": kind, "video": False, "failure": None, "body": None}
+    for i in range(files):
+        with open(home / f"{i:06}.{kind}", "wb") as file:
+            file.truncate(bytes)
+    (home / "tour.json").write_text(json.dumps({**state, **more}))
+    return f"/v1/tours/{home.name}"
+
+
+def length_of(d, uri):
+    """Reads a reply to its end and forgets it."""
+    connection = d.connect()
+    connection.request("GET", uri)
+    reply, length = connection.getresponse(), 0
+    assert reply.status == 200, reply.status
+    while piece := reply.read(MIB):
+        length += len(piece)
+    connection.close()
+    return length
+
+
+def test_what_tours_leave_stalls_nobody():
+    frame = 192 * MIB
+    with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder:
+        large = keep(folder, 0, 3, files=3, bytes=frame)
+        many = keep(folder, 1, 20000, files=20000, bytes=0)
+        for number in range(2, 1000):
+            keep(folder, number, 10000)
+        with Daemon(FAKE, "--tours", folder, "--connections", "64") as d:
+            watch = Watch(d)
+            watch.blame("the start")
+            assert len(d.ask("/v1/tours").json()["tours"]) == 1000
+            watch.blame("a list of a thousand")
+            assert length_of(d, large + "/frames.zip") > 3 * frame
+            watch.blame("a ZIP of large frames")
+            assert length_of(d, many + "/frames.zip") > 20000 * 100
+            watch.blame("a ZIP of many frames")
+            assert length_of(d, large + "/stream") > 3 * frame
+            watch.blame("a stream of large frames")
+            assert length_of(d, large + "/frames/2") == frame
+            watch.blame("a large frame")
+            for uri in (large, many):
+                assert d.ask(uri, "DELETE").status == 204
+            watch.blame("removing them")
+            eventually(lambda: len(os.listdir(folder)) == 998)
+            watch.judge()
+            assert peak_bytes(d) < 200 * MIB, peak_bytes(d) / MIB
 
 
 run(globals())
