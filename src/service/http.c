@@ -16,7 +16,7 @@
 #include "service/access/door.h"
 #include "service/state.h"
 
-enum { drain_max = 8 * body_max, idle_s = 30, eager_pumps_max = 16 };
+enum { drain_max = 8 * body_max, idle_s = 30 };
 
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
@@ -223,21 +223,36 @@ static void on_poll(uv_poll_t *poll, int status, int events)
     spl_http_pump(poll->data);
 }
 
-/* libmicrohttpd wants to go on at once while a connection has bytes in its buffer, also where it can make nothing of
- * them (a chunk's first line that fills it), so it gets its turns after everything else, and a rest now and then. A
- * timer of 0 ms that starts itself would be all that libuv runs. */
+static void on_again(uv_idle_t *again)
+{
+    uv_idle_stop(again);
+    spl_http_pump(again->data);
+}
+
+/* Not by a timer of 0 ms: libuv runs timers until none is due, so that nothing but MHD would have its turn while a
+ * client reads as fast as we write. An idle handle runs once a turn. Now and then there is a rest: MHD also wants to go
+ * on while it can make nothing of what fills a buffer (a chunk's first line without an end). */
+void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timeout, uv_idle_cb on_turn)
+{
+    enum { turns_max = 16, rest_ms = 1 };
+    MHD_UNSIGNED_LONG_LONG timeout_ms;
+    MHD_run(daemon);
+    bool wants = MHD_get_timeout(daemon, &timeout_ms) == MHD_YES;
+    bool again = wants && !timeout_ms && ++turns->eager % turns_max;
+    if (wants && !again)
+        uv_timer_start(&turns->timer, on_timeout, timeout_ms ? timeout_ms : rest_ms, 0);
+    else
+        uv_timer_stop(&turns->timer);
+    if (again)
+        uv_idle_start(&turns->again, on_turn);
+    else
+        uv_idle_stop(&turns->again);
+}
+
 void spl_http_pump(struct spl_service *service)
 {
-    if (!service->daemon)
-        return;
-    MHD_run(service->daemon);
-    MHD_UNSIGNED_LONG_LONG timeout_ms;
-    if (MHD_get_timeout(service->daemon, &timeout_ms) != MHD_YES)
-        uv_timer_stop(&service->http_timer);
-    else if (!timeout_ms && ++service->eager_pumps % eager_pumps_max)
-        uv_async_send(&service->wake);
-    else
-        uv_timer_start(&service->http_timer, on_timer, timeout_ms ? timeout_ms : 1, 0);
+    if (service->daemon)
+        spl_http_run(service->daemon, &service->http_turns, on_timer, on_again);
 }
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)

@@ -178,8 +178,9 @@ static void raise_descriptor_limit(const struct spl_service_options *options)
 static int init_loop(struct spl_service *service, struct spl_error *err)
 {
     static const int numbers[] = {SIGTERM, SIGINT};
-    uv_timer_t *timers[] = {&service->http_timer,    &service->wait_timer, &service->slow_timer, &service->drain_timer,
-                            &service->library.timer, &service->look_timer, &service->ops_timer};
+    uv_timer_t *timers[] = {&service->http_turns.timer, &service->wait_timer,    &service->slow_timer,
+                            &service->drain_timer,      &service->library.timer, &service->look_timer,
+                            &service->ops_turns.timer};
     int rc = uv_loop_init(&service->loop);
     if (rc)
         return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
@@ -190,6 +191,9 @@ static int init_loop(struct spl_service *service, struct spl_error *err)
         uv_timer_init(&service->loop, timers[i]);
         timers[i]->data = service;
     }
+    uv_idle_init(&service->loop, &service->http_turns.again);
+    uv_idle_init(&service->loop, &service->ops_turns.again);
+    service->http_turns.again.data = service->ops_turns.again.data = service;
     for (size_t i = 0; i < 2; i++) {
         uv_signal_init(&service->loop, &service->signals[i]);
         service->signals[i].data = service;
@@ -291,8 +295,7 @@ int spl_service_go_on(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_service_options *options = service->options;
     int rc = spl_cache_create(options->cache_bytes, &service->cache, err);
-    if (!rc && *options->tours)
-        rc = spl_tours_open(service, options->tours, err);
+    spl_tours_start(service->tours);
     return rc ? rc : start_pipeline(service, err);
 }
 
@@ -309,8 +312,7 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
     int rc = init_loop(service, err);
     if (rc)
         goto free_service;
-    if ((rc = check(service, err)) || (rc = open_sockets(service, err)) ||
-        (rc = spl_loading_start(service, err)))
+    if ((rc = check(service, err)) || (rc = open_sockets(service, err)) || (rc = spl_loading_start(service, err)))
         goto done;
     spl_health_watch(service);
     uv_run(&service->loop, UV_RUN_DEFAULT);

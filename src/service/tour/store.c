@@ -34,45 +34,69 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
     return spl_file_replace(path, bytes, length, err);
 }
 
-int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
-                        size_t *length, struct spl_error *err)
+int spl_tour_file_open(const char *directory, const char *name, const char *file, struct spl_tour_file *out,
+                       struct spl_error *err)
 {
     char path[4096];
     struct stat status;
-    *bytes = NULL;
+    int rc = 0;
+    *out = (struct spl_tour_file){.fd = -1};
     if (snprintf(path, sizeof path, "%s/%s/%s", directory, name, file) >= (int)sizeof path)
         return spl_fail(err, SPL_E_USAGE, "the path of the tours' folder is too long");
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK), rc = 0;
-    if (fd < 0 || fstat(fd, &status)) {
+    out->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (out->fd < 0 || fstat(out->fd, &status))
         rc = errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s is not there", path)
                              : spl_fail_errno(err, errno, "%s: cannot be read", path);
-        goto done;
-    }
-    if (!S_ISREG(status.st_mode) || (uint64_t)status.st_size > most) {
-        rc = spl_fail(err, SPL_E_CORRUPT, "%s: %lld bytes; at most %zu were expected", path, (long long)status.st_size,
-                      most);
-        goto done;
-    }
-    *length = (size_t)status.st_size;
-    if (!(*bytes = spl_alloc_raw(*length + 1, 1, err))) {
+    else if (!S_ISREG(status.st_mode))
+        rc = spl_fail(err, SPL_E_CORRUPT, "%s is no file", path);
+    else
+        out->left = (uint64_t)status.st_size;
+    if (rc)
+        spl_tour_file_close(out);
+    return rc;
+}
+
+size_t spl_tour_file_read(struct spl_tour_file *file, void *out, size_t room)
+{
+    ssize_t got;
+    room = room < file->left ? room : (size_t)file->left;
+    do
+        got = read(file->fd, out, room);
+    while (got < 0 && errno == EINTR);
+    if (got <= 0)
+        return 0;
+    file->left -= (size_t)got;
+    return (size_t)got;
+}
+
+void spl_tour_file_close(struct spl_tour_file *file)
+{
+    if (file->fd >= 0)
+        close(file->fd);
+    *file = (struct spl_tour_file){.fd = -1};
+}
+
+int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
+                        size_t *length, struct spl_error *err)
+{
+    struct spl_tour_file opened;
+    *bytes = NULL;
+    int rc = spl_tour_file_open(directory, name, file, &opened, err);
+    if (rc)
+        return rc;
+    *length = (size_t)opened.left;
+    if (opened.left > most)
+        rc = spl_fail(err, SPL_E_CORRUPT, "%s: %zu bytes; at most %zu were expected", file, *length, most);
+    else if (!(*bytes = spl_alloc_raw(*length + 1, 1, err)))
         rc = SPL_E_NOMEM;
-        goto done;
+    for (size_t got; !rc && opened.left;)
+        if (!(got = spl_tour_file_read(&opened, *bytes + (*length - opened.left), (size_t)opened.left)))
+            rc = spl_fail(err, SPL_E_IO, "%s: cannot be read to its end", file);
+    if (rc) {
+        free(*bytes);
+        *bytes = NULL;
     }
-    for (size_t at = 0; at < *length;) {
-        ssize_t got = pread(fd, *bytes + at, *length - at, (off_t)at);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got <= 0) {
-            rc = spl_fail_errno(err, got ? errno : EIO, "%s: cannot be read", path);
-            free(*bytes);
-            *bytes = NULL;
-            goto done;
-        }
-        at += (size_t)got;
-    }
-done:
-    if (fd >= 0)
-        close(fd);
+    spl_tour_file_close(&opened);
     return rc;
 }
 

@@ -13,7 +13,7 @@
 #include "base/memory.h"
 #include "service/tour/tour.h"
 
-enum { tick_ms = 20, streams_max = 256, part_head_max = 160 };
+enum { tick_ms = 20, streams_max = 256 };
 static const uint64_t quiet_ns = 10 * SPL_NS_PER_S, look_ns = SPL_NS_PER_S;
 
 struct spl_tour_stream {
@@ -24,9 +24,10 @@ struct spl_tour_stream {
     bool pictures, suspended, ending, gone;
     char *chunk; // owned; what is being sent
     size_t length, sent;
-    uint64_t seen;            /* events: changes that were told, + 1 */
-    size_t frame;             /* pictures: the next */
-    uint64_t told_ns, due_ns; /* last chunk; pictures: not before */
+    struct spl_tour_file file; /* pictures: what follows the chunk */
+    uint64_t seen;             /* events: changes that were told, + 1 */
+    size_t frame;              /* pictures: the next */
+    uint64_t told_ns, due_ns;  /* last chunk; pictures: not before */
     uint64_t looked_ns;
 };
 
@@ -76,28 +77,36 @@ static bool make_picture(struct spl_tour_stream *s)
     }
     if (!there || now < s->due_ns)
         return false;
-    char name[32], head[part_head_max];
-    uint8_t *bytes;
-    size_t length;
+    char name[32], *head = NULL;
     spl_tour_file_name(tour, s->frame, name);
-    if (spl_tour_store_read(tour->tours->directory, tour->name, name, SIZE_MAX / 2, &bytes, &length, NULL)) {
+    if (spl_tour_file_open(tour->tours->directory, tour->name, name, &s->file, NULL) || !s->file.left) {
         s->gone = true;
         return false;
     }
-    size_t used =
-        (size_t)snprintf(head, sizeof head, "--" BOUNDARY "\r\nContent-Type: %s\r\nContent-Length: %zu\r\n\r\n",
-                         spl_tour_media_type(tour), length);
-    if ((s->chunk = spl_alloc_raw(used + length + 2, 1, NULL))) {
-        memcpy(s->chunk, head, used);
-        memcpy(s->chunk + used, bytes, length);
-        memcpy(s->chunk + used + length, "\r\n", 2);
-        s->length = used + length + 2;
-        s->frame++;
-        uint64_t step = (uint64_t)((double)SPL_NS_PER_S / tour->spec.fps);
-        s->due_ns = (s->due_ns && now < s->due_ns + step ? s->due_ns : now) + step;
+    if (asprintf(&head, "--" BOUNDARY "\r\nContent-Type: %s\r\nContent-Length: %llu\r\n\r\n", spl_tour_media_type(tour),
+                 (unsigned long long)s->file.left) < 0)
+        head = NULL;
+    s->frame++;
+    uint64_t step = (uint64_t)((double)SPL_NS_PER_S / tour->spec.fps);
+    s->due_ns = (s->due_ns && now < s->due_ns + step ? s->due_ns : now) + step;
+    s->gone = !take_text(s, head);
+    return !s->gone;
+}
+
+/* The picture whose head has been sent, straight from its file; a line ends it. */
+static ssize_t read_picture(struct spl_tour_stream *s, char *out, size_t room)
+{
+    size_t n = spl_tour_file_read(&s->file, out, room);
+    s->connection->since_ns = spl_now_ns();
+    if (!s->file.left) {
+        spl_tour_file_close(&s->file);
+        free(s->chunk);
+        s->chunk = NULL;
+        s->sent = s->length = 0;
+        if (!take_text(s, strdup("\r\n")))
+            n = 0;
     }
-    free(bytes);
-    return s->chunk != NULL;
+    return n ? (ssize_t)n : MHD_CONTENT_READER_END_WITH_ERROR;
 }
 
 static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
@@ -106,6 +115,8 @@ static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
     struct spl_tour_stream *s = context;
     if (s->gone)
         return MHD_CONTENT_READER_END_WITH_ERROR;
+    if (s->sent == s->length && s->file.left)
+        return read_picture(s, out, room);
     if (s->sent == s->length) {
         free(s->chunk);
         s->chunk = NULL;
@@ -144,6 +155,7 @@ static void on_free(void *context)
     LIST_REMOVE(s, link);
     if (!--tour->tours->stream_count && !tour->tours->stopping)
         uv_timer_stop(&tour->tours->stream_timer);
+    spl_tour_file_close(&s->file);
     free(s->chunk);
     free(s);
     tour->readers--;
@@ -222,6 +234,7 @@ static void begin(struct request *request, struct spl_tour *tour, bool pictures)
     s->handle = request->handle;
     s->connection = request->connection;
     s->pictures = pictures;
+    s->file.fd = -1;
     s->told_ns = s->looked_ns = spl_now_ns();
     spl_reply_stream(request, 64 << 10, on_read, s, on_free);
     if (!request->response) {

@@ -60,9 +60,12 @@ struct spl_tours {
     size_t stream_count;
 };
 
-/* engine.c: their life. open: makes the directory if need be, locks it, takes up what lies in it. stop: nothing
- * new begins, streams end; before the loop's last run. close: after it. The last two take NULL. */
-int spl_tours_open(struct spl_service *service, const char *directory, struct spl_error *err);
+/* open.c: their life. load: makes the directory if need be, locks it, takes up what lies in it; any thread, blocks on
+ * disk, while nobody else has them. start: from now on they are made. stop: nothing new begins, streams end; before the
+ * loop's last run. close: after it. The last three take NULL. */
+int spl_tours_create(struct spl_service *service, const char *directory, struct spl_tours **out, struct spl_error *err);
+int spl_tours_load(struct spl_tours *tours, const struct spl_catalog *catalog, struct spl_error *err);
+void spl_tours_start(struct spl_tours *tours);
 void spl_tours_stop(struct spl_tours *tours);
 void spl_tours_close(struct spl_tours *tours);
 
@@ -109,6 +112,16 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
                          struct spl_error *err);
 int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
                         size_t *length, struct spl_error *err); /* the caller frees *bytes */
+/* One that is read piece by piece, since a frame may have hundreds of megabytes. */
+struct spl_tour_file {
+    int fd; /* -1 = none */
+    uint64_t left;
+};
+int spl_tour_file_open(const char *directory, const char *name, const char *file, struct spl_tour_file *out,
+                       struct spl_error *err);
+size_t spl_tour_file_read(struct spl_tour_file *file, void *out,
+                          size_t room);               /* 0: nothing left, or it cannot be read */
+void spl_tour_file_close(struct spl_tour_file *file); /* idempotent */
 void spl_tour_store_remove(const char *directory, const char *name);
 bool spl_tour_name_is_valid(const char *name);
 

@@ -1,5 +1,5 @@
-/* All frames of a tour as one ZIP file, made while it is sent: frames are read one at a time, so that nothing lies on
- * disk twice and one frame lies in memory.
+/* All frames of a tour as one ZIP file, made while it is sent: frames are read block by block, so that nothing lies on
+ * disk twice, a block lies in memory, and the loop is held up for no longer than that takes.
  *
  * Invariant: `piece` holds what libarchive has written and MHD has not taken. Owned by the loop's thread. */
 #include <stdio.h>
@@ -11,13 +11,17 @@
 #include "service/tour/tour.h"
 #include "service/zip.h"
 
+enum { block_bytes = 256 << 10 };
+
 struct zip {
     struct spl_tour *tour; // held; its `readers`
     struct connection *connection;
     struct archive *archive;
-    size_t next; /* frame */
-    bool closed; /* the directory is in `piece` */
-    char *piece; // owned
+    size_t next;               /* frame */
+    struct spl_tour_file file; /* the frame before it, as far as it is not in `piece` yet */
+    char *block;               // owned, block_bytes
+    bool closed;               /* the directory is in `piece` */
+    char *piece;               // owned
     size_t length, capacity, sent;
 };
 
@@ -37,25 +41,30 @@ static la_ssize_t on_write(struct archive *archive, void *context, const void *b
     return (la_ssize_t)length;
 }
 
-/* The next frame that was made, or the directory behind the last. */
+/* The next block of the frame that is read. */
+static bool add_block(struct zip *zip)
+{
+    size_t got = spl_tour_file_read(&zip->file, zip->block, block_bytes);
+    return got && spl_zip_append(zip->archive, zip->block, got);
+}
+
+/* The beginning of the next frame that was made, or the directory behind the last. */
 static bool make_piece(struct zip *zip)
 {
     struct spl_tour *tour = zip->tour;
+    char name[32];
+    if (zip->file.left)
+        return add_block(zip);
+    spl_tour_file_close(&zip->file);
     while (zip->next < tour->spec.frames && tour->frames[zip->next] != SPL_FRAME_DONE)
         zip->next++;
     if (zip->next == tour->spec.frames) {
         zip->closed = true;
         return archive_write_close(zip->archive) == ARCHIVE_OK;
     }
-    char name[32];
-    uint8_t *bytes;
-    size_t length;
     spl_tour_file_name(tour, zip->next++, name);
-    if (spl_tour_store_read(tour->tours->directory, tour->name, name, SIZE_MAX / 2, &bytes, &length, NULL))
-        return false;
-    bool good = spl_zip_add(zip->archive, name, bytes, length, (time_t)tour->ended_s);
-    free(bytes);
-    return good;
+    return !spl_tour_file_open(tour->tours->directory, tour->name, name, &zip->file, NULL) &&
+           spl_zip_begin(zip->archive, name, zip->file.left, (time_t)tour->ended_s);
 }
 
 static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
@@ -63,7 +72,7 @@ static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
     (void)position;
     struct zip *zip = context;
     zip->connection->since_ns = spl_now_ns();
-    if (zip->sent == zip->length) {
+    while (zip->sent == zip->length) { // a piece may be empty: nothing is written before it must
         zip->length = zip->sent = 0;
         if (zip->closed)
             return MHD_CONTENT_READER_END_OF_STREAM;
@@ -78,7 +87,10 @@ static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
 
 static void zip_free(struct zip *zip)
 {
-    archive_write_free(zip->archive); // writes the directory where nobody has: `piece` is still there
+    if (zip->archive)
+        archive_write_free(zip->archive); // writes the directory where nobody has: `piece` is still there
+    spl_tour_file_close(&zip->file);
+    free(zip->block);
     free(zip->piece);
     free(zip);
 }
@@ -100,8 +112,8 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour)
         return;
     zip->tour = tour;
     zip->connection = request->connection;
-    zip->archive = spl_zip_open(zip, on_write);
-    if (!zip->archive) {
+    zip->file.fd = -1;
+    if (!(zip->block = spl_alloc_raw(block_bytes, 1, NULL)) || !(zip->archive = spl_zip_open(zip, on_write))) {
         zip_free(zip);
         return;
     }

@@ -199,7 +199,7 @@ def _continue(value=b"100-continue", expect=ANSWER, continues=True):
     def mutate(r, d):
         d.need_body()
         d.fields = d.fields + [b"Expect: " + value]
-        d.continues = continues
+        d.continues = d.continues or continues
         d.worse(expect)
     return mutate
 
