@@ -60,6 +60,7 @@ struct spl_pack_options {
     size_t input_count;
     const char *output;        /* NAME.spld */
     const char *columns;       /* text inputs, may be NULL */
+    bool intensity;            /* grey from intensity where a scan has one, whatever colours it has */
     unsigned neighbours;       /* K of eq. 20 and of the PCA; 0 = 12 */
     double position_error;     /* mean, as a share of the splat radius; 0 = 0.016 */
     double normal_error;       /* mean, degrees; 0 = 1 */
@@ -69,7 +70,9 @@ struct spl_pack_options {
     unsigned threads;          /* 0 = all cores */
     const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
-    void *progress_context;
+    /* Each thing in which scans disagree, once they have been read: a sentence or two without a newline. May be NULL. */
+    void (*warn)(void *context, const char *text);
+    void *progress_context; /* of both */
 };
 
 struct spl_pack_report {

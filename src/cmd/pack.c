@@ -19,8 +19,9 @@ static void usage(FILE *out)
 {
     fprintf(
         out,
-        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
-        "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines] [--threads N]\n"
+        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--neighbours K]\n"
+        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
+        "                   [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
@@ -40,6 +41,7 @@ static void usage(FILE *out)
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
         "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
         "      --columns LIST       of text inputs: x y z r g b intensity class nx ny nz -\n"
+        "      --intensity          grey from intensity where a scan has one, whatever colours it has\n"
         "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
         "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
         "      --normal-error DEG   mean, degrees (default 1)\n"
@@ -152,6 +154,12 @@ static int parse_textures(const char *text, enum spl_texture_coding *out, struct
                           "--textures takes adaptive, none, D8W4, D12W4 or D16W8, not '%.32s'", text);
 }
 
+static void say_warning(void *context, const char *text)
+{
+    spl_cmd_progress_finish(context);
+    fprintf(stderr, "splatd: warning: %s\n", text);
+}
+
 static void name_refused(void *context, const struct spl_error *why)
 {
     spl_cmd_progress_finish(context);
@@ -179,6 +187,7 @@ int spl_cmd_pack(int argc, char **argv)
 {
     enum {
         opt_columns = 256,
+        opt_intensity,
         opt_neighbours,
         opt_position,
         opt_normal,
@@ -198,6 +207,7 @@ int spl_cmd_pack(int argc, char **argv)
     static const struct option options[] = {
         {"output", required_argument, NULL, 'o'},
         {"columns", required_argument, NULL, opt_columns},
+        {"intensity", no_argument, NULL, opt_intensity},
         {"neighbours", required_argument, NULL, opt_neighbours},
         {"position-error", required_argument, NULL, opt_position},
         {"normal-error", required_argument, NULL, opt_normal},
@@ -217,7 +227,7 @@ int spl_cmd_pack(int argc, char **argv)
         {0},
     };
     struct spl_cmd_progress progress = {0};
-    struct spl_pack_options o = {.progress = spl_cmd_progress, .progress_context = &progress};
+    struct spl_pack_options o = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress};
     struct spl_photo_options photos = {.textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
@@ -231,6 +241,9 @@ int spl_cmd_pack(int argc, char **argv)
             break;
         case opt_columns:
             o.columns = optarg;
+            break;
+        case opt_intensity:
+            o.intensity = true;
             break;
         case opt_neighbours:
             result = spl_cmd_parse_count("--neighbours", optarg, 3, 64, &number, &err);

@@ -28,6 +28,7 @@ struct pack {
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage stage;
+    struct spl_scans scans;
     struct spl_points points;
     struct spl_tree tree;
     struct spl_emitted emitted;
@@ -92,10 +93,8 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
     json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
-    for (size_t i = 0; i < p->options->input_count; i++) {
-        const char *slash = strrchr(p->options->inputs[i], '/');
-        json_array_append_new(sources, json_string_nocheck(slash ? slash + 1 : p->options->inputs[i]));
-    }
+    for (size_t i = 0; i < p->scans.count; i++)
+        json_array_append_new(sources, json_string_nocheck(p->scans.list[i].name));
     for (uint32_t s = 0; s < points->station_count; s++) {
         json_t *pose = json_array();
         for (int i = 0; i < 16; i++)
@@ -103,13 +102,14 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
         json_array_append_new(stations, pose);
     }
     return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b, s:b}, s:o, s:o, s:o,"
-                     " s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
+                     " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
                      (int)points->has_color, "class", (int)points->has_class, "uncertainty", !points->no_surface,
-                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "pack",
+                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "color",
+                     spl_scans_describe(&p->scans), "pack",
                      "neighbours", (int)p->neighbours, "position_error_bound", p->chunk.position_error,
                      "normal_error_bound", p->chunk.normal_error * 180 / M_PI, "points_skipped",
                      (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates, "position_error",
@@ -172,7 +172,12 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_points_gather(&p.points, options->inputs, options->input_count, options->columns, &p.stage, err);
+        rc = spl_scans_init(&p.scans, options->inputs, options->input_count, options->columns, options->intensity,
+                            &p.stage, err);
+    if (!rc)
+        rc = spl_points_gather(&p.points, &p.scans, &p.stage, err);
+    if (!rc && options->warn)
+        spl_scans_compare(&p.scans, options->warn, options->progress_context);
     if (!rc)
         rc = spl_points_order(&p.points, &p.stage, err);
     if (!rc && !options->no_linear)
@@ -194,6 +199,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     spl_emitted_finish(&p.emitted);
     spl_tree_finish(&p.tree);
     spl_points_finish(&p.points);
+    spl_scans_finish(&p.scans);
     return rc;
 }
 

@@ -143,6 +143,21 @@ static int even_out(struct spl_photo_pass *pass, struct spl_error *err)
     }
 }
 
+/* Points, not splats: coarser levels have their colours from the same photographs. NULL when memory is refused. */
+static json_t *describe_source(const struct spl_photo_pass *pass)
+{
+    const char *cameras = pass->options->cameras, *slash = strrchr(cameras, '/');
+    json_int_t points = 0;
+    for (uint32_t chunk = 0; chunk < pass->splats.chunk_count; chunk++) {
+        uint64_t first = pass->splats.chunks[chunk].first_id;
+        bool leaf = !pass->splats.nodes[pass->splats.node_of[chunk]].child_count;
+        for (uint64_t id = first; leaf && id < first + pass->splats.chunks[chunk].count; id++)
+            points += pass->chosen.photo[id] != SPL_NO_PHOTO;
+    }
+    return json_pack("{s:o, s:s, s:I}", "source", json_string_nocheck(slash && slash[1] ? slash + 1 : cameras), "from",
+                     "photographs", "points", points);
+}
+
 int spl_photos_apply(const struct spl_photo_options *options, const struct spl_view_list *list,
                      const struct spl_dataset *dataset, const char *output, struct spl_stage *stage,
                      struct spl_photo_report *report, struct spl_error *err)
@@ -163,7 +178,12 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
         goto done;
     spl_stage_end(stage);
     report->unseen = pass.chosen.unseen;
-    const struct spl_retexture plain = {.from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color};
+    if (!(pass.color_source = describe_source(&pass))) {
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing colours");
+        goto done;
+    }
+    const struct spl_retexture plain = {
+        .from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color, .color_source = pass.color_source};
     rc = options->textures == SPL_TEXTURES_NONE ? spl_dataset_retexture(&plain, output, err)
                                                 : spl_photo_pass_write_textured(&pass, dataset, output, err);
     report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
@@ -176,5 +196,6 @@ done:
     free(pass.own);
     free(pass.dropped);
     free(pass.uses);
+    json_decref(pass.color_source);
     return rc;
 }

@@ -147,6 +147,7 @@ int spl_photo_pass_write_textured(struct spl_photo_pass *pass, const struct spl_
                                        .dictionary = &coded.dictionary,
                                        .code_chunk = spl_coded_get,
                                        .context = &chunks,
+                                       .color_source = pass->color_source,
                                        .textures = description};
     rc = spl_dataset_retexture(&what, output, err);
 done:
