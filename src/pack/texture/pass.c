@@ -111,7 +111,8 @@ static int even_out(struct spl_photo_pass *pass, struct spl_error *err)
     uint32_t photos = pass->report->photographs;
     for (bool first = true;; first = false) {
         uint32_t contradicting = 0, doubtful = 0, compared = 0, worst = 0;
-        int rc = spl_gains_find(&pass->candidates, (const uint8_t(*)[3])pass->judged, photos, pass->gains, err);
+        int rc = spl_gains_find(&pass->candidates, (const uint8_t(*)[3])pass->judged, photos, pass->gains,
+                                pass->stage->threads, err);
         if (rc)
             return rc;
         for (uint32_t i = 0; i < photos; i++) {
