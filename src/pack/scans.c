@@ -14,7 +14,7 @@
 
 #include "base/memory.h"
 
-enum { names_listed = 3 };
+enum { names_listed = 3, bytes_a_line = 40 };
 static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
 static const double like_steps = 10;    /* times the finest step of coordinates: nothing to mention */
 static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
@@ -103,6 +103,8 @@ int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t co
                                   .colors = info->colors,
                                   .coordinates = info->coordinates,
                                   .attributes = info->attributes,
+                                  .points_expected =
+                                      info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                                   .min = {INFINITY, INFINITY, INFINITY},
                                   .max = {-INFINITY, -INFINITY, -INFINITY}};
         spl_cloud_destroy(cloud);

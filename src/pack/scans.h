@@ -12,9 +12,10 @@ struct spl_scan {
     const char *path, *name;        /* borrowed; the name is the path's last part */
     struct spl_cloud_colors colors; /* as they are taken; intensities of like range share one over all scans */
     struct spl_cloud_coordinates coordinates;
-    uint32_t attributes;     /* enum spl_cloud_attribute */
-    uint64_t points_from[3]; /* that were read, by struct spl_cloud_colors.from */
-    double min[3], max[3];   /* of their coordinates; nothing while there is no point */
+    uint32_t attributes;      /* enum spl_cloud_attribute */
+    uint64_t points_expected; /* of the header, or a guess by the file's size */
+    uint64_t points_from[3];  /* that were read, by struct spl_cloud_colors.from */
+    double min[3], max[3];    /* of their coordinates; nothing while there is no point */
 };
 
 struct spl_scans {

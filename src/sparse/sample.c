@@ -196,6 +196,8 @@ static int plan(struct spl_training *t, bool *gram, struct spl_error *err)
             "fewer atoms",
             t->count, t->n, (unsigned long long)(fixed + each * least), (unsigned long long)memory);
     uint64_t sample = (memory - fixed) / each;
+    if (s->sample && sample > s->sample)
+        sample = s->sample;
     t->sample = sample < t->population ? sample : t->population;
     if (t->sample > UINT32_MAX / SPL_ATOMS_MAX)
         t->sample = UINT32_MAX / SPL_ATOMS_MAX;

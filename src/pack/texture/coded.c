@@ -17,23 +17,24 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "dataset/texture.h"
+#include "pack/texture/presets.h"
 #include "sparse/texture_file.h"
 
 static const struct {
-    uint32_t dictionary, weight_bits;
-    bool weighs; /* gain against bits */
+    uint32_t dictionary, weight_bits; /* 0: the preset's */
+    bool weighs;                      /* gain against bits */
 } codings[SPL_TEXTURES_COUNT] = {
-    [SPL_TEXTURES_ADAPTIVE] = {4096, 8, true},
+    [SPL_TEXTURES_ADAPTIVE] = {0, 8, true},
     [SPL_TEXTURES_D8W4] = {256, 4, false},
     [SPL_TEXTURES_D12W4] = {4096, 4, false},
     [SPL_TEXTURES_D16W8] = {65536, 8, false},
 };
-static const double quality_default = 40; /* dB */
 /* What a bit of codes saves where textures are as good as wanted, in shares of their squared error, on Sceaux; the
  * packer starts there and seeks the lambda that gives the wanted quality. */
 static const double share_of_target = 0.025, share_range = 8;
 static const double db_per_lambda = 1.75; /* lower for e times the lambda, likewise */
 enum { sampled_chunks = 128, lambda_trials = 4 };
+enum { epochs_expected = 5 };           /* until training settles, on Sceaux */
 static const double seconds_most = 600; /* of training */
 static const uint64_t memory_default = 2ull << 30;
 
@@ -83,7 +84,18 @@ int spl_textures_keep(const struct spl_textures *textures, const char *path, con
 struct reporting {
     json_t *epochs;
     const struct spl_photo_options *options;
+    struct spl_stage *stage;
+    uint64_t sample; /* textures of an epoch */
 };
+
+/* Nobody knows how many epochs it takes to settle: one more than was expected is announced when it begins. */
+static void advance(void *context, uint64_t textures)
+{
+    const struct reporting *reporting = context;
+    if (atomic_load(&reporting->stage->done) + textures > reporting->stage->total)
+        reporting->stage->total += reporting->sample;
+    spl_stage_add(reporting->stage, textures, 0);
+}
 
 static bool report_epoch(void *context, const struct spl_train_progress *p)
 {
@@ -162,8 +174,7 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
         mtx_unlock(&coding->mutex);
         atomic_store(&coding->failed, rc);
     }
-    if (!coding->stride)
-        spl_stage_add(coding->stage, end - begin, worker);
+    spl_stage_add(coding->stage, end - begin, worker);
 }
 
 static void add_sums(struct spl_code_sums *sums, const struct spl_code_sums *more)
@@ -231,7 +242,8 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
                    const struct spl_photo_options *options, struct spl_chosen *chosen, struct spl_stage *stage,
                    struct spl_error *err)
 {
-    double quality = options->texture_quality > 0 ? options->texture_quality : quality_default;
+    const struct spl_texture_settings preset = spl_texture_settings_get(options);
+    double quality = preset.quality;
     double wanted = textures->values * pow(10, -quality / 10);
     uint64_t memory = options->memory_bytes ? options->memory_bytes : memory_default;
     bool weighs = codings[options->textures].weighs;
@@ -240,7 +252,9 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         .count = textures->count, .size = textures->size, .read = read_textures, .context = &reader};
     const struct spl_train_settings train = {
         .method = SPL_TRAIN_BATCHES,
-        .dictionary = codings[options->textures].dictionary,
+        .dictionary = codings[options->textures].dictionary ? codings[options->textures].dictionary : preset.dictionary,
+        .epochs = preset.epochs,
+        .sample = preset.sample,
         .atoms = SPL_ATOMS_MAX,
         .psnr = weighs ? 0 : (float)quality,
         .lambda = weighs ? (float)(share_of_target * wanted) : 0,
@@ -248,6 +262,7 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         .seed = 1,
         .memory_bytes = memory,
         .threads = stage->threads,
+        .advance = advance,
     };
     const struct spl_code_settings settings = {.atoms = train.atoms,
                                                .psnr = train.psnr,
@@ -257,22 +272,26 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
     *coded = (struct spl_coded){.chunk_count = splats->chunk_count, .epochs = json_array()};
     coded->words = spl_alloc(splats->chunk_count, sizeof *coded->words, err);
     coded->planes = spl_alloc(splats->chunk_count, sizeof *coded->planes, err);
-    struct reporting reporting = {coded->epochs, options};
+    struct reporting reporting = {coded->epochs, options, stage, 0};
     int rc = !coded->words || !coded->planes ? SPL_E_NOMEM
              : !coded->epochs                ? spl_fail(err, SPL_E_NOMEM, "out of memory for the figures of training")
                                              : SPL_OK;
-    spl_stage_begin(stage, "training", 0);
+    uint64_t sample = preset.sample && preset.sample < textures->count ? preset.sample : textures->count;
+    reporting.sample = sample;
+    spl_stage_begin(stage, "training", sample * (preset.epochs ? preset.epochs : epochs_expected));
     if (!rc)
         rc = spl_dictionary_train(&source, &train, report_epoch, &reporting, &coded->dictionary, err);
-    spl_stage_end(stage);
+    spl_stage_finish(stage);
     if (!rc && !(coding.coder = spl_coder_create(&coded->dictionary, &settings, memory, stage->threads, err)))
         rc = err && err->code ? err->code : SPL_E_NOMEM;
-    spl_stage_begin(stage, "coding textures", splats->chunk_count);
+    uint32_t stride = splats->chunk_count / sampled_chunks + 1;
+    uint32_t sampled = weighs ? lambda_trials * ((splats->chunk_count + stride - 1) / stride) : 0;
+    spl_stage_begin(stage, "coding textures", (uint64_t)splats->chunk_count + sampled);
     if (!rc && weighs)
         rc = seek_lambda(&coding, (double)train.lambda, quality, err);
     if (!rc)
         rc = code_all(&coding, &coded->sums, err);
-    spl_stage_end(stage);
+    spl_stage_finish(stage);
     spl_coder_destroy(coding.coder);
     if (rc)
         spl_coded_finish(coded);

@@ -6,6 +6,7 @@
  * photograph left out, as the options say. The caller's thread owns the renderer. */
 #include "pack/texture/pass.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,6 +16,7 @@
 #include "dataset/retexture.h"
 #include "pack/texture/pass_parts.h"
 #include "pack/texture/photographs.h"
+#include "pack/texture/presets.h"
 
 static const uint64_t memory_default = 2ull << 30;
 
@@ -157,6 +159,28 @@ static json_t *describe_source(const struct spl_photo_pass *pass)
     }
     return json_pack("{s:o, s:s, s:I}", "source", json_string_nocheck(slash && slash[1] ? slash + 1 : cameras), "from",
                      "photographs", "points", points);
+}
+
+/* Seconds on two cores, of Sceaux: a million splats, times photographs where each is asked, times epochs and atoms
+ * where there are. Finer textures cost training and coding less than their texels are more, since few main axes hold
+ * most of them. */
+void spl_photos_plan(const struct spl_photo_options *options, struct spl_stage *stage, uint32_t photographs,
+                     uint64_t splats, uint32_t size)
+{
+    const struct spl_texture_settings settings = spl_texture_settings_get(options);
+    double millions = (double)splats * 1e-6, pairs = millions * photographs, finer = size > 8 ? size / 8 : 1;
+    double share = settings.sample && settings.sample < splats ? (double)settings.sample / (double)splats : 1;
+    double atoms = settings.dictionary / 4096.0, epochs = settings.epochs ? settings.epochs : 5;
+    if (!size) {
+        spl_stage_plan(stage, "photographs", 1.2 * pairs, 0);
+        spl_stage_plan(stage, "colours", 0.9 * millions, 0);
+    }
+    if (options->textures == SPL_TEXTURES_NONE)
+        return;
+    if (!size)
+        spl_stage_plan(stage, "resampling", 0.7 * pairs, 0);
+    spl_stage_plan(stage, "training", 11 * millions * share * epochs * atoms * pow(finer, 1.3), 0);
+    spl_stage_plan(stage, "coding textures", 42 * millions * atoms * pow(finer, 1.3), 0);
 }
 
 int spl_photos_apply(const struct spl_photo_options *options, const struct spl_view_list *list,
