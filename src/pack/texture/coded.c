@@ -100,9 +100,10 @@ static void advance(void *context, uint64_t textures)
 static bool report_epoch(void *context, const struct spl_train_progress *p)
 {
     const struct reporting *reporting = context;
-    json_array_append_new(reporting->epochs, json_pack("{s:i, s:f, s:f, s:f, s:i}", "epoch", (int)p->epoch, "seconds",
-                                                       p->seconds, "psnr", isfinite(p->psnr) ? p->psnr : 999.0, "atoms",
-                                                       p->atoms_per_splat, "dictionary", (int)p->dictionary));
+    /* without its seconds: equal input gives an equal file */
+    json_array_append_new(reporting->epochs, json_pack("{s:i, s:f, s:f, s:i}", "epoch", (int)p->epoch, "psnr",
+                                                       isfinite(p->psnr) ? p->psnr : 999.0, "atoms", p->atoms_per_splat,
+                                                       "dictionary", (int)p->dictionary));
     if (reporting->options->trained)
         reporting->options->trained(reporting->options->context, p->epoch, p->seconds, p->psnr, p->atoms_per_splat,
                                     p->dictionary);
@@ -116,7 +117,7 @@ struct coding {
     struct spl_coder *coder;
     struct spl_chosen *chosen;
     struct spl_stage *stage;
-    struct spl_code_sums *sums; /* by worker; of a sample by its chunk */
+    struct spl_code_sums *sums; /* by chunk, or by chunk of the sample */
     uint32_t stride;            /* > 0: a sample, every so many-th chunk; nothing is kept */
     uint8_t *scratch;           /* by worker: the textures of a chunk */
     atomic_int failed;
@@ -165,8 +166,8 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
     struct coding *coding = context;
     for (uint32_t i = (uint32_t)begin; i < end && !atomic_load(&coding->failed); i++) {
         struct spl_error why = {0};
-        int rc = coding->stride ? code_chunk(coding, i * coding->stride, worker, &coding->sums[i], &why)
-                                : code_chunk(coding, i, worker, &coding->sums[worker], &why);
+        uint32_t chunk = coding->stride ? i * coding->stride : i;
+        int rc = code_chunk(coding, chunk, worker, &coding->sums[i], &why);
         if (!rc)
             continue;
         mtx_lock(&coding->mutex);
@@ -194,9 +195,8 @@ static int code_all(struct coding *coding, struct spl_code_sums *total, struct s
     unsigned threads = coding->stage->threads;
     uint32_t chunks = coding->splats->chunk_count;
     uint32_t wanted = coding->stride ? (chunks + coding->stride - 1) / coding->stride : chunks;
-    size_t parts = coding->stride ? wanted : threads;
     struct spl_error first = {0};
-    coding->sums = spl_alloc(parts, sizeof *coding->sums, err);
+    coding->sums = spl_alloc(wanted, sizeof *coding->sums, err);
     coding->scratch = spl_alloc_raw((size_t)threads * SPL_CHUNK_SPLATS, coding->textures->values, err);
     coding->err = &first;
     int rc = coding->sums && coding->scratch ? SPL_OK : SPL_E_NOMEM;
@@ -209,7 +209,8 @@ static int code_all(struct coding *coding, struct spl_code_sums *total, struct s
         if (rc)
             spl_fail_field(err, rc, first.field, "%s", first.message);
     }
-    for (size_t i = 0; coding->sums && i < parts; i++) /* of a sample in the order of chunks: lambda depends on it */
+    /* in the order of chunks: lambda and what META says must not depend on who did which */
+    for (uint32_t i = 0; coding->sums && i < wanted; i++)
         add_sums(total, &coding->sums[i]);
     free(coding->sums);
     free(coding->scratch);
