@@ -13,6 +13,7 @@ struct spl_progress {          /* one call about every 100 ms while work runs, f
     const char *stage;         /* static: "reading scan.ply", "neighbours", … (valid during the call) */
     uint64_t done, total;      /* items of this stage; total 0 = unknown */
     double rate;               /* items per second */
+    double left_s;             /* of everything, not of this stage alone; 0 = unknown */
 };
 
 /* How photographs are coded: into nothing but the splats' colours; as sums of atoms of a dictionary, of which a splat
@@ -26,6 +27,9 @@ enum spl_texture_coding {
     SPL_TEXTURES_COUNT
 };
 
+/* How much work goes into textures, and what comes of it (api/photographs.md has the figures). */
+enum spl_texture_preset { SPL_TEXTURE_NORMAL, SPL_TEXTURE_DRAFT, SPL_TEXTURE_BEST, SPL_TEXTURE_PRESET_COUNT };
+
 /* Colours and textures from photographs with known poses. */
 struct spl_photo_options {
     const char *cameras;       /* COLMAP's folder, transforms.json, Open3D's trajectory, pose folder, list of views */
@@ -33,7 +37,8 @@ struct spl_photo_options {
     const char *device;        /* as of struct spl_renderer_options: draws how far the splats lie from photographs */
     uint64_t memory_bytes;     /* of this pass; 0 = 2 GiB */
     enum spl_texture_coding textures;
-    double texture_quality;    /* dB at which a splat takes no further atom; 0 = 40 */
+    enum spl_texture_preset preset;
+    double texture_quality;    /* dB that textures are coded to, all together; 0 = the preset's */
     const char *keep_textures; /* a file for the textures before they are coded (sparse/texture_file.h); NULL = none */
     /* Each photograph that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
     void (*refused)(void *context, const struct spl_error *why);
@@ -60,6 +65,7 @@ struct spl_pack_options {
     size_t input_count;
     const char *output;        /* NAME.spld */
     const char *columns;       /* text inputs, may be NULL */
+    bool intensity;            /* grey from intensity where a scan has one, whatever colours it has */
     unsigned neighbours;       /* K of eq. 20 and of the PCA; 0 = 12 */
     double position_error;     /* mean, as a share of the splat radius; 0 = 0.016 */
     double normal_error;       /* mean, degrees; 0 = 1 */
@@ -69,7 +75,9 @@ struct spl_pack_options {
     unsigned threads;          /* 0 = all cores */
     const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
-    void *progress_context;
+    /* Each thing in which scans disagree, once they have been read: a sentence or two without a newline. May be NULL. */
+    void (*warn)(void *context, const char *text);
+    void *progress_context; /* of both */
 };
 
 struct spl_pack_report {

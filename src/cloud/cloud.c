@@ -99,6 +99,7 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
         return SPL_E_NOMEM;
     cloud->source.fd = -1;
     cloud->options = options ? options : &defaults;
+    cloud->intensity = cloud->options->intensity;
     int code = spl_source_open(&cloud->source, path, err);
     if (code < 0)
         goto fail;
@@ -136,6 +137,7 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
     while (batch->count < batch->capacity) {
         size_t room = batch->capacity - batch->count;
         int code = cloud->reader->rows(cloud, &cloud->rows, room < SPL_ROWS ? room : SPL_ROWS, err);
+        size_t before = batch->count;
         if (code > 0)
             code = spl_rows_emit(&cloud->rows, cloud->row, &cloud->color, &cloud->source, &cloud->info, batch, err);
         else if (code == 0)
@@ -143,6 +145,7 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
         if (code < 0)
             return code;
         cloud->row += cloud->rows.count;
+        cloud->info.points_from[cloud->info.colors.from] += batch->count - before;
     }
     return batch->count > 0;
 }

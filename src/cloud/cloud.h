@@ -12,32 +12,53 @@
 #include "base/error.h"
 
 enum spl_cloud_attribute {
-    SPL_CLOUD_COLOR = 1 << 0,     /* measured colour, or intensity as grey when the file has no colour */
+    SPL_CLOUD_COLOR = 1 << 0, /* measured colour, or intensity as grey when the file has no colour */
     SPL_CLOUD_NORMAL = 1 << 1,
     SPL_CLOUD_CLASS = 1 << 2,
-    SPL_CLOUD_STATION = 1 << 3,   /* batch.station indexes info.stations */
+    SPL_CLOUD_STATION = 1 << 3, /* batch.station indexes info.stations */
+};
+
+/* What a file's colours are made from, and the values that are black and white. */
+struct spl_cloud_colors {
+    enum { SPL_COLORS_CONSTANT, SPL_COLORS_RGB, SPL_COLORS_INTENSITY } from; /* the first: the file has neither */
+    double black, white;                                                     /* of RGB 0 and 1, 255 or 65535 */
+    bool guessed; /* by the values of this file, since their type has room for more */
+    bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
+};
+
+/* What a header says of its coordinates, as far as it does. */
+struct spl_cloud_coordinates {
+    uint32_t epsg;  /* of the projected, else the geographic system; 0 = not said */
+    char name[64];  /* of the system; "" = not said. A header says it by number or by name */
+    double unit_m;  /* metres a unit; 0 = not said */
+    double step[3]; /* that they are multiples of; 0 = not said */
 };
 
 struct spl_cloud_options {
-    const char *columns;  /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
+    const char *columns; /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
+    bool intensity;      /* grey from intensity where there is one, whatever colours there are */
+    const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
 };
 
 struct spl_cloud_info {
-    const char *format;           /* static: "PLY", "LAS", "PTX", "PTS", "text" */
-    uint32_t attributes;          /* enum spl_cloud_attribute, known at open */
-    uint64_t points_expected;     /* as the header says (already checked against the file's size), 0 = unknown */
+    const char *format;       /* static: "PLY", "LAS", "PTX", "PTS", "text" */
+    uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
+    uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;
-    uint32_t station_count;       /* grows while a PTX is read; final at the end */
-    double (*stations)[16];       /* row-major station-to-world; borrowed until the next read or destroy */
-    uint64_t points_skipped;      /* non-finite, or PTX "no return" cells */
+    uint32_t station_count;         /* grows while a PTX is read; final at the end */
+    double (*stations)[16];         /* row-major station-to-world; borrowed until the next read or destroy */
+    struct spl_cloud_colors colors; /* of the points that come next: stations of a PTX may differ */
+    uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
+    struct spl_cloud_coordinates coordinates;
+    uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
 struct spl_point_batch {
     size_t capacity, count;
-    double (*position)[3];        /* exact: LAS integers × scale + offset, PTX transformed to world */
-    uint8_t (*color)[3];          /* sRGB; 16 bit sources that use more than 8 bits are scaled down, rounded */
-    float (*normal)[3];           /* unit; zero where the file has none or it is degenerate */
+    double (*position)[3]; /* exact: LAS integers × scale + offset, PTX transformed to world */
+    uint8_t (*color)[3];   /* sRGB; 16 bit sources that use more than 8 bits are scaled down, rounded */
+    float (*normal)[3];    /* unit; zero where the file has none or it is degenerate */
     uint8_t *classification;
     uint16_t *station;
 };

@@ -85,63 +85,88 @@ static int ascending(const void *a, const void *b)
 }
 
 /* Between the 1st and the 99th percentile, so that a few glints do not darken everything. */
-static struct spl_color_rule grey_rule(double *sample, size_t count)
+static struct spl_cloud_colors find_grey(double *sample, size_t count)
 {
+    struct spl_cloud_colors grey = {.from = SPL_COLORS_INTENSITY, .guessed = true};
     if (count == 0)
-        return (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+        return (struct spl_cloud_colors){0};
     qsort(sample, count, sizeof *sample, ascending);
-    double low = sample[count / 100], high = sample[count - 1 - count / 100];
-    if (low == high) {
-        low = sample[0];
-        high = sample[count - 1];
+    grey.black = sample[count / 100];
+    grey.white = sample[count - 1 - count / 100];
+    if (grey.black == grey.white) {
+        grey.black = sample[0];
+        grey.white = sample[count - 1];
     }
     /* one value everywhere says nothing about the scene */
-    return low < high ? spl_color_rule_grey(low, high) : (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+    return grey.black < grey.white ? grey : (struct spl_cloud_colors){0};
+}
+
+/* Looks for the largest colour and decides what is white by it. */
+static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
+{
+    struct ranges ranges = {.colors = true};
+    int code = scan_all(cloud, &ranges, err);
+    if (code < 0)
+        return code;
+    if (ranges.color_max > 65535.5)
+        return spl_source_fail(&cloud->source, SPL_E_INPUT, "red, green, blue", err,
+                               "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
+    *colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .guessed = true, .white = 1};
+    if (ranges.color_max > 255.5)
+        colors->white = 65535;
+    else if (ranges.color_max > 1.001 || cloud->integer_colors)
+        colors->white = 255;
+    if (ranges.color_max <= 0) /* colour fields that nobody filled are no colours */
+        *colors = (struct spl_cloud_colors){.blank = true};
+    return SPL_OK;
+}
+
+static int find_range(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
+{
+    struct ranges ranges = {.intensities = true};
+    bool blank = colors->blank;
+    ranges.sample = spl_alloc_raw(SAMPLES, sizeof *ranges.sample, err);
+    if (!ranges.sample)
+        return SPL_E_NOMEM;
+    int code = scan_all(cloud, &ranges, err);
+    if (code == SPL_OK)
+        *colors = find_grey(ranges.sample, ranges.sample_count);
+    colors->blank = blank;
+    free(ranges.sample);
+    return code;
+}
+
+void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors)
+{
+    cloud->info.colors = *colors;
+    cloud->color = (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
+    if (colors->from == SPL_COLORS_RGB)
+        cloud->color = spl_color_rule_rgb(colors->white);
+    else if (colors->from == SPL_COLORS_INTENSITY)
+        cloud->color = spl_color_rule_grey(colors->black, colors->white);
 }
 
 int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err)
 {
+    struct spl_cloud_colors colors = cloud->info.colors;
     bool intensity = cloud->columns >> SPL_COLUMN_INTENSITY & 1;
-    struct ranges ranges = {.colors = spl_columns_have3(cloud->columns, SPL_COLUMN_RED) && cloud->scan_colors};
+    bool rgb = spl_columns_have3(cloud->columns, SPL_COLUMN_RED) && !(intensity && cloud->intensity);
     int code = SPL_OK;
 
-    if (cloud->color.kind != SPL_COLOR_ABSENT)
-        goto decided; /* by the format itself */
-    if (spl_columns_have3(cloud->columns, SPL_COLUMN_RED) && !cloud->scan_colors) {
-        cloud->color = spl_color_rule_rgb(255);
-        goto decided;
-    }
-    if (ranges.colors) {
-        code = scan_all(cloud, &ranges, err);
+    if (cloud->options->colors) {
+        colors = *cloud->options->colors;
+    } else if (colors.from == SPL_COLORS_CONSTANT) { /* else the format itself has decided */
+        if (rgb && !cloud->scan_colors)
+            colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255};
+        else if (rgb)
+            code = find_white(cloud, &colors, err);
+        if (code == SPL_OK && intensity && colors.from == SPL_COLORS_CONSTANT)
+            code = find_range(cloud, &colors, err);
         if (code < 0)
             return code;
-        if (ranges.color_max > 65535.5)
-            return spl_source_fail(&cloud->source, SPL_E_INPUT, "red, green, blue", err,
-                                   "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
-        if (ranges.color_max > 255.5)
-            cloud->color = spl_color_rule_rgb(65535);
-        else if (ranges.color_max > 1.001 || cloud->integer_colors)
-            cloud->color = spl_color_rule_rgb(255);
-        else
-            cloud->color = spl_color_rule_rgb(1);
     }
-    /* colour fields that nobody filled are no colours */
-    if (intensity && (!ranges.colors || ranges.color_max <= 0)) {
-        ranges = (struct ranges){.intensities = true};
-        ranges.sample = spl_alloc_raw(SAMPLES, sizeof *ranges.sample, err);
-        if (!ranges.sample)
-            return SPL_E_NOMEM;
-        code = scan_all(cloud, &ranges, err);
-        if (code == SPL_OK)
-            cloud->color = grey_rule(ranges.sample, ranges.sample_count);
-        free(ranges.sample);
-        if (code < 0)
-            return code;
-    } else if (ranges.colors && ranges.color_max <= 0) {
-        cloud->color = (struct spl_color_rule){.kind = SPL_COLOR_ABSENT};
-    }
-decided:
-    if (cloud->color.kind != SPL_COLOR_ABSENT)
+    spl_cloud_set_colors(cloud, &colors);
+    if (colors.from != SPL_COLORS_CONSTANT)
         cloud->info.attributes |= SPL_CLOUD_COLOR;
     cloud->info.points_skipped = 0;
     cloud->row = 0;

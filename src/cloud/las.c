@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "cloud/reader.h"
+#include "cloud/las_records.h"
 
 struct las {
     uint64_t start, count, next;
@@ -21,13 +21,6 @@ struct las {
 static const struct {
     uint8_t bytes, color;
 } formats[] = {{20, 0}, {28, 0}, {26, 20}, {34, 28}, {57, 0}, {63, 28}, {30, 0}, {36, 30}, {38, 30}, {59, 0}, {67, 30}};
-
-static uint16_t get16(const uint8_t *p)
-{
-    uint16_t v;
-    memcpy(&v, p, sizeof v);
-    return le16toh(v);
-}
 
 static uint32_t get32(const uint8_t *p)
 {
@@ -51,33 +44,15 @@ static double get_double(const uint8_t *p)
     return v;
 }
 
-/* A VLR of user `user` among the records between header and points; a chain that leaves this range just ends. */
-static int find_vlr(struct spl_cloud *cloud, uint64_t at, uint64_t end, uint32_t count, const char *user, bool *found,
-                    struct spl_error *err)
-{
-    *found = false;
-    for (; count > 0 && at + 54 <= end && !*found; count--) {
-        const uint8_t *vlr;
-        size_t available;
-        spl_source_seek(&cloud->source, at);
-        int code = spl_source_peek(&cloud->source, 54, &vlr, &available, err);
-        if (code < 0)
-            return code;
-        if (available < 54)
-            break;
-        *found = memcmp(vlr + 2, user, strlen(user)) == 0;
-        at += 54u + get16(vlr + 20);
-    }
-    return SPL_OK;
-}
-
 static int refuse_compressed(struct spl_cloud *cloud, uint64_t header_bytes, uint32_t vlrs, uint64_t points_at,
                              unsigned format, struct spl_error *err)
 {
     bool copc, laszip;
-    int code = find_vlr(cloud, header_bytes, points_at, vlrs < 1 ? vlrs : 1, "copc", &copc, err);
+    struct spl_las_record all = {.at = header_bytes, .end = points_at, .count = vlrs}, first = all;
+    first.count = vlrs < 1 ? vlrs : 1;
+    int code = spl_las_find(cloud, &first, "copc", 0, &copc, err);
     if (code == SPL_OK)
-        code = find_vlr(cloud, header_bytes, points_at, vlrs, "laszip encoded", &laszip, err);
+        code = spl_las_find(cloud, &all, "laszip encoded", 0, &laszip, err);
     if (code < 0)
         return code;
     if (!copc && !laszip && !(format & 0xc0))
@@ -122,7 +97,7 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     memcpy(h, bytes, available < sizeof h ? available : sizeof h);
     if (available < 227)
         return spl_source_fail_at(source, available, "", err, "the file ends inside the LAS header of 227 bytes");
-    unsigned major = h[24], minor = h[25], header_bytes = get16(h + 94),
+    unsigned major = h[24], minor = h[25], header_bytes = spl_las_get16(h + 94),
              least = minor >= 4   ? 375
                      : minor == 3 ? 235
                                   : 227;
@@ -143,7 +118,7 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     las->format = h[104];
-    las->record_bytes = get16(h + 105);
+    las->record_bytes = spl_las_get16(h + 105);
     if (las->format >= sizeof formats / sizeof *formats)
         return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10",
                                   las->format);
@@ -161,6 +136,10 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     code = check_transform(cloud, h, err);
     if (code < 0)
         return code;
+    struct spl_las_record records = {.at = header_bytes, .end = points_at, .count = vlrs};
+    if ((code = spl_las_read_coordinates(cloud, records, err)) < 0)
+        return code;
+    memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     las->start = points_at;
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
@@ -192,10 +171,10 @@ static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     for (size_t r = 0; r < count; r++, p += las->record_bytes) {
         for (unsigned k = 0; k < 3; k++)
             rows->value[SPL_COLUMN_X + k][r] = (int32_t)get32(p + 4 * k) * las->scale[k] + las->offset[k];
-        rows->value[SPL_COLUMN_INTENSITY][r] = get16(p + 12);
+        rows->value[SPL_COLUMN_INTENSITY][r] = spl_las_get16(p + 12);
         rows->value[SPL_COLUMN_CLASS][r] = p[class_at] & class_mask;
         for (unsigned k = 0; color && k < 3; k++)
-            rows->value[SPL_COLUMN_RED + k][r] = get16(p + color + 2 * k);
+            rows->value[SPL_COLUMN_RED + k][r] = spl_las_get16(p + color + 2 * k);
     }
     spl_source_take(&cloud->source, count * las->record_bytes);
     las->next += count;

@@ -150,8 +150,10 @@ static int set_fields(struct spl_cloud *cloud, unsigned fields, struct spl_error
                                     "intensity do not mix",
                                     fields, ptx->first_fields);
     ptx->fields = fields;
-    if (fields > 3)
-        cloud->color = fields == 7 ? spl_color_rule_rgb(255) : spl_color_rule_grey(0, 1);
+    if (fields == 7 && !cloud->intensity)
+        spl_cloud_set_colors(cloud, &(struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255});
+    else if (fields > 3)
+        spl_cloud_set_colors(cloud, &(struct spl_cloud_colors){.from = SPL_COLORS_INTENSITY, .white = 1});
     return SPL_OK;
 }
 

@@ -33,6 +33,7 @@ struct spl_cloud {
     enum spl_sampling sampling;
     bool scan_colors;    /* the range of the colours is not fixed by their type */
     bool integer_colors; /* 1 is then the darkest grey, not white */
+    bool intensity;      /* wanted, whatever colours there are */
     struct spl_color_rule color;
     uint64_t row; /* index of the next row */
     struct spl_rows rows;
@@ -40,7 +41,10 @@ struct spl_cloud {
 
 extern const struct spl_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
 
-/* Decides cloud->color from the columns and the values' range, and leaves the reader at its first row. */
+/* Takes colours from the next rows on as `colors` say. */
+void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors);
+
+/* Decides them from the columns and the values' range, and leaves the reader at its first row. */
 int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err);
 
 #endif

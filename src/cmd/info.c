@@ -166,6 +166,18 @@ static void print_atoms(const struct report *report)
     }
 }
 
+/* Photographs first: they have taken the place of the others. */
+static void print_colors(const json_t *colors)
+{
+    const json_t *color;
+    char text[32];
+    size_t i;
+    json_array_foreach(colors, i, color)
+        printf("%-16s%s: %s points of %s\n", i ? "" : "  color from", json_string_value(json_object_get(color, "from")),
+               grouped((uint64_t)json_integer_value(json_object_get(color, "points")), text),
+               json_string_value(json_object_get(color, "source")));
+}
+
 static void print_table(const struct report *report)
 {
     const struct spl_dataset_info *info = report->info;
@@ -180,6 +192,7 @@ static void print_table(const struct report *report)
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
     printf("  given         %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
            info->has_uncertainty ? ", uncertainty" : "");
+    print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"));
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
@@ -263,7 +276,7 @@ static json_t *to_json(const struct report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -274,7 +287,8 @@ static json_t *to_json(const struct report *report)
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
         "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
         "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
-        json_object_get(spl_dataset_get_meta(report->dataset), "sources"));
+        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
+        json_object_get(spl_dataset_get_meta(report->dataset), "color"));
 }
 
 static int print_json(const struct report *report, struct spl_error *err)

@@ -20,9 +20,10 @@ static void usage(FILE *out)
 {
     fprintf(
         out,
-        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--neighbours K] [--position-error X]\n"
-        "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines] [--threads N]\n"
-        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality DB] [--keep-going]\n"
+        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--neighbours K]\n"
+        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
+        "                   [--no-clip-lines] [--threads N]\n"
+        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
         "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
@@ -41,6 +42,7 @@ static void usage(FILE *out)
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
         "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
         "      --columns LIST       of text inputs: x y z r g b intensity class nx ny nz -\n"
+        "      --intensity          grey from intensity where a scan has one, whatever colours it has\n"
         "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
         "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
         "      --normal-error DEG   mean, degrees (default 1)\n"
@@ -54,7 +56,9 @@ static void usage(FILE *out)
         "      --textures HOW       adaptive (default): as much as the photographs show; none: colours alone; D8W4, "
         "D12W4,\n"
         "                           D16W8: a fixed dictionary of 2^8, 2^12, 2^16 atoms, weights of 4, 4, 8 bits\n"
-        "      --texture-quality DB that textures are coded to, all together, 20 to 60 (default 40); lower is smaller\n"
+        "      --texture-quality Q  draft, normal (default) or best: how long it takes and what comes of it; or the "
+        "dB\n"
+        "                           alone that textures are coded to, all together, 20 to 60 (normal: 40)\n"
         "      --keep-going         photographs that cannot be used are named and left out\n"
         "      --keep-textures FILE as they are before coding too, for 'splatd bench --textures FILE'\n"
         "      --memory MIB         of the photographs' pass (default 2048)\n"
@@ -136,7 +140,8 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
 static void say_trained(void *context, uint32_t epoch, double seconds, double psnr, double atoms_per_splat,
                         uint32_t atoms)
 {
-    spl_cmd_progress_finish(context);
+    (void)context;
+    spl_cmd_progress_clear();
     fprintf(stderr, "training: epoch %u, %.0f s, %.2f dB, %.2f atoms a splat of %u\n", epoch, seconds, psnr,
             atoms_per_splat, atoms);
 }
@@ -153,6 +158,28 @@ static int parse_textures(const char *text, enum spl_texture_coding *out, struct
                           "--textures takes adaptive, none, D8W4, D12W4 or D16W8, not '%.32s'", text);
 }
 
+static void say_warning(void *context, const char *text)
+{
+    spl_cmd_progress_finish(context);
+    fprintf(stderr, "splatd: warning: %s\n", text);
+}
+
+/* A name sets everything, a number the decibels alone; both may be given. */
+static int parse_quality(const char *text, struct spl_photo_options *photos, struct spl_error *err)
+{
+    static const char *const names[SPL_TEXTURE_PRESET_COUNT] = {"normal", "draft", "best"};
+    for (int i = 0; i < SPL_TEXTURE_PRESET_COUNT; i++)
+        if (!strcmp(text, names[i])) {
+            photos->preset = (enum spl_texture_preset)i;
+            return 0;
+        }
+    if (text[0] >= 'a' && text[0] <= 'z')
+        return spl_fail_field(err, SPL_E_USAGE, "texture-quality",
+                              "--texture-quality takes draft, normal, best or decibels from 20 to 60, not '%.32s'",
+                              text);
+    return spl_cmd_parse_real("--texture-quality", text, 20, 60, &photos->texture_quality, err);
+}
+
 static void name_refused(void *context, const struct spl_error *why)
 {
     spl_cmd_progress_finish(context);
@@ -161,14 +188,14 @@ static void name_refused(void *context, const struct spl_error *why)
 
 /* What contradicts itself among the options; NULL: nothing. */
 static const char *find_contradiction(const struct spl_pack_options *o, const struct spl_photo_options *photos,
-                                      bool textures)
+                                      bool textures, bool quality)
 {
     if (!photos->cameras && (photos->images || photos->refused || photos->memory_bytes || photos->device ||
-                             photos->keep_textures || photos->texture_quality > 0 || textures))
+                             photos->keep_textures || quality || textures))
         return "photographs need their poses: --cameras MODEL";
     if (photos->keep_textures && photos->textures == SPL_TEXTURES_NONE)
         return "--keep-textures with --textures none keeps nothing: leave one of them out";
-    if (photos->texture_quality > 0 && photos->textures == SPL_TEXTURES_NONE)
+    if (quality && photos->textures == SPL_TEXTURES_NONE)
         return "--texture-quality with --textures none codes nothing: leave one of them out";
     if (o->points_only && (o->neighbours || o->normal_error > 0 || o->no_clip_lines))
         return "--points-only makes no normals, radii and clip lines: leave out --neighbours, --normal-error and "
@@ -187,6 +214,7 @@ int spl_cmd_pack(int argc, char **argv)
 {
     enum {
         opt_columns = 256,
+        opt_intensity,
         opt_neighbours,
         opt_position,
         opt_normal,
@@ -206,6 +234,7 @@ int spl_cmd_pack(int argc, char **argv)
     static const struct option options[] = {
         {"output", required_argument, NULL, 'o'},
         {"columns", required_argument, NULL, opt_columns},
+        {"intensity", no_argument, NULL, opt_intensity},
         {"neighbours", required_argument, NULL, opt_neighbours},
         {"position-error", required_argument, NULL, opt_position},
         {"normal-error", required_argument, NULL, opt_normal},
@@ -225,12 +254,12 @@ int spl_cmd_pack(int argc, char **argv)
         {0},
     };
     struct spl_cmd_progress progress = {0};
-    struct spl_pack_options o = {.progress = spl_cmd_progress, .progress_context = &progress};
+    struct spl_pack_options o = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress};
     struct spl_photo_options photos = {.textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
     uint64_t number = 0;
-    bool textures = false;
+    bool textures = false, quality = false;
     int result = 0;
     for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
         switch (c) {
@@ -239,6 +268,9 @@ int spl_cmd_pack(int argc, char **argv)
             break;
         case opt_columns:
             o.columns = optarg;
+            break;
+        case opt_intensity:
+            o.intensity = true;
             break;
         case opt_neighbours:
             result = spl_cmd_parse_count("--neighbours", optarg, 3, 64, &number, &err);
@@ -281,7 +313,8 @@ int spl_cmd_pack(int argc, char **argv)
             textures = true;
             break;
         case opt_quality:
-            result = spl_cmd_parse_real("--texture-quality", optarg, 20, 60, &photos.texture_quality, &err);
+            result = parse_quality(optarg, &photos, &err);
+            quality = true;
             break;
         case opt_keep_textures:
             photos.keep_textures = optarg;
@@ -308,7 +341,7 @@ int spl_cmd_pack(int argc, char **argv)
         fprintf(stderr, "splatd: pack needs a dataset to write: -o NAME.spld\n");
         return 2;
     }
-    const char *contradiction = find_contradiction(&o, &photos, textures);
+    const char *contradiction = find_contradiction(&o, &photos, textures, quality);
     if (contradiction) {
         fprintf(stderr, "splatd: %s\n", contradiction);
         return 2;

@@ -1,5 +1,6 @@
-/* Progress lines: "stage  42 %  1.2 M/s  3 s left", rewritten in place on a terminal. A log gets two plain lines a
- * stage instead, so that it stays readable and short. A stage ends where the next begins or the work is over. */
+/* Progress lines: "stage  42 %  1.2 M/s  3 s left, 50 s in all", rewritten in place on a terminal. A log gets two plain
+ * lines a stage instead and one every ten seconds, so that it stays readable and short, and nobody takes work for a
+ * hang. A stage ends where the next begins or the work is over. */
 #include "cmd/progress.h"
 
 #include <math.h>
@@ -20,14 +21,19 @@ static const char *scaled(double value, char text[16])
     return text;
 }
 
+void spl_cmd_progress_clear(void)
+{
+    if (isatty(STDERR_FILENO))
+        fprintf(stderr, "\r\033[K");
+}
+
 void spl_cmd_progress_finish(struct spl_cmd_progress *state)
 {
     if (!state->stage[0])
         return;
     double seconds = (double)(spl_now_ns() - state->start_ns) / 1e9;
     char done[16];
-    if (isatty(STDERR_FILENO))
-        fprintf(stderr, "\r\033[K");
+    spl_cmd_progress_clear();
     if (state->done)
         fprintf(stderr, "%s: %s in %.1f s\n", state->stage, scaled((double)state->done, done), seconds);
     else
@@ -35,28 +41,48 @@ void spl_cmd_progress_finish(struct spl_cmd_progress *state)
     state->stage[0] = 0;
 }
 
+/* "45 s", "3 min": what a guess is worth. */
+static const char *rough(double seconds, char text[32])
+{
+    if (seconds < 100)
+        snprintf(text, 32, "%.0f s", ceil(seconds));
+    else
+        snprintf(text, 32, "%.0f min", ceil(seconds / 60));
+    return text;
+}
+
+static void print_line(const struct spl_cmd_progress *state, const struct spl_progress *p)
+{
+    char text[32];
+    fprintf(stderr, "%s", state->stage);
+    if (p->total)
+        fprintf(stderr, "  %3.0f %%", 100.0 * fmin((double)p->done / (double)p->total, 1));
+    if (p->rate > 0)
+        fprintf(stderr, "  %s/s", scaled(p->rate, text));
+    if (p->rate > 0 && p->total > p->done)
+        fprintf(stderr, "  %s left", rough((double)(p->total - p->done) / p->rate, text));
+    if (p->left_s > 0)
+        fprintf(stderr, "  %s in all", rough(p->left_s, text));
+}
+
 void spl_cmd_progress(void *context, const struct spl_progress *progress)
 {
+    static const uint64_t interval_ns = 10 * SPL_NS_PER_S;
     struct spl_cmd_progress *state = context;
     int terminal = isatty(STDERR_FILENO);
+    uint64_t now = spl_now_ns();
     if (strncmp(state->stage, progress->stage, sizeof state->stage - 1)) {
         spl_cmd_progress_finish(state);
         snprintf(state->stage, sizeof state->stage, "%s", progress->stage);
-        state->start_ns = spl_now_ns();
+        state->start_ns = state->said_ns = now;
         if (!terminal)
             fprintf(stderr, "%s...\n", state->stage);
     }
     state->done = progress->done;
-    if (!terminal)
+    if (!terminal && now - state->said_ns < interval_ns)
         return;
-    char rate[16];
-    fprintf(stderr, "\r%s", state->stage);
-    if (progress->total)
-        fprintf(stderr, "  %3.0f %%", 100.0 * (double)progress->done / (double)progress->total);
-    if (progress->rate > 0) {
-        fprintf(stderr, "  %s/s", scaled(progress->rate, rate));
-        if (progress->total > progress->done)
-            fprintf(stderr, "  %.0f s left", ceil((double)(progress->total - progress->done) / progress->rate));
-    }
-    fprintf(stderr, "\033[K");
+    state->said_ns = now;
+    fprintf(stderr, "%s", terminal ? "\r" : "");
+    print_line(state, progress);
+    fprintf(stderr, "%s", terminal ? "\033[K" : "\n");
 }

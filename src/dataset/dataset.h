@@ -58,6 +58,8 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, stru
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,
  *   "uncertainty": bool, "surface": bool (optional, true)}, "sources" [string], "pack" {...} (optional, free: settings,
  * statistics), "stations"
- *   [[16 reals: row-major station-to-world]] (optional). */
+ *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |
+ *   "constant" | "photographs", "points": int}] (optional): where colours come from; those from photographs have taken
+ *   the place of the others, whose points are all that were read. */
 
 #endif

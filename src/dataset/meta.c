@@ -108,6 +108,26 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Optional. */
+static int check_color(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const char *key = "color";
+    const json_t *all = json_object_get(dataset->meta, key);
+    if (all && !json_is_array(all))
+        return wrong(dataset, err, key, "must be an array");
+    for (size_t i = 0; i < json_array_size(all); i++) {
+        const json_t *one = json_array_get(all, i), *points = json_object_get(one, "points");
+        const char *from = json_string_value(json_object_get(one, "from"));
+        if (!json_is_string(json_object_get(one, "source")) || !json_is_integer(points) ||
+            json_integer_value(points) < 0)
+            return wrong(dataset, err, key, "must say of each \"source\" how many \"points\" it is of");
+        if (!from || (strcmp(from, "rgb") && strcmp(from, "intensity") && strcmp(from, "constant") &&
+                      strcmp(from, "photographs")))
+            return wrong(dataset, err, key, "is \"from\" rgb, intensity, constant or photographs");
+    }
+    return SPL_OK;
+}
+
 int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
@@ -147,6 +167,8 @@ int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = check_sources(dataset, err);
     if (!rc)
         rc = check_stations(dataset, err);
+    if (!rc)
+        rc = check_color(dataset, err);
     if (rc)
         return rc;
     for (int a = 0; a < 3; a++)

@@ -79,6 +79,8 @@ static json_t *make_meta(const struct spl_retexture *what)
     json_t *meta = json_deep_copy(spl_dataset_get_meta(what->from));
     if (meta && what->colors)
         json_object_set_new(json_object_get(meta, "attributes"), "color", json_true());
+    if (meta && what->color_source)
+        json_array_insert(json_object_get(meta, "color"), 0, (json_t *)what->color_source);
     json_object_del(meta, "textures");
     if (meta && what->textures)
         json_object_set(meta, "textures", (json_t *)what->textures);

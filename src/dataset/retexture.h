@@ -19,7 +19,8 @@ struct spl_retexture {
      * dictionary. */
     int (*code_chunk)(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err);
     void *context;
-    const json_t *textures; /* META's "textures": settings, statistics; NULL = none */
+    const json_t *color_source; /* put before what META's "color" has; NULL = nothing */
+    const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */
 };
 
 /* Writes `path` (temporary file, sync, rename): geometry, classes and uncertainties are copied bit for bit. Blocks on

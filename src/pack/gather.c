@@ -104,31 +104,42 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const char *path, const char *columns,
-                       struct spl_stage *stage, struct spl_error *err)
+static void grow_box(struct spl_scan *scan, const struct spl_point_batch *batch)
+{
+    for (size_t i = 0; i < batch->count; i++)
+        for (int c = 0; c < 3; c++) {
+            scan->min[c] = fmin(scan->min[c], batch->position[i][c]);
+            scan->max[c] = fmax(scan->max[c], batch->position[i][c]);
+        }
+}
+
+static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
+                       struct spl_scan *scan, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
-    struct spl_cloud_options options = {.columns = columns};
-    int rc = spl_cloud_open(path, &options, &cloud, err);
+    struct spl_cloud_options options = {
+        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors};
+    int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
     char name[128];
-    const char *base = strrchr(path, '/');
-    snprintf(name, sizeof name, "reading %.100s", base ? base + 1 : path);
+    snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. */
     if (info->points_expected && info->points_expected < UINT32_MAX - 1 - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
-        rc = append(p, batch, attributes, p->station_count, path, err);
+        grow_box(scan, batch);
+        rc = append(p, batch, attributes, p->station_count, scan->path, err);
     }
     info = spl_cloud_get_info(cloud);
     if (!rc && attributes & SPL_CLOUD_STATION)
         rc = keep_stations(p, info, err);
     p->points_skipped += info->points_skipped;
+    memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
     p->has_color |= attributes & SPL_CLOUD_COLOR;
     p->has_class |= attributes & SPL_CLOUD_CLASS;
     spl_stage_end(stage);
@@ -137,17 +148,18 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
-int spl_points_gather(struct spl_points *points, const char *const *inputs, size_t input_count, const char *columns,
-                      struct spl_stage *stage, struct spl_error *err)
+int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
+                      struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
     int rc = spl_point_batch_init(&batch, batch_points, err);
-    for (size_t i = 0; !rc && i < input_count; i++)
-        rc = gather_file(points, &batch, inputs[i], columns, stage, err);
+    for (size_t i = 0; !rc && i < scans->count; i++)
+        rc = gather_file(points, &batch, scans, &scans->list[i], stage, err);
     spl_point_batch_finish(&batch);
     if (!rc && !points->count)
-        rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)", inputs[0],
-                      input_count > 1 ? " and the other inputs" : "", (unsigned long long)points->points_skipped);
+        rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
+                      scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
+                      (unsigned long long)points->points_skipped);
     return rc;
 }
 

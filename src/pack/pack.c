@@ -27,7 +27,8 @@ struct pack {
     const struct spl_pack_options *options;
     struct spl_chunk_options chunk;
     unsigned neighbours;
-    struct spl_stage stage;
+    struct spl_stage *stage;
+    struct spl_scans scans;
     struct spl_points points;
     struct spl_tree tree;
     struct spl_emitted emitted;
@@ -92,10 +93,8 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
     json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
-    for (size_t i = 0; i < p->options->input_count; i++) {
-        const char *slash = strrchr(p->options->inputs[i], '/');
-        json_array_append_new(sources, json_string_nocheck(slash ? slash + 1 : p->options->inputs[i]));
-    }
+    for (size_t i = 0; i < p->scans.count; i++)
+        json_array_append_new(sources, json_string_nocheck(p->scans.list[i].name));
     for (uint32_t s = 0; s < points->station_count; s++) {
         json_t *pose = json_array();
         for (int i = 0; i < 16; i++)
@@ -103,18 +102,18 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
         json_array_append_new(stations, pose);
     }
     return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b, s:b}, s:o, s:o, s:o,"
-                     " s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
+                     " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
                      (int)points->has_color, "class", (int)points->has_class, "uncertainty", !points->no_surface,
-                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "pack",
-                     "neighbours", (int)p->neighbours, "position_error_bound", p->chunk.position_error,
-                     "normal_error_bound", p->chunk.normal_error * 180 / M_PI, "points_skipped",
-                     (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates, "position_error",
-                     p->emitted.error.position_over_radius / (double)p->emitted.splats, "normal_error",
-                     p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
+                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "color",
+                     spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",
+                     p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
+                     "points_skipped", (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates,
+                     "position_error", p->emitted.error.position_over_radius / (double)p->emitted.splats,
+                     "normal_error", p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
 }
 
 static int write_dataset(struct pack *p, struct spl_error *err)
@@ -125,17 +124,17 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     if (!rc)
         rc = median_radius(&p->points, &radius, err);
     if (!rc)
-        rc = spl_emit(&p->tree, &p->points, &p->chunk, p->writer, &p->stage, &p->emitted, err);
+        rc = spl_emit(&p->tree, &p->points, &p->chunk, p->writer, p->stage, &p->emitted, err);
     if (rc)
         return rc;
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
-    spl_stage_begin(&p->stage, "writing", 0);
+    spl_stage_begin(p->stage, "writing", 0);
     rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);
     json_decref(meta);
-    spl_stage_end(&p->stage);
+    spl_stage_end(p->stage);
     return rc;
 }
 
@@ -160,30 +159,54 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
     memcpy(report->attribute_bits, p->emitted.bits, sizeof report->attribute_bits);
 }
 
-static int pack_scan(const struct spl_pack_options *options, const char *output, struct spl_pack_report *report,
-                     struct spl_error *err)
+/* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
+static void plan(const struct pack *p, uint32_t photographs)
 {
-    struct pack p = {.options = options};
+    static const struct {
+        const char *name;
+        double seconds;
+        bool of_surface;
+    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"levels", 0.2, false},
+                 {"encoding", 0.25, false},      {"writing", 0.3, false}};
+    uint64_t points = 0;
+    for (size_t i = 0; i < p->scans.count; i++)
+        points += p->scans.list[i].points_expected;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        if (!parts[i].of_surface || !p->options->points_only)
+            spl_stage_plan(p->stage, parts[i].name, parts[i].seconds * 1e-6 * (double)points, i ? 0 : points);
+    if (photographs)
+        spl_photos_plan(p->options->photos, p->stage, photographs, (uint64_t)(1.33 * (double)points), 0);
+}
+
+static int pack_scan(const struct spl_pack_options *options, const char *output, uint32_t photographs,
+                     struct spl_stage *stage, struct spl_pack_report *report, struct spl_error *err)
+{
+    struct pack p = {.options = options, .stage = stage};
     uint64_t begin_ns = spl_now_ns();
-    p.stage.callback = options->progress;
-    p.stage.context = options->progress_context;
-    p.stage.threads = spl_thread_count(options->threads);
     int rc = check_options(&p, err);
     if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_points_gather(&p.points, options->inputs, options->input_count, options->columns, &p.stage, err);
+        rc = spl_scans_init(&p.scans, options->inputs, options->input_count, options->columns, options->intensity,
+                            stage, err);
+    if (!rc) {
+        plan(&p, photographs);
+        rc = spl_points_gather(&p.points, &p.scans, stage, err);
+    }
+    if (!rc && options->warn)
+        spl_scans_compare(&p.scans, options->warn, options->progress_context);
     if (!rc)
-        rc = spl_points_order(&p.points, &p.stage, err);
+        rc = spl_points_order(&p.points, stage, err);
     if (!rc && !options->no_linear)
-        rc = spl_linear_find(&p.points, &p.stage, err);
+        rc = spl_linear_find(&p.points, stage, err);
     if (!rc)
-        rc = options->points_only ? spl_bare_points(&p.points, &p.stage, err)
-                                  : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, &p.stage, err);
+        rc = options->points_only ? spl_bare_points(&p.points, stage, err)
+                                  : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
     if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
-        rc = spl_levels_build(&p.tree, &p.points, &p.stage, err);
+        rc = spl_levels_build(&p.tree, &p.points, stage, err);
     if (!rc) {
         p.chunk.has_class = p.points.has_class;
         rc = write_dataset(&p, err);
@@ -194,6 +217,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     spl_emitted_finish(&p.emitted);
     spl_tree_finish(&p.tree);
     spl_points_finish(&p.points);
+    spl_scans_finish(&p.scans);
     return rc;
 }
 
@@ -236,11 +260,9 @@ static int check_kept(const struct spl_pack_options *o, const struct spl_view_li
 }
 
 /* The dataset without its name, so that nothing of it is left when the process dies. */
-static int pack_photos(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+static int pack_photos(const struct spl_pack_options *options, struct spl_stage *stage, struct spl_pack_report *report,
+                       struct spl_error *err)
 {
-    struct spl_stage stage = {.callback = options->progress,
-                              .context = options->progress_context,
-                              .threads = spl_thread_count(options->threads)};
     struct spl_view_list photographs = {0};
     struct spl_photo_report photos = {0};
     struct spl_dataset *dataset = NULL;
@@ -252,12 +274,12 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_pack_r
         path = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
-    if (!rc && !(rc = pack_scan(options, path, report, err))) {
+    if (!rc && !(rc = pack_scan(options, path, photos.photographs, stage, report, err))) {
         rc = spl_dataset_open(path, false, &dataset, err);
         unlink(path);
     }
     if (!rc)
-        rc = spl_photos_apply(options->photos, &photographs, dataset, options->output, &stage, &photos, err);
+        rc = spl_photos_apply(options->photos, &photographs, dataset, options->output, stage, &photos, err);
     spl_dataset_close(dataset);
     dataset = NULL;
     if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
@@ -276,5 +298,9 @@ int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *rep
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
-    return options->photos ? pack_photos(options, report, err) : pack_scan(options, options->output, report, err);
+    struct spl_stage stage = {.callback = options->progress,
+                              .context = options->progress_context,
+                              .threads = spl_thread_count(options->threads)};
+    return options->photos ? pack_photos(options, &stage, report, err)
+                           : pack_scan(options, options->output, 0, &stage, report, err);
 }

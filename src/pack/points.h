@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "base/error.h"
-#include "pack/stage.h"
+#include "pack/scans.h"
 
 #define SPL_NO_STATION UINT16_MAX
 #define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
@@ -35,9 +35,10 @@ struct spl_points {
     uint64_t points_read, points_skipped, duplicates;
 };
 
-/* Reads all inputs. SPL_E_INPUT when no file has a usable point or a coordinate is beyond SPL_COORDINATE_MAX. */
-int spl_points_gather(struct spl_points *points, const char *const *inputs, size_t input_count, const char *columns,
-                      struct spl_stage *stage, struct spl_error *err);
+/* Reads all scans, and counts in them what came of each. SPL_E_INPUT when none has a usable point or a coordinate is
+ * beyond SPL_COORDINATE_MAX. */
+int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
+                      struct spl_error *err);
 
 /* Sorts all arrays in Morton order and drops points with equal coordinates, keeping the first read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);

@@ -147,7 +147,9 @@ static void grow(struct sum *out, const struct child *child)
     out->count = last + 1;
 }
 
-/* out->match of its atoms at their best weights; `match` is the texture's own. */
+/* out->match of its atoms at their best weights; `match` is the texture's own. What coding spends its time on: a row of
+ * the Gram matrix an atom, which no cache holds. So it is made for sums that are extended, not for those of the last
+ * step, which are half of all. */
 static void rematch(const struct spl_beam *beam, const float *match, struct sum *out)
 {
     double weight[SPL_ATOMS_MAX];
@@ -171,21 +173,20 @@ double spl_beam_search(struct spl_beam *beam, const float *match, double norm, c
     out->count = 0;
     now->count = 0;
     now->error = norm;
-    memcpy(now->match, match, beam->atoms->count * sizeof *match);
     for (uint32_t t = 0; t < aim->atoms && best > aim->enough && t < out->count + 2u; t++) {
         struct child kept[width], child;
         uint32_t count = 0, atom[width];
         for (uint32_t i = 0; i < sums; i++) {
-            uint32_t found = now[i].error > least ? best_matches(now[i].match, beam->atoms->count, atom) : 0;
+            if (!(now[i].error > least))
+                continue;
+            rematch(beam, match, &now[i]);
+            uint32_t found = best_matches(now[i].match, beam->atoms->count, atom);
             for (uint32_t k = 0; k < found; k++)
                 if (extend(beam, &now[i], atom[k], &child))
                     count = keep(kept, count, &child);
         }
-        for (uint32_t i = 0; i < count; i++) {
+        for (uint32_t i = 0; i < count; i++)
             grow(&next[i], &kept[i]);
-            if (t + 1 < aim->atoms)
-                rematch(beam, match, &next[i]);
-        }
         if (count && next->error + (t + 1) * aim->price < cost) {
             cost = next->error + (t + 1) * aim->price;
             best = next->error;

@@ -17,6 +17,8 @@
 
 enum {
     read_textures = 1024, /* at a time */
+    planned_threads = 8,
+    project_grain = 64,   /* of them, a thread's at a time */
     axes_textures = 8192, /* the sample for the axes */
     axes_min = 64,
     sample_min = 256,
@@ -114,13 +116,36 @@ done:
     return rc;
 }
 
-/* Reads the sample into t->y, projected and shuffled. */
+struct projecting {
+    struct spl_training *t;
+    const uint32_t *slot;
+    size_t first; /* of the sample */
+    uint32_t size;
+    const uint8_t *textures;
+    float *whole; /* [n] a worker */
+};
+
+static void project(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct projecting *p = context;
+    struct spl_training *t = p->t;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t slot = p->slot[p->first + i];
+        float mean[3], *y = t->y + (size_t)slot * t->m, *whole = t->basis ? p->whole + (size_t)worker * t->n : y;
+        t->norm[slot] = (float)spl_texture_centre(p->textures + i * t->n, p->size, whole, mean);
+        if (t->basis)
+            spl_blas_apply(t->m, t->n, t->basis, whole, y);
+    }
+}
+
+/* Reads the sample into t->y, projected and shuffled: a run of textures after the other, its textures in parallel. */
 static int read_sample(struct spl_training *t, struct reader *reader, struct spl_error *err)
 {
     int rc = SPL_E_NOMEM;
-    float *whole = spl_alloc_raw(t->n, sizeof *whole, err);
+    float *whole = spl_alloc_raw((size_t)t->threads * t->n, sizeof *whole, err);
     uint32_t *slot = spl_alloc_raw(t->sample, sizeof *slot, err);
-    if (!whole || !slot)
+    uint8_t *run = spl_alloc_raw(read_textures, t->n, err);
+    if (!whole || !slot || !run)
         goto done;
     for (size_t i = 0; i < t->sample; i++) {
         size_t k = spl_random_at(~t->settings->seed, i) % (i + 1);
@@ -128,20 +153,24 @@ static int read_sample(struct spl_training *t, struct reader *reader, struct spl
         slot[k] = (uint32_t)i;
     }
     reader->count = 0;
+    struct projecting projecting = {
+        .t = t, .slot = slot, .size = reader->source->size, .textures = run, .whole = whole};
     for (size_t j = 0; j < t->sample; j++) {
-        float mean[3], *y = t->y + (size_t)slot[j] * t->m;
         const uint8_t *texture;
         rc = read_texture(reader, stratum(t->settings->seed, j, t->sample, t->population), &texture, err);
         if (rc)
             goto done;
-        t->norm[slot[j]] = (float)spl_texture_centre(texture, reader->source->size, t->basis ? whole : y, mean);
-        if (t->basis)
-            spl_blas_apply(t->m, t->n, t->basis, whole, y);
+        memcpy(run + (j - projecting.first) * t->n, texture, t->n);
+        if (j + 1 - projecting.first < read_textures && j + 1 < t->sample)
+            continue;
+        spl_parallel_for(t->threads, j + 1 - projecting.first, project_grain, project, &projecting);
+        projecting.first = j + 1;
     }
     rc = 0;
 done:
     free(whole);
     free(slot);
+    free(run);
     return rc;
 }
 
@@ -155,8 +184,9 @@ static int plan(struct spl_training *t, bool *gram, struct spl_error *err)
     if (batch > t->population)
         batch = t->population;
     *gram = 4 * k * k <= memory / 4;
-    uint64_t fixed = 8 * k * m + 32 * k + (*gram ? 4 * k * k : 0) + batch * row + read_textures * (uint64_t)t->n +
-                     (t->basis ? 4ull * t->n * t->m : 0) + t->threads * spl_block_bytes(t->count, t->m, *gram);
+    uint64_t block = spl_block_bytes(t->count, t->m, *gram);
+    uint64_t fixed = 8 * k * m + 32 * k + (*gram ? 4 * k * k : 0) + batch * row + 2 * read_textures * (uint64_t)t->n +
+                     4ull * planned_threads * t->n + (t->basis ? 4ull * t->n * t->m : 0) + planned_threads * block;
     uint64_t each = texture + (whole ? row : 0) + 4 /* its slot while reading */;
     uint64_t least = t->population < sample_min ? t->population : sample_min;
     if (memory < fixed + each * least)
@@ -166,9 +196,14 @@ static int plan(struct spl_training *t, bool *gram, struct spl_error *err)
             "fewer atoms",
             t->count, t->n, (unsigned long long)(fixed + each * least), (unsigned long long)memory);
     uint64_t sample = (memory - fixed) / each;
+    if (s->sample && sample > s->sample)
+        sample = s->sample;
     t->sample = sample < t->population ? sample : t->population;
     if (t->sample > UINT32_MAX / SPL_ATOMS_MAX)
         t->sample = UINT32_MAX / SPL_ATOMS_MAX;
+    /* threads beyond those that were counted on work where memory is left, so that no sample depends on their number */
+    uint64_t threads = planned_threads + (memory - fixed - each * t->sample) / (block + 4ull * t->n);
+    t->threads = t->threads < threads ? t->threads : (unsigned)threads;
     t->batch = whole || batch > t->sample ? t->sample : batch;
     return 0;
 }

@@ -36,7 +36,7 @@ static int check(const struct spl_texture_source *source, const struct spl_train
     return 0;
 }
 
-static int epoch(struct spl_training *t, struct spl_error *err)
+static int epoch(struct spl_training *t, void *context, struct spl_error *err)
 {
     t->epoch_error = 0;
     t->epoch_weights = 0;
@@ -49,6 +49,8 @@ static int epoch(struct spl_training *t, struct spl_error *err)
         if (rc)
             return rc;
         spl_training_update(t, count);
+        if (t->settings->advance)
+            t->settings->advance(context, count);
     }
     return 0;
 }
@@ -88,7 +90,7 @@ static int run(struct spl_training *t, uint64_t begin_ns, spl_train_report *repo
         uint32_t dropped = 0;
         if (s->seconds > 0 && number > 1 && (double)(epoch_begin - begin_ns) / SPL_NS_PER_S + longest > s->seconds)
             break;
-        int rc = epoch(t, err);
+        int rc = epoch(t, context, err);
         if (rc)
             return rc;
         longest = fmax(longest, (double)(spl_now_ns() - epoch_begin) / SPL_NS_PER_S);

@@ -30,7 +30,11 @@ struct spl_train_settings {
     float lambda;        /* as in spl_code_settings; counts the dictionary's bytes too */
     uint32_t epochs;     /* rounds at most; 0: until an epoch gains less than 0.02 dB */
     double seconds;      /* no epoch is begun that would end later than this; 0: no limit */
+    uint64_t sample;     /* textures that are trained on at most; 0: as many as memory_bytes hold */
     uint64_t seed;
+    /* After each batch, by the calling thread: so many more textures were coded. May be NULL; gets the report's
+     * context. */
+    void (*advance)(void *context, uint64_t textures);
     uint64_t
         memory_bytes; /* of everything that training holds; the sample of textures is cut to fit: an even random one */
     unsigned threads; /* 0: all cores */

@@ -96,7 +96,10 @@ int main(int argc, char **argv)
     struct spl_error err = {0};
     const char *scan = argc > 1 ? argv[1] : "",
                *out = argc > 2 && !strcmp(argv[argc - 2], "-o") ? argv[argc - 1] : NULL;
-    int rc = spl_points_gather(&points, &scan, 1, NULL, &stage, &err);
+    struct spl_scans scans;
+    int rc = spl_scans_init(&scans, &scan, 1, NULL, false, &stage, &err);
+    if (!rc)
+        rc = spl_points_gather(&points, &scans, &stage, &err);
     if (!rc && argc > (out ? 4 : 2))
         rc = spl_scene_create(argv[2], &scene, &err);
     if (!rc)

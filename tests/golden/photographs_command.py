@@ -161,6 +161,18 @@ with tempfile.TemporaryDirectory() as folder:
         grey = [out[4 * i] for i in range(64 * 48)]
         return sum((g - sum(grey) / len(grey)) ** 2 for g in grey) / len(grey)
 
+    # the same bytes whatever the threads; what is left is said from the first stage that counts; presets
+    files = []
+    for threads in (1, 2, 4):
+        said = pack("--textures", "adaptive", "--texture-quality", "draft", "--threads", threads)
+        files.append(pathlib.Path("wall.spld").read_bytes())
+        assert "training: epoch 2" in said and "training: epoch 3" not in said, said
+    assert files[0] == files[1] == files[2], [len(f) for f in files]
+    said = pack("--textures", "adaptive", "--texture-quality", "36")
+    plain = pathlib.Path("wall.spld").read_bytes()
+    said = pack("--textures", "adaptive", "--texture-quality", "normal", "--texture-quality", "36")
+    assert pathlib.Path("wall.spld").read_bytes() == plain != files[0]
+
     for coding in ("adaptive",):
         said = pack("--textures", coding, "--texture-quality", "36", "--keep-textures", "images/kept")
         found = re.search(r"(\d+) textures of (\d+) x \d+: resampled at ([\d.]+) dB, coded at ([\d.]+) dB", said)
@@ -243,7 +255,8 @@ with tempfile.TemporaryDirectory() as folder:
     model = ("--cameras", "views.json")
     for arguments, words in ((("--images", "."), "--cameras"), (("--keep-going",), "--cameras"),
                              (("--cameras", "nowhere"), "nowhere"), ((*model, "--textures", "D9"), "D9"),
-                             (("--texture-quality", "40"), "--cameras"), (("--textures", "none"), "--cameras"),
+                             (("--texture-quality", "40"), "--cameras"), (("--texture-quality", "best"), "--cameras"),
+                             ((*model, "--texture-quality", "fast"), "draft, normal, best"), (("--textures", "none"), "--cameras"),
                              ((*model, "--textures", "none", "--texture-quality", "40"), "codes nothing"),
                              ((*model, "--keep-textures", "./wall.xyz"), "is an input too"),
                              ((*model, "--keep-textures", "images/right.png"), "is an input too"),

@@ -179,6 +179,7 @@ def test_bare_points():
         with Daemon(REAL, datasets=(bare,)) as d:
             at = "/v1/datasets/bare"
             assert d.ask(at).json()["methods"] == ["points", "fill"]
+            assert d.ask(at).json()["color"] == [{"source": "cloud.xyz", "from": "constant", "points": 10000}]
             camera = "eye=3,0,1&target=0,0,1&fov=30&width=64&height=48"
             points = d.ask(f"{at}/pick?{camera}&x=32&y=24&method=points").json()
             assert points["normal"] is None, points

@@ -162,6 +162,7 @@ def test_atoms_are_chosen_where_there_are_textures():
         assert "psnr" not in reply.headers["Splatd-Promised"], "nobody measured it"
     with serving(profile(VERSION)) as (d, _):
         assert d.ask("/v1/datasets/wall").json()["textures"] is None
+        assert d.ask("/v1/datasets/wall").json()["color"] is None  # its META does not say
         reply = ask(d, psnr=20, atoms=3)[1]
         assert "atoms" not in reply.headers["Splatd-Chosen"] and "psnr" in reply.headers["Splatd-Promised"]
 

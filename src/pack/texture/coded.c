@@ -17,23 +17,24 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "dataset/texture.h"
+#include "pack/texture/presets.h"
 #include "sparse/texture_file.h"
 
 static const struct {
-    uint32_t dictionary, weight_bits;
-    bool weighs; /* gain against bits */
+    uint32_t dictionary, weight_bits; /* 0: the preset's */
+    bool weighs;                      /* gain against bits */
 } codings[SPL_TEXTURES_COUNT] = {
-    [SPL_TEXTURES_ADAPTIVE] = {4096, 8, true},
+    [SPL_TEXTURES_ADAPTIVE] = {0, 8, true},
     [SPL_TEXTURES_D8W4] = {256, 4, false},
     [SPL_TEXTURES_D12W4] = {4096, 4, false},
     [SPL_TEXTURES_D16W8] = {65536, 8, false},
 };
-static const double quality_default = 40; /* dB */
 /* What a bit of codes saves where textures are as good as wanted, in shares of their squared error, on Sceaux; the
  * packer starts there and seeks the lambda that gives the wanted quality. */
 static const double share_of_target = 0.025, share_range = 8;
 static const double db_per_lambda = 1.75; /* lower for e times the lambda, likewise */
 enum { sampled_chunks = 128, lambda_trials = 4 };
+enum { epochs_expected = 5 };           /* until training settles, on Sceaux */
 static const double seconds_most = 600; /* of training */
 static const uint64_t memory_default = 2ull << 30;
 
@@ -83,14 +84,26 @@ int spl_textures_keep(const struct spl_textures *textures, const char *path, con
 struct reporting {
     json_t *epochs;
     const struct spl_photo_options *options;
+    struct spl_stage *stage;
+    uint64_t sample; /* textures of an epoch */
 };
+
+/* Nobody knows how many epochs it takes to settle: one more than was expected is announced when it begins. */
+static void advance(void *context, uint64_t textures)
+{
+    const struct reporting *reporting = context;
+    if (atomic_load(&reporting->stage->done) + textures > reporting->stage->total)
+        reporting->stage->total += reporting->sample;
+    spl_stage_add(reporting->stage, textures, 0);
+}
 
 static bool report_epoch(void *context, const struct spl_train_progress *p)
 {
     const struct reporting *reporting = context;
-    json_array_append_new(reporting->epochs, json_pack("{s:i, s:f, s:f, s:f, s:i}", "epoch", (int)p->epoch, "seconds",
-                                                       p->seconds, "psnr", isfinite(p->psnr) ? p->psnr : 999.0, "atoms",
-                                                       p->atoms_per_splat, "dictionary", (int)p->dictionary));
+    /* without its seconds: equal input gives an equal file */
+    json_array_append_new(reporting->epochs, json_pack("{s:i, s:f, s:f, s:i}", "epoch", (int)p->epoch, "psnr",
+                                                       isfinite(p->psnr) ? p->psnr : 999.0, "atoms", p->atoms_per_splat,
+                                                       "dictionary", (int)p->dictionary));
     if (reporting->options->trained)
         reporting->options->trained(reporting->options->context, p->epoch, p->seconds, p->psnr, p->atoms_per_splat,
                                     p->dictionary);
@@ -104,7 +117,7 @@ struct coding {
     struct spl_coder *coder;
     struct spl_chosen *chosen;
     struct spl_stage *stage;
-    struct spl_code_sums *sums; /* by worker; of a sample by its chunk */
+    struct spl_code_sums *sums; /* by chunk, or by chunk of the sample */
     uint32_t stride;            /* > 0: a sample, every so many-th chunk; nothing is kept */
     uint8_t *scratch;           /* by worker: the textures of a chunk */
     atomic_int failed;
@@ -153,8 +166,8 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
     struct coding *coding = context;
     for (uint32_t i = (uint32_t)begin; i < end && !atomic_load(&coding->failed); i++) {
         struct spl_error why = {0};
-        int rc = coding->stride ? code_chunk(coding, i * coding->stride, worker, &coding->sums[i], &why)
-                                : code_chunk(coding, i, worker, &coding->sums[worker], &why);
+        uint32_t chunk = coding->stride ? i * coding->stride : i;
+        int rc = code_chunk(coding, chunk, worker, &coding->sums[i], &why);
         if (!rc)
             continue;
         mtx_lock(&coding->mutex);
@@ -162,8 +175,7 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
         mtx_unlock(&coding->mutex);
         atomic_store(&coding->failed, rc);
     }
-    if (!coding->stride)
-        spl_stage_add(coding->stage, end - begin, worker);
+    spl_stage_add(coding->stage, end - begin, worker);
 }
 
 static void add_sums(struct spl_code_sums *sums, const struct spl_code_sums *more)
@@ -183,9 +195,8 @@ static int code_all(struct coding *coding, struct spl_code_sums *total, struct s
     unsigned threads = coding->stage->threads;
     uint32_t chunks = coding->splats->chunk_count;
     uint32_t wanted = coding->stride ? (chunks + coding->stride - 1) / coding->stride : chunks;
-    size_t parts = coding->stride ? wanted : threads;
     struct spl_error first = {0};
-    coding->sums = spl_alloc(parts, sizeof *coding->sums, err);
+    coding->sums = spl_alloc(wanted, sizeof *coding->sums, err);
     coding->scratch = spl_alloc_raw((size_t)threads * SPL_CHUNK_SPLATS, coding->textures->values, err);
     coding->err = &first;
     int rc = coding->sums && coding->scratch ? SPL_OK : SPL_E_NOMEM;
@@ -198,7 +209,8 @@ static int code_all(struct coding *coding, struct spl_code_sums *total, struct s
         if (rc)
             spl_fail_field(err, rc, first.field, "%s", first.message);
     }
-    for (size_t i = 0; coding->sums && i < parts; i++) /* of a sample in the order of chunks: lambda depends on it */
+    /* in the order of chunks: lambda and what META says must not depend on who did which */
+    for (uint32_t i = 0; coding->sums && i < wanted; i++)
         add_sums(total, &coding->sums[i]);
     free(coding->sums);
     free(coding->scratch);
@@ -231,7 +243,8 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
                    const struct spl_photo_options *options, struct spl_chosen *chosen, struct spl_stage *stage,
                    struct spl_error *err)
 {
-    double quality = options->texture_quality > 0 ? options->texture_quality : quality_default;
+    const struct spl_texture_settings preset = spl_texture_settings_get(options);
+    double quality = preset.quality;
     double wanted = textures->values * pow(10, -quality / 10);
     uint64_t memory = options->memory_bytes ? options->memory_bytes : memory_default;
     bool weighs = codings[options->textures].weighs;
@@ -240,7 +253,9 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         .count = textures->count, .size = textures->size, .read = read_textures, .context = &reader};
     const struct spl_train_settings train = {
         .method = SPL_TRAIN_BATCHES,
-        .dictionary = codings[options->textures].dictionary,
+        .dictionary = codings[options->textures].dictionary ? codings[options->textures].dictionary : preset.dictionary,
+        .epochs = preset.epochs,
+        .sample = preset.sample,
         .atoms = SPL_ATOMS_MAX,
         .psnr = weighs ? 0 : (float)quality,
         .lambda = weighs ? (float)(share_of_target * wanted) : 0,
@@ -248,6 +263,7 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         .seed = 1,
         .memory_bytes = memory,
         .threads = stage->threads,
+        .advance = advance,
     };
     const struct spl_code_settings settings = {.atoms = train.atoms,
                                                .psnr = train.psnr,
@@ -257,22 +273,26 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
     *coded = (struct spl_coded){.chunk_count = splats->chunk_count, .epochs = json_array()};
     coded->words = spl_alloc(splats->chunk_count, sizeof *coded->words, err);
     coded->planes = spl_alloc(splats->chunk_count, sizeof *coded->planes, err);
-    struct reporting reporting = {coded->epochs, options};
+    struct reporting reporting = {coded->epochs, options, stage, 0};
     int rc = !coded->words || !coded->planes ? SPL_E_NOMEM
              : !coded->epochs                ? spl_fail(err, SPL_E_NOMEM, "out of memory for the figures of training")
                                              : SPL_OK;
-    spl_stage_begin(stage, "training", 0);
+    uint64_t sample = preset.sample && preset.sample < textures->count ? preset.sample : textures->count;
+    reporting.sample = sample;
+    spl_stage_begin(stage, "training", sample * (preset.epochs ? preset.epochs : epochs_expected));
     if (!rc)
         rc = spl_dictionary_train(&source, &train, report_epoch, &reporting, &coded->dictionary, err);
-    spl_stage_end(stage);
+    spl_stage_finish(stage);
     if (!rc && !(coding.coder = spl_coder_create(&coded->dictionary, &settings, memory, stage->threads, err)))
         rc = err && err->code ? err->code : SPL_E_NOMEM;
-    spl_stage_begin(stage, "coding textures", splats->chunk_count);
+    uint32_t stride = splats->chunk_count / sampled_chunks + 1;
+    uint32_t sampled = weighs ? lambda_trials * ((splats->chunk_count + stride - 1) / stride) : 0;
+    spl_stage_begin(stage, "coding textures", (uint64_t)splats->chunk_count + sampled);
     if (!rc && weighs)
         rc = seek_lambda(&coding, (double)train.lambda, quality, err);
     if (!rc)
         rc = code_all(&coding, &coded->sums, err);
-    spl_stage_end(stage);
+    spl_stage_finish(stage);
     spl_coder_destroy(coding.coder);
     if (rc)
         spl_coded_finish(coded);

@@ -1,8 +1,8 @@
 /* Gains by iteratively reweighted least squares (Cauchy weights): for a splat that photographs i and j show,
  * log c_i + x_i = log c_j + x_j, where x_i is bilinear in the photograph between the corners of a grid whose neighbours
  * are drawn together. Weights are lenient at first, so that glare on a part of a photograph, on which all pairs agree,
- * is not taken for an outlier. Conjugate gradients solve the normal equations without a matrix. Values near black and
- * white say nothing about exposure and are left out. One thread; deterministic. */
+ * is not taken for an outlier. Conjugate gradients solve the normal equations without a matrix, a channel on each
+ * thread. Values near black and white say nothing about exposure and are left out. Deterministic. */
 #include "pack/texture/gains.h"
 
 #include <math.h>
@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/parallel.h"
 
 enum { pairs_max = 1 << 17, rounds = 5, steps_max = 50, darkest = 12, brightest = 243, enough = 200 };
 static const double scales[rounds] = {0.8, 0.4, 0.2, 0.1, 0.1}; /* of the Cauchy weights, logarithm */
@@ -178,6 +179,20 @@ static void solve(const struct system *s, int channel, double *x, double *work)
     }
 }
 
+struct channels {
+    const struct system *system;
+    double *const *x;
+    double *work; /* 3 * nodes a channel */
+};
+
+static void solve_channels(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct channels *channels = context;
+    (void)worker;
+    for (size_t c = begin; c < end; c++)
+        solve(channels->system, (int)c, channels->x[c], channels->work + 3 * c * channels->system->nodes);
+}
+
 static double residual(const struct pair *p, const double *const x[3], int c)
 {
     return (double)p->difference[c] + value_at(x[c], p, 0) - value_at(x[c], p, 1);
@@ -212,11 +227,11 @@ static void judge(const struct system *s, const double *const x[3], struct spl_g
 }
 
 int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)[3], uint32_t photos,
-                   struct spl_gain *gains, struct spl_error *err)
+                   struct spl_gain *gains, unsigned threads, struct spl_error *err)
 {
     uint32_t all = photos + 1, nodes = all * SPL_GAIN_NODES;
     struct pair *pairs = spl_alloc_raw(pairs_max, sizeof *pairs, err);
-    double *memory = spl_alloc(nodes, 6 * sizeof *memory, err);
+    double *memory = spl_alloc(nodes, 12 * sizeof *memory, err);
     int rc = pairs && memory ? SPL_OK : SPL_E_NOMEM;
     if (rc)
         goto done;
@@ -234,8 +249,7 @@ int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)
             double share = pairs[k].photo[1] == photos ? scan_weight : 1;
             pairs[k].weight = (float)(share / (1 + worst * worst / (scales[round] * scales[round])));
         }
-        for (int c = 0; c < 3; c++)
-            solve(&s, c, x[c], work);
+        spl_parallel_for(threads, 3, 1, solve_channels, &(struct channels){&s, x, work});
     }
     judge(&s, solved, gains, work);
     for (int c = 0; c < 3; c++) {

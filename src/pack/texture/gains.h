@@ -20,7 +20,7 @@ struct spl_gain {
  * splats have without photographs (by id), NULL for none. Fills gains[photos + 1]. What few splats say of a part of a
  * photograph is drawn towards the parts around it. Photographs that share nothing keep factor 1. */
 int spl_gains_find(const struct spl_candidates *candidates, const uint8_t (*own)[3], uint32_t photos,
-                   struct spl_gain *gains, struct spl_error *err);
+                   struct spl_gain *gains, unsigned threads, struct spl_error *err);
 
 /* A photograph that contradicts the others: it was taken elsewhere, or the model is mirrored or scaled. */
 bool spl_gain_contradicts(const struct spl_gain *gain);

@@ -23,8 +23,9 @@ struct spl_photo_pass {
     uint8_t (*own)[3];    /* NULL: the scan has no colours */
     uint8_t (*judged)[3]; /* own, beside which photographs are judged; NULL: all of it is grey, as infrared is */
     struct spl_renderer *renderer;
-    bool *dropped;  /* by photograph */
-    uint64_t *uses; /* the same: splats that chose it */
+    bool *dropped;        /* by photograph */
+    uint64_t *uses;       /* the same: splats that chose it */
+    json_t *color_source; /* for META */
 };
 
 /* Resamples, codes and writes `output`. Afterwards the candidates are gone: training may hold as much as they did.

@@ -9,6 +9,7 @@
 
 #include "base/memory.h"
 #include "dataset/retexture.h"
+#include "pack/texture/presets.h"
 
 enum { splats_compared = 4000 };
 
@@ -25,7 +26,7 @@ static const double texels_enough = 1.25;
  * pixel to tell by. */
 static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    double quality = pass->options->texture_quality > 0 ? pass->options->texture_quality : 40;
+    const struct spl_texture_settings settings = spl_texture_settings_get(pass->options);
     struct spl_resample_error error[3] = {0};
     struct spl_photo photo;
     uint32_t best = 0;
@@ -43,7 +44,8 @@ static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *da
         pass->report->texture_size = 8u << k;
         pass->report->resampling_psnr = !error[k].values ? NAN : mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
         double side = error[k].sides / fmax((double)error[k].splats, 1);
-        if (pass->report->resampling_psnr > quality - resampling_slack ||
+        if (pass->report->resampling_psnr > settings.quality - resampling_slack ||
+            pass->report->texture_size >= settings.texels_max ||
             (error[k].values && pass->report->texture_size >= texels_enough * side))
             break;
     }
@@ -128,8 +130,11 @@ int spl_photo_pass_write_textured(struct spl_photo_pass *pass, const struct spl_
     for (uint64_t id = 0; !rc && id < pass->splats.count; id++)
         if (pass->chosen.photo[id] != SPL_NO_PHOTO)
             pass->uses[pass->chosen.photo[id]]++;
-    if (rc || (rc = choose_size(pass, dataset, err)) ||
-        (rc = spl_textures_init(&textures, output, pass->splats.count, pass->report->texture_size, err)) ||
+    if (rc || (rc = choose_size(pass, dataset, err)))
+        goto done;
+    spl_photos_plan(pass->options, pass->stage, pass->report->photographs, pass->splats.count,
+                    pass->report->texture_size);
+    if ((rc = spl_textures_init(&textures, output, pass->splats.count, pass->report->texture_size, err)) ||
         (rc = take_textures(pass, dataset, &textures, err)) || (rc = keep_textures(pass, &textures, err)))
         goto done;
     spl_candidates_finish(&pass->candidates); /* training may hold as much as they did */
@@ -147,6 +152,7 @@ int spl_photo_pass_write_textured(struct spl_photo_pass *pass, const struct spl_
                                        .dictionary = &coded.dictionary,
                                        .code_chunk = spl_coded_get,
                                        .context = &chunks,
+                                       .color_source = pass->color_source,
                                        .textures = description};
     rc = spl_dataset_retexture(&what, output, err);
 done:

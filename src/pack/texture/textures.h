@@ -44,7 +44,7 @@ struct spl_coded {
     uint8_t *planes;  /* by chunk */
     uint32_t chunk_count;
     struct spl_code_sums sums;
-    json_t *epochs; /* of training: [{"epoch", "seconds", "psnr", "atoms", "dictionary"}] */
+    json_t *epochs; /* of training: [{"epoch", "psnr", "atoms", "dictionary"}] */
 };
 
 /* Trains and codes; sets chosen->color of textured splats to their textures' mean. `trained` as in

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "dataset/dataset.h"
 #include "service/state.h"
 
 static json_t *vector(const double v[3])
@@ -59,6 +60,13 @@ static json_t *describe_textures(const struct spl_dataset_info *info)
     return json_pack("{s:i, s:i, s:o}", "size", (int)info->texture_size, "atoms", (int)info->atoms, "methods", methods);
 }
 
+/* A copy: a reply is taken apart while other threads may read META. */
+static json_t *describe_color(const struct spl_dataset *dataset)
+{
+    const json_t *color = json_object_get(spl_dataset_get_meta(dataset), "color");
+    return color ? json_deep_copy(color) : json_null();
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
@@ -86,6 +94,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", describe_layers());
     set(json, "methods", describe_methods(info));
+    set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)

@@ -156,6 +156,14 @@ FORGE(eye, json_object_set(json_object_get(p->meta, "default_view"), "eye",
 FORGE(flags, json_object_del(json_object_get(p->meta, "attributes"), "class"))
 FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
 FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
+static void set_color(struct parts *p, const char *from, int points)
+{
+    json_object_set_new(p->meta, "color", json_pack("[{s:s, s:s, s:i}]", "source", "a", "from", from, "points", points));
+}
+FORGE(color, set_color(p, "rgb", 400))
+FORGE(color_text, json_object_set_new(p->meta, "color", json_string("rgb")))
+FORGE(color_few, set_color(p, "rgb", -1))
+FORGE(color_what, set_color(p, "xyz", 1))
 FORGE(not_an_object, (json_decref(p->meta), p->meta = json_array()))
 
 static const struct {
@@ -222,6 +230,10 @@ static const struct {
     {flags, "section META: \"attributes\" must say"},
     {sources, "section META: \"sources\" must be"},
     {stations, "section META: \"stations\" must hold"},
+    {color, NULL},
+    {color_text, "section META: \"color\" must be an array"},
+    {color_few, "section META: \"color\" must say of each \"source\""},
+    {color_what, "section META: \"color\" is \"from\" rgb"},
     {not_an_object, "section META is no JSON object"},
 };
 

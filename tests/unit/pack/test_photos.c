@@ -177,7 +177,7 @@ static void glare_is_found_where_it_is(void **state)
             c.color[0] = (uint8_t)(c.color[0] * (glare ? 1.6 : 1));
             spl_candidates_add(&candidates, s, &c);
         }
-    assert_int_equal(spl_gains_find(&candidates, NULL, 3, gains, NULL), 0);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 3, gains, 2, NULL), 0);
     float clear[3];
     spl_gain_get(&gains[1], (uint8_t[]){240, 230}, factor);
     spl_gain_get(&gains[0], (uint8_t[]){240, 230}, clear);
@@ -214,11 +214,11 @@ static void exposures_are_found_among_outliers(void **state)
     struct spl_candidates candidates;
     struct spl_gain gains[6];
     assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
-    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0); /* nothing is seen: nothing changes */
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, 2, NULL), 0); /* nothing is seen: nothing changes */
     for (int i = 0; i < 6; i++)
         assert_true(gains[i].factor[0][0] == 1 && gains[i].shared == 0 && !spl_gain_contradicts(&gains[i]));
     fill(&candidates, 5, factor, false);
-    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, 2, NULL), 0);
     for (int i = 0; i < 5; i++) {
         assert_true(fabs((double)gains[i].factor[7][1] / factor[i] - 1) < 0.03);
         assert_false(spl_gain_contradicts(&gains[i]) || spl_gain_doubtful(&gains[i]));
@@ -226,7 +226,7 @@ static void exposures_are_found_among_outliers(void **state)
     spl_candidates_finish(&candidates);
     assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
     fill(&candidates, 5, factor, true);
-    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, NULL), 0);
+    assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, 2, NULL), 0);
     assert_true(spl_gain_contradicts(&gains[2]) && spl_gain_doubtful(&gains[2]));
     assert_true(gains[0].agreement > gains[2].agreement && gains[4].agreement > gains[2].agreement);
     spl_candidates_finish(&candidates);
@@ -256,7 +256,7 @@ static void a_scan_of_print_brightens_nothing(void **state)
                     spl_candidates_add(&candidates, s, &c);
             }
         }
-        assert_int_equal(spl_gains_find(&candidates, (const uint8_t(*)[3])own, 2, gains, NULL), 0);
+        assert_int_equal(spl_gains_find(&candidates, (const uint8_t(*)[3])own, 2, gains, 2, NULL), 0);
         float left[2][3], right[3];
         for (int photo = 0; photo < 2; photo++) {
             spl_gain_get(&gains[photo], (uint8_t[]){30, 128}, left[photo]);

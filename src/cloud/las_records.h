@@ -1,0 +1,33 @@
+/* Variable length records of a LAS file: finding them, and what they say of its coordinates. */
+#ifndef SPL_CLOUD_LAS_RECORDS_H
+#define SPL_CLOUD_LAS_RECORDS_H
+
+#include <endian.h>
+#include <string.h>
+
+#include "cloud/reader.h"
+
+static inline uint16_t spl_las_get16(const uint8_t *p)
+{
+    uint16_t v;
+    memcpy(&v, p, sizeof v);
+    return le16toh(v);
+}
+
+/* Records that are left to look at: `count` at most from `at` on, none past `end`. */
+struct spl_las_record {
+    uint64_t at, end;
+    uint32_t count;
+    uint64_t content; /* of the one that was found: where it begins */
+    uint32_t bytes;   /* and how long it is, up to `end` */
+};
+
+/* The next record of `user`, and of number `id` unless that is 0; a chain that leaves its range just ends. Moves the
+ * source's cursor. */
+int spl_las_find(struct spl_cloud *cloud, struct spl_las_record *record, const char *user, uint16_t id, bool *found,
+                 struct spl_error *err);
+
+/* Fills info.coordinates from GeoTIFF keys or WKT, as far as they are there and whole. Moves the cursor. */
+int spl_las_read_coordinates(struct spl_cloud *cloud, struct spl_las_record records, struct spl_error *err);
+
+#endif

@@ -1,0 +1,325 @@
+/* Scans that are merged were often written by different programs, with RGB here and intensity alone there. Nothing of
+ * that is an error, so each is taken as it is; but it is said, since nobody sees in a merged dataset why it has a seam.
+ *
+ * Intensities have no white of their own: the range that is made grey is a scan's own. Tiles of one flight must not
+ * differ by that, so scans of like ranges share one. 8 bit numbers beside 16 bit ones would be black in it: then each
+ * keeps its own. The caller's thread. */
+#include "pack/scans.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+enum { names_listed = 3, bytes_a_line = 40 };
+static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
+static const double like_steps = 10;    /* times the finest step of coordinates: nothing to mention */
+static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
+
+/* "a.las, b.las, c.las and 4 more" */
+struct group {
+    size_t count;
+    char names[224];
+};
+
+static void add(struct group *group, const struct spl_scan *scan)
+{
+    size_t used = strlen(group->names);
+    if (group->count++ < names_listed)
+        snprintf(group->names + used, sizeof group->names - used, "%s%.60s", used ? ", " : "", scan->name);
+}
+
+static const char *list(struct group *group)
+{
+    size_t used = strlen(group->names);
+    if (group->count > names_listed)
+        snprintf(group->names + used, sizeof group->names - used, " and %zu more", group->count - names_listed);
+    return group->names;
+}
+
+struct saying {
+    const struct spl_scans *scans;
+    void (*warn)(void *context, const char *text);
+    void *context;
+};
+
+__attribute__((format(printf, 2, 3))) static void say(const struct saying *s, const char *format, ...)
+{
+    char text[1200];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    s->warn(s->context, text);
+}
+
+static bool has_points(const struct spl_scan *scan)
+{
+    return scan->points_from[0] + scan->points_from[1] + scan->points_from[2] > 0;
+}
+
+static void share_intensities(struct spl_scans *scans)
+{
+    double black = INFINITY, white = -INFINITY, least = INFINITY;
+    for (size_t i = 0; i < scans->count; i++) {
+        const struct spl_cloud_colors *colors = &scans->list[i].colors;
+        if (colors->from != SPL_COLORS_INTENSITY || !colors->guessed)
+            continue;
+        black = fmin(black, colors->black);
+        white = fmax(white, colors->white);
+        least = fmin(least, colors->white - colors->black);
+    }
+    for (size_t i = 0; i < scans->count && white - black <= like_ranges * least; i++) {
+        struct spl_cloud_colors *colors = &scans->list[i].colors;
+        if (colors->from != SPL_COLORS_INTENSITY || !colors->guessed)
+            continue;
+        colors->black = black;
+        colors->white = white;
+    }
+}
+
+int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
+                   bool intensity, struct spl_stage *stage, struct spl_error *err)
+{
+    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    int rc = SPL_OK;
+    *scans = (struct spl_scans){.count = count, .columns = columns, .intensity = intensity};
+    scans->list = spl_alloc(count, sizeof *scans->list, err);
+    if (!scans->list)
+        return SPL_E_NOMEM;
+    spl_stage_begin(stage, "looking at colours", count);
+    for (size_t i = 0; !rc && i < count; i++) {
+        struct spl_cloud *cloud = NULL;
+        struct spl_scan *scan = &scans->list[i];
+        const char *slash = strrchr(inputs[i], '/');
+        if ((rc = spl_cloud_open(inputs[i], &options, &cloud, err)))
+            break;
+        const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+        *scan = (struct spl_scan){.path = inputs[i],
+                                  .name = slash ? slash + 1 : inputs[i],
+                                  .colors = info->colors,
+                                  .coordinates = info->coordinates,
+                                  .attributes = info->attributes,
+                                  .points_expected =
+                                      info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
+                                  .min = {INFINITY, INFINITY, INFINITY},
+                                  .max = {-INFINITY, -INFINITY, -INFINITY}};
+        spl_cloud_destroy(cloud);
+        spl_stage_add(stage, 1, 0);
+    }
+    spl_stage_end(stage);
+    if (rc)
+        spl_scans_finish(scans);
+    else
+        share_intensities(scans);
+    return rc;
+}
+
+void spl_scans_finish(struct spl_scans *scans)
+{
+    free(scans->list);
+    *scans = (struct spl_scans){0};
+}
+
+static void compare_kinds(const struct saying *s)
+{
+    static const char *const what[3] = {"none at all", "RGB", "grey from intensity"};
+    struct group groups[3] = {0}, blank = {0};
+    char text[800] = "";
+    int kinds = 0;
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        for (int from = 0; from < 3; from++)
+            if (scan->points_from[from])
+                add(&groups[from], scan);
+        if (scan->colors.blank && has_points(scan))
+            add(&blank, scan);
+    }
+    for (int k = 0; k < 3; k++) {
+        int from = (k + 1) % 3;
+        size_t used = strlen(text);
+        if (groups[from].count)
+            snprintf(text + used, sizeof text - used, "%s%s in %zu (%s)", kinds++ ? ", " : "", what[from],
+                     groups[from].count, list(&groups[from]));
+    }
+    if (blank.count && s->scans->count > 1)
+        say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", list(&blank));
+    if (kinds > 1)
+        say(s,
+            "the scans' colours are of different kinds: %s. Each was taken as it is, and a seam shows where they meet. "
+            "--intensity takes intensity from all that have it, --cameras the colours of photographs; or pack each "
+            "kind as a dataset of its own",
+            text);
+}
+
+/* Values that mean black and white where the scans do not say so themselves. */
+static void compare_ranges(const struct saying *s)
+{
+    const struct spl_scan *low = NULL, *high = NULL;
+    struct group bits8 = {0}, bits16 = {0};
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        const struct spl_cloud_colors *colors = &scan->colors;
+        if (!colors->guessed || !scan->points_from[colors->from])
+            continue;
+        if (colors->from == SPL_COLORS_RGB) {
+            add(colors->white > 255 ? &bits16 : &bits8, scan);
+            continue;
+        }
+        low = !low || colors->white < low->colors.white ? scan : low;
+        high = !high || colors->white > high->colors.white ? scan : high;
+    }
+    if (bits8.count && bits16.count)
+        say(s,
+            "colours are 8 bit, none above 255, in %zu (%s) and 16 bit in %zu (%s): each was taken by its own range. "
+            "If the former are only dark, write all of them with 8 bit first",
+            bits8.count, list(&bits8), bits16.count, list(&bits16));
+    if (low && (low->colors.white < high->colors.white || low->colors.black > high->colors.black))
+        say(s,
+            "intensities differ in range, from %g..%g in %s to %g..%g in %s: each scan was made grey by its own, and "
+            "its brightness does not compare. Write all of them in one unit to avoid that",
+            low->colors.black, low->colors.white, low->name, high->colors.black, high->colors.white, high->name);
+}
+
+static void compare_attributes(const struct saying *s)
+{
+    static const struct {
+        uint32_t attribute;
+        const char *what, *done;
+    } rows[] = {{SPL_CLOUD_NORMAL, "normals", "estimated"}, {SPL_CLOUD_CLASS, "classes", "0"}};
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        struct group with = {0}, without = {0};
+        for (size_t i = 0; i < s->scans->count; i++)
+            if (has_points(&s->scans->list[i]))
+                add(s->scans->list[i].attributes & rows[r].attribute ? &with : &without, &s->scans->list[i]);
+        if (with.count && without.count)
+            say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count, list(&with),
+                list(&without), rows[r].done);
+    }
+}
+
+static void name_system(const struct spl_cloud_coordinates *c, char text[96])
+{
+    if (c->epsg)
+        snprintf(text, 96, "EPSG %u", c->epsg);
+    else
+        snprintf(text, 96, "%s", c->name);
+}
+
+/* The first scan that says something against each other one; one sentence a kind is enough. */
+static void compare_systems(const struct saying *s)
+{
+    const struct spl_scan *of[3] = {NULL};
+    bool said[3] = {false};
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        const struct spl_cloud_coordinates *c = &scan->coordinates, *f;
+        bool says[3] = {c->epsg || c->name[0], c->unit_m > 0, c->step[0] > 0};
+        for (int k = 0; k < 3; k++)
+            of[k] = of[k] || !says[k] ? of[k] : scan;
+        if (says[0] && !said[0]) {
+            f = &of[0]->coordinates;
+            /* a number and a name may mean the same */
+            if ((f->epsg && c->epsg && f->epsg != c->epsg) || (f->name[0] && c->name[0] && strcmp(f->name, c->name))) {
+                char a[96], b[96];
+                name_system(f, a);
+                name_system(c, b);
+                say(s,
+                    "%s and %s name different coordinate systems (%s, %s): nothing was converted. Bring all scans into "
+                    "one system first",
+                    of[0]->name, scan->name, a, b);
+                said[0] = true;
+            }
+        }
+        if (says[1] && !said[1] && fabs(of[1]->coordinates.unit_m / c->unit_m - 1) > 1e-9) {
+            say(s, "a unit of %s is %.9g m, of %s %.9g m: nothing was converted. Bring all scans into one unit first",
+                of[1]->name, of[1]->coordinates.unit_m, scan->name, c->unit_m);
+            said[1] = true;
+        }
+        for (int k = 0; k < 3 && says[2] && !said[2]; k++) {
+            double ratio = c->step[k] / of[2]->coordinates.step[k];
+            if (!(ratio >= like_steps) && !(ratio <= 1 / like_steps))
+                continue;
+            say(s, "coordinates of %s are multiples of %g, of %s of %g: the coarser scan is no finer than that",
+                of[2]->name, of[2]->coordinates.step[k], scan->name, c->step[k]);
+            said[2] = true;
+        }
+    }
+}
+
+static double diagonal(const struct spl_scan *a)
+{
+    return sqrt(pow(a->max[0] - a->min[0], 2) + pow(a->max[1] - a->min[1], 2) + pow(a->max[2] - a->min[2], 2));
+}
+
+/* Between two boxes. */
+static double gap(const struct spl_scan *a, const struct spl_scan *b)
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        double apart = fmax(fmax(a->min[k] - b->max[k], b->min[k] - a->max[k]), 0);
+        square += apart * apart;
+    }
+    return sqrt(square);
+}
+
+/* Each scan against all others: of the thousands that a street may have, that is still nothing beside reading them. */
+static void compare_places(const struct saying *s)
+{
+    struct group empty = {0}, far = {0};
+    double farthest = 0;
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        double nearest = INFINITY, size = diagonal(scan);
+        if (!has_points(scan)) {
+            add(&empty, scan);
+            continue;
+        }
+        for (size_t k = 0; k < s->scans->count; k++) {
+            const struct spl_scan *other = &s->scans->list[k];
+            if (k == i || !has_points(other))
+                continue;
+            nearest = fmin(nearest, gap(scan, other));
+            size = fmax(size, diagonal(other));
+        }
+        if (isfinite(nearest) && nearest > far_diagonals * size) {
+            add(&far, scan);
+            farthest = fmax(farthest, nearest);
+        }
+    }
+    if (empty.count)
+        say(s, "no usable point in %zu (%s)", empty.count, list(&empty));
+    if (far.count)
+        say(s,
+            "scans lie far apart: %.4g from the nearest other one (%s). They may be in different coordinates; if not, "
+            "pack them as datasets of their own, since the first view and the levels of detail span the gap",
+            farthest, list(&far));
+}
+
+void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context, const char *text), void *context)
+{
+    const struct saying saying = {scans, warn, context};
+    compare_kinds(&saying);
+    compare_ranges(&saying);
+    compare_attributes(&saying);
+    compare_systems(&saying);
+    compare_places(&saying);
+}
+
+json_t *spl_scans_describe(const struct spl_scans *scans)
+{
+    static const char *const names[3] = {"constant", "rgb", "intensity"};
+    json_t *all = json_array();
+    for (size_t i = 0; i < scans->count; i++) {
+        const struct spl_scan *scan = &scans->list[i];
+        for (int from = 0; from < 3; from++)
+            if (scan->points_from[from] || (from == (int)scan->colors.from && !has_points(scan)))
+                json_array_append_new(all,
+                                      json_pack("{s:o, s:s, s:I}", "source", json_string_nocheck(scan->name), "from",
+                                                names[from], "points", (json_int_t)scan->points_from[from]));
+    }
+    return all;
+}

@@ -1,0 +1,41 @@
+/* The inputs of a pack side by side: what each holds, in what they disagree, and where the dataset's colours come from.
+ */
+#ifndef SPL_PACK_SCANS_H
+#define SPL_PACK_SCANS_H
+
+#include <jansson.h>
+
+#include "cloud/cloud.h"
+#include "pack/stage.h"
+
+struct spl_scan {
+    const char *path, *name;        /* borrowed; the name is the path's last part */
+    struct spl_cloud_colors colors; /* as they are taken; intensities of like range share one over all scans */
+    struct spl_cloud_coordinates coordinates;
+    uint32_t attributes;      /* enum spl_cloud_attribute */
+    uint64_t points_expected; /* of the header, or a guess by the file's size */
+    uint64_t points_from[3];  /* that were read, by struct spl_cloud_colors.from */
+    double min[3], max[3];    /* of their coordinates; nothing while there is no point */
+};
+
+struct spl_scans {
+    struct spl_scan *list; // owned
+    size_t count;
+    const char *columns; /* as of struct spl_cloud_options */
+    bool intensity;      /* likewise */
+};
+
+/* Opens each scan once, so that one that cannot be read is refused before hours of work, and decides how colours are
+ * taken. Points are counted by spl_points_gather(). On failure nothing is held. Blocks. */
+int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
+                   bool intensity, struct spl_stage *stage, struct spl_error *err);
+void spl_scans_finish(struct spl_scans *scans);
+
+/* Hands out what a user may not know and would see: scans that disagree in colours, attributes or coordinates, that
+ * hold no point, or lie far from the others. Says what was done and how to avoid it. For after reading. */
+void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context, const char *text), void *context);
+
+/* META's "color". NULL when memory is refused. */
+json_t *spl_scans_describe(const struct spl_scans *scans);
+
+#endif

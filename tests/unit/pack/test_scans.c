@@ -1,0 +1,302 @@
+/* Scans that disagree: what is said of each pair, what is made of their colours, what the dataset remembers. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <splatd/pack.h>
+
+#include "dataset/chunk.h"
+#include "dataset/dataset.h"
+
+static char folder[] = "/tmp/splatd-scans-XXXXXX";
+static char said[8192];
+
+static char *path_of(const char *name)
+{
+    static char paths[8][512];
+    static int next;
+    char *path = paths[next++ % 8];
+    snprintf(path, 512, "%s/%s", folder, name);
+    return path;
+}
+
+/* An ASCII PLY of a 10 x 10 grid from (x, 0, 0) on; `value` of its `properties` is put behind each point. */
+static char *write_ply(const char *name, double x, const char *properties, const char *value)
+{
+    char *path = path_of(name), text[512];
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fprintf(f, "ply\nformat ascii 1.0\nelement vertex 100\nproperty double x\nproperty double y\nproperty double z\n");
+    snprintf(text, sizeof text, "%s", properties);
+    for (char *p = strtok(text, ","); p; p = strtok(NULL, ","))
+        fprintf(f, "property %s\n", p);
+    fprintf(f, "end_header\n");
+    for (int i = 0; i < 100; i++) {
+        fprintf(f, "%.17g %d 0 ", x + i % 10, i / 10);
+        fprintf(f, value, i);
+        fprintf(f, "\n");
+    }
+    assert_int_equal(fclose(f), 0);
+    return path;
+}
+
+static void put(uint8_t *p, uint64_t value, unsigned bytes)
+{
+    for (unsigned i = 0; i < bytes; i++)
+        p[i] = (uint8_t)(value >> 8 * i);
+}
+
+static void put_double(uint8_t *p, double value)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put(p, bits, 8);
+}
+
+struct las {
+    double scale;
+    unsigned epsg, unit; /* GeoTIFF keys; 0 = none */
+    const char *wkt;     /* NULL = none */
+    unsigned red, count; /* of point i: red * i */
+};
+
+/* LAS 1.2, format 2, on the same grid. */
+static char *write_las(const char *name, const struct las *las)
+{
+    static uint8_t b[8192];
+    char *path = path_of(name);
+    size_t keys = las->epsg || las->unit ? 54 + 8 + 16 : 0, wkt = las->wkt ? 54 + strlen(las->wkt) : 0;
+    size_t points = 227 + keys + wkt, length = points + 26 * las->count;
+    assert_true(length <= sizeof b);
+    memset(b, 0, sizeof b);
+    memcpy(b, "LASF", 4);
+    b[24] = 1;
+    b[25] = 2;
+    put(b + 94, 227, 2);
+    put(b + 96, points, 4);
+    put(b + 100, (keys > 0) + (wkt > 0), 4);
+    b[104] = 2;
+    put(b + 105, 26, 2);
+    put(b + 107, las->count, 4);
+    for (int k = 0; k < 3; k++)
+        put_double(b + 131 + 8 * k, las->scale);
+    if (keys) {
+        uint8_t *v = b + 227;
+        memcpy(v + 2, "LASF_Projection", 15);
+        put(v + 18, 34735, 2);
+        put(v + 20, 24, 2);
+        put(v + 54, 1, 2);
+        put(v + 60, 2, 2);
+        put(v + 62, 3072, 2);
+        put(v + 68, las->epsg ? las->epsg : 32767, 2);
+        put(v + 70, 3076, 2);
+        put(v + 76, las->unit, 2);
+    }
+    if (wkt) {
+        uint8_t *v = b + 227 + keys;
+        memcpy(v + 2, "LASF_Projection", 15);
+        put(v + 18, 2112, 2);
+        put(v + 20, strlen(las->wkt), 2);
+        memcpy(v + 54, las->wkt, strlen(las->wkt));
+    }
+    for (unsigned i = 0; i < las->count; i++) {
+        uint8_t *p = b + points + 26 * (size_t)i;
+        put(p, (uint64_t)(i % 10 / las->scale + 0.5), 4);
+        put(p + 4, (uint64_t)(i / 10 / las->scale + 0.5), 4);
+        put(p + 12, 100 + i, 2);
+        for (int k = 0; k < 3; k++)
+            put(p + 20 + 2 * k, (uint64_t)las->red * i, 2);
+    }
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(b, 1, length, f), length);
+    assert_int_equal(fclose(f), 0);
+    return path;
+}
+
+static void listen(void *context, const char *text)
+{
+    size_t used = strlen(said);
+    (void)context;
+    snprintf(said + used, sizeof said - used, "%s\n", text);
+}
+
+/* What is said while `a` and `b` (may be NULL) are packed; the dataset stays open in *out unless that is NULL. */
+static const char *pack_two(const char *a, const char *b, bool intensity, struct spl_dataset **out)
+{
+    const char *inputs[2] = {a, b}, *output = path_of("out.spld");
+    struct spl_pack_options options = {.inputs = inputs,
+                                       .input_count = b ? 2 : 1,
+                                       .output = output,
+                                       .intensity = intensity,
+                                       .threads = 1,
+                                       .warn = listen};
+    struct spl_error err = {0};
+    said[0] = 0;
+    if (spl_pack(&options, NULL, &err) || (out && spl_dataset_open(output, true, out, &err)))
+        fail_msg("%s", err.message);
+    return said;
+}
+
+static const char *grey_fields = "float intensity", *rgb_fields = "uchar red,uchar green,uchar blue";
+
+static void test_agreement_says_nothing(void **state)
+{
+    (void)state;
+    assert_string_equal(pack_two(write_ply("a.ply", 0, rgb_fields, "%d 9 9"), NULL, false, NULL), "");
+    assert_string_equal(pack_two(path_of("a.ply"), write_ply("b.ply", 10, rgb_fields, "9 %d 9"), false, NULL), "");
+    assert_string_equal(
+        pack_two(write_ply("c.ply", 0, grey_fields, "%d"), write_ply("d.ply", 10, grey_fields, "1%02d"), false, NULL),
+        "");
+}
+
+static void test_kinds_are_said_and_remembered(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset;
+    char *a = write_ply("a.ply", 0, "uchar red,uchar green,uchar blue,float intensity", "%1$d 9 9 %1$d");
+    char *b = write_ply("b.ply", 10, grey_fields, "%d"), *c = write_ply("c.ply", 10, "", "");
+    const char *text = pack_two(a, b, false, &dataset);
+    assert_non_null(strstr(text, "RGB in 1 (a.ply), grey from intensity in 1 (b.ply)"));
+    assert_non_null(strstr(text, "--intensity"));
+    const json_t *color = json_object_get(spl_dataset_get_meta(dataset), "color");
+    char *dump = json_dumps(color, JSON_COMPACT);
+    assert_string_equal(dump, "[{\"source\":\"a.ply\",\"from\":\"rgb\",\"points\":100},"
+                              "{\"source\":\"b.ply\",\"from\":\"intensity\",\"points\":100}]");
+    free(dump);
+    spl_dataset_close(dataset);
+    assert_string_equal(pack_two(a, b, true, &dataset), ""); /* the way out that was named */
+    color = json_object_get(spl_dataset_get_meta(dataset), "color");
+    assert_string_equal(json_string_value(json_object_get(json_array_get(color, 0), "from")), "intensity");
+    spl_dataset_close(dataset);
+    assert_non_null(strstr(pack_two(b, c, true, NULL), "intensity in 1 (b.ply), none at all in 1 (c.ply)"));
+}
+
+/* Stations of one PTX: with colours, without. */
+static void test_one_file_may_disagree_with_itself(void **state)
+{
+    (void)state;
+    char *path = path_of("both.ptx");
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    for (int station = 0; station < 2; station++) {
+        fprintf(f, "10\n10\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+        for (int i = 0; i < 100; i++)
+            fprintf(f, station ? "%d %d 1 0.5\n" : "%d %d 0 0.5 10 20 30\n", 1 + i % 10, i / 10);
+    }
+    assert_int_equal(fclose(f), 0);
+    assert_non_null(
+        strstr(pack_two(path, NULL, false, NULL), "RGB in 1 (both.ptx), grey from intensity in 1 (both.ptx)"));
+    assert_string_equal(pack_two(path, NULL, true, NULL), "");
+}
+
+/* The same intensity is the same grey in both tiles, though the one holds only dark ground. */
+static void test_intensities_share_a_scale(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset;
+    struct spl_splat splat;
+    char *dark = write_ply("dark.ply", 0, grey_fields, "%d"), *light = write_ply("light.ply", 10, grey_fields, "3%02d");
+    assert_string_equal(pack_two(dark, light, false, &dataset), "");
+    unsigned most_dark = 0, least_light = 255;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    for (uint32_t id = 0; id < info->splats; id++) {
+        assert_true(spl_dataset_find_splat(dataset, id, &splat));
+        uint32_t count;
+        (void)spl_dataset_get_nodes(dataset, &count);
+        assert_int_equal(count, 1); /* positions are relative to the one node, which begins at x = 0 */
+        bool is_dark = splat.position[0] < 9.5f;
+        if (is_dark && splat.color[0] > most_dark)
+            most_dark = splat.color[0];
+        if (!is_dark && splat.color[0] < least_light)
+            least_light = splat.color[0];
+    }
+    assert_in_range(most_dark, 55, 70); /* 98 of 1..398; by its own range it were 255 */
+    assert_in_range(least_light, 180, 200);
+    spl_dataset_close(dataset);
+    char *fine = write_ply("fine.ply", 10, grey_fields, "6%03d");
+    assert_non_null(strstr(pack_two(dark, fine, false, NULL), "intensities differ in range, from 1..98 in dark.ply to "
+                                                              "6001..6098 in fine.ply"));
+}
+
+static void test_ranges_of_colours(void **state)
+{
+    (void)state;
+    struct las bits8 = {0.001, 0, 0, NULL, 2, 100}, bits16 = {0.001, 0, 0, NULL, 600, 100},
+               black = {0.001, 0, 0, NULL, 0, 100};
+    const char *text = pack_two(write_las("8.las", &bits8), write_las("16.las", &bits16), false, NULL);
+    assert_non_null(strstr(text, "colours are 8 bit, none above 255, in 1 (8.las) and 16 bit in 1 (16.las)"));
+    text = pack_two(path_of("16.las"), write_las("black.las", &black), false, NULL);
+    assert_non_null(strstr(text, "nothing but 0 in black.las"));
+    assert_non_null(strstr(text, "RGB in 1 (16.las), grey from intensity in 1 (black.las)"));
+}
+
+static void test_attributes_and_places(void **state)
+{
+    (void)state;
+    struct las none = {0.001, 0, 0, NULL, 2, 0}, some = {0.001, 0, 0, NULL, 2, 100};
+    char *plain = write_ply("a.ply", 0, rgb_fields, "%d 9 9"),
+         *far = write_ply("far.ply", 100000, rgb_fields, "%d 9 9");
+    char *normals =
+        write_ply("n.ply", 10, "uchar red,uchar green,uchar blue,float nx,float ny,float nz", "%d 9 9 0 0 1");
+    assert_non_null(
+        strstr(pack_two(plain, normals, false, NULL), "normals are given in 1 (n.ply), in the others (a.ply)"));
+    assert_non_null(
+        strstr(pack_two(plain, far, false, NULL), "far apart: 9.999e+04 from the nearest other one (a.ply, "));
+    write_las("some.las", &some);
+    assert_non_null(strstr(pack_two(path_of("some.las"), write_las("none.las", &none), false, NULL),
+                           "no usable point in 1 (none.las)"));
+    assert_non_null(
+        strstr(pack_two(path_of("a.ply"), path_of("some.las"), false, NULL), "classes are given in 1 (some.las)"));
+}
+
+static void test_coordinate_systems(void **state)
+{
+    (void)state;
+    static const struct {
+        struct las a, b;
+        const char *said; /* NULL: nothing */
+    } rows[] = {
+        {{0.001, 25832, 9001, NULL, 2, 100}, {0.001, 25832, 9001, NULL, 2, 100}, NULL},
+        {{0.001, 25832, 0, NULL, 2, 100}, {0.001, 25833, 0, NULL, 2, 100}, "(EPSG 25832, EPSG 25833): nothing was"},
+        {{0.001, 0, 9001, NULL, 2, 100}, {0.001, 0, 9003, NULL, 2, 100}, "of b.las 0.30480061 m"},
+        {{0.001, 0, 0, "PROJCS[\"Here\",GEOGCS[]]", 2, 100},
+         {0.001, 0, 0, "PROJCS[\"There\",GEOGCS[]]", 2, 100},
+         "(Here, There)"},
+        {{0.001, 25832, 0, NULL, 2, 100}, {0.001, 0, 0, "PROJCS[\"ETRS89 / UTM 32N\"]", 2, 100}, NULL},
+        {{0.001, 0, 0, NULL, 2, 100}, {0.001, 25832, 0, NULL, 2, 100}, NULL},
+        {{0.001, 0, 0, "PROJCS[\"no end", 2, 100}, {0.001, 0, 0, "nothing", 2, 100}, NULL},
+        {{0.001, 0, 0, NULL, 2, 100}, {0.01, 0, 0, NULL, 2, 100}, "multiples of 0.001, of b.las of 0.01"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const char *text = pack_two(write_las("a.las", &rows[i].a), write_las("b.las", &rows[i].b), false, NULL);
+        if (rows[i].said ? !strstr(text, rows[i].said) : *text)
+            fail_msg("row %zu: %s", i, text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_agreement_says_nothing),
+        cmocka_unit_test(test_kinds_are_said_and_remembered),
+        cmocka_unit_test(test_one_file_may_disagree_with_itself),
+        cmocka_unit_test(test_intensities_share_a_scale),
+        cmocka_unit_test(test_ranges_of_colours),
+        cmocka_unit_test(test_attributes_and_places),
+        cmocka_unit_test(test_coordinate_systems),
+    };
+    if (!mkdtemp(folder))
+        return 1;
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    char command[600];
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    return system(command) ? 1 : failed;
+}
