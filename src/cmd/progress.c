@@ -1,4 +1,4 @@
-/* Progress lines: "stage  42 %  1.2 M/s  3 s left, 50 s in all", rewritten in place on a terminal. A log gets two plain
+/* Progress lines: "stage  42 %  1.2 M/s  3 s left, 50 s until all is done", rewritten in place on a terminal. A log gets two plain
  * lines a stage instead and one every ten seconds, so that it stays readable and short, and nobody takes work for a
  * hang. A stage ends where the next begins or the work is over. */
 #include "cmd/progress.h"
@@ -62,7 +62,7 @@ static void print_line(const struct spl_cmd_progress *state, const struct spl_pr
     if (p->rate > 0 && p->total > p->done)
         fprintf(stderr, "  %s left", rough((double)(p->total - p->done) / p->rate, text));
     if (p->left_s > 0)
-        fprintf(stderr, "  %s in all", rough(p->left_s, text));
+        fprintf(stderr, ", %s until all is done", rough(p->left_s, text));
 }
 
 void spl_cmd_progress(void *context, const struct spl_progress *progress)

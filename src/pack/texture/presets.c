@@ -5,7 +5,7 @@
 static const struct spl_texture_settings presets[SPL_TEXTURE_PRESET_COUNT] = {
     [SPL_TEXTURE_DRAFT] = {.quality = 36, .texels_max = 16, .dictionary = 1024, .epochs = 2, .sample = 1 << 16},
     [SPL_TEXTURE_NORMAL] = {.quality = 40, .texels_max = 32, .dictionary = 4096},
-    [SPL_TEXTURE_BEST] = {.quality = 43, .texels_max = 32, .dictionary = 8192},
+    [SPL_TEXTURE_BEST] = {.quality = 43, .texels_max = 32, .dictionary = 4096},
 };
 
 struct spl_texture_settings spl_texture_settings_get(const struct spl_photo_options *options)
