@@ -184,7 +184,7 @@ static int init_loop(struct spl_service *service, struct spl_error *err)
     int rc = uv_loop_init(&service->loop);
     if (rc)
         return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
-    spl_turns_watch(&service->turns, &service->loop);
+    spl_loop_turns_watch(&service->loop_turns, &service->loop);
     uv_async_init(&service->loop, &service->wake, on_wake);
     service->wake.data = service;
     for (size_t i = 0; i < sizeof timers / sizeof *timers; i++) {

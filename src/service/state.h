@@ -11,7 +11,7 @@
 #include "service/datasets/catalog.h"
 #include "service/ops/access_log.h"
 #include "service/ops/latency.h"
-#include "service/ops/turns.h"
+#include "service/ops/loop_turns.h"
 #include "service/service.h"
 #include "service/view/cache.h"
 #include "service/view/pipeline.h"
@@ -126,7 +126,7 @@ struct spl_service {
     int ops_fd;    /* passed by the supervisor; -1 = none, or once MHD has it */
 
     uv_loop_t loop;
-    struct spl_turns turns;
+    struct spl_loop_turns loop_turns;
     uv_async_t wake;
     uv_signal_t signals[2], hangup;
     uv_poll_t http_poll;

@@ -439,14 +439,21 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             d.wait_exit()
         files = {f.name: f.stat().st_ino for f in (folder / tour["name"]).iterdir() if f.name[0] != "."}
         assert 15 <= len(files) - 1 < 60, files
-        (folder / "0123456789abcdef").mkdir()  # not understood: left alone, and said so
+        (folder / "0123456789abcdef").mkdir()  # not understood: a tour that has failed
         (folder / "0123456789abcdef" / "tour.json").write_text("{}")
+        (folder / "0123456789abcdef" / "000000.jpg").write_bytes(b"x" * 5000)
         (folder / "00000000000000aa").mkdir()  # a crash while it began
         (folder / ".fedcba9876543210").mkdir()  # half removed
         with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:  # ended by SIGTERM, a stream open
             [stream], _ = watch(d, [tour["events"]])
             eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > len(files))
-            assert any("0123456789abcdef is left alone" in line for line in d.lines)
+            assert any("0123456789abcdef is not understood" in line for line in d.lines)
+            odd = d.ask("/v1/tours/0123456789abcdef").json()
+            assert odd["state"] == "failed" and "tour.json" in odd["error"] and odd["bytes"] == 5002, odd
+            for leaf in ("events", "stream", "frames.zip", "frames/0"):
+                assert d.ask(f"/v1/tours/0123456789abcdef/{leaf}").status in (200, 404)
+            assert d.ask("/v1/tours/0123456789abcdef", "DELETE").status == 204
+            eventually(lambda: not (folder / "0123456789abcdef").exists())
             assert d.stop() == 0
             stream.join(60)
         with Daemon(FAKE, "--tours", str(folder)) as d:
@@ -458,7 +465,18 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert not (folder / ".fedcba9876543210").exists() and not (folder / "00000000000000aa").exists()
         with Daemon(FAKE, "--tours", str(folder)) as d:  # done is done
             assert d.ask(tour["uri"]).json() == tour and frames_of(d, tour)[:2] == wanted[:2]
-            shutil.rmtree(folder / "0123456789abcdef")
+
+
+def test_what_is_not_understood_counts_against_the_quota():
+    with Folder() as folder:
+        (folder / "0123456789abcdef").mkdir()
+        (folder / "0123456789abcdef" / "tour.json").write_bytes(b"[" * (3 << 20))  # as an older version left one
+        with Daemon(FAKE, "--tours", str(folder), "--tour-disk", "2M") as d:
+            reply = d.post(body(3), TOURS)
+            assert reply.status == 503 and "remove some" in reply.json()["detail"], reply.body
+            assert [tour["name"] for tour in d.ask("/v1/tours").json()["tours"]] == ["0123456789abcdef"]
+            assert d.ask("/v1/tours/0123456789abcdef", "DELETE").status == 204
+            ended(d, begin(d, body(3))["uri"])
 
 
 def test_a_lost_device_does_not_end_a_tour():

@@ -152,7 +152,7 @@ char *spl_prometheus_print(struct spl_service *service)
     print_pipeline(out, service);
     print_process(out, service);
     print_counters(out, &service->counters);
-    spl_turns_print(&service->turns, out);
+    spl_loop_turns_print(&service->loop_turns, out);
     spl_latency_print(&service->latencies, out);
     bool failed = ferror(out);
     if (fclose(out) || failed) {

@@ -1,8 +1,8 @@
 /* tour.json, and a tour from its folder.
  *
  * tour.json says what the frames are, so that a finished tour can be served after its dataset has gone; the body that
- * was accepted is parsed again only when frames are still to be made. A folder that is not understood is left alone and
- * named in the log. Loop's thread, at start. */
+ * was accepted is parsed again only when frames are still to be made. A folder that is not understood is a tour that
+ * has failed, so that it is listed, counted against the quota, and removed like any other. Any thread, at start. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 
 #include "base/clock.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "geom/camera_path.h"
 #include "service/tour/tour.h"
@@ -171,41 +172,81 @@ static int look_at_files(struct spl_tour *tour, struct spl_error *err)
     return 0;
 }
 
-int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err)
+/* What stands for a folder whose tour.json says nothing that we understand. */
+static int stand_in(struct spl_tour *tour, const struct spl_error *why, struct spl_error *err)
+{
+    char path[4096];
+    struct stat status;
+    snprintf(path, sizeof path, "%s/%s", tour->tours->directory, tour->name);
+    DIR *dir = opendir(path);
+    if (!dir || fstat(dirfd(dir), &status)) {
+        spl_fail_errno(err, errno, "%s: cannot be listed", path);
+        if (dir)
+            closedir(dir);
+        return SPL_E_IO;
+    }
+    free(tour->body);
+    free(tour->frames);
+    tour->body = NULL;
+    tour->frames = NULL;
+    tour->body_length = tour->frames_done = 0;
+    tour->spec = (struct spl_tour_spec){.view.view.layers = 1};
+    strcpy(tour->dataset, "");
+    strcpy(tour->version, "0000000000000000");
+    tour->state = SPL_TOUR_FAILED;
+    tour->failure = *why;
+    tour->created_s = tour->ended_s = status.st_mtim.tv_sec;
+    tour->bytes = tour->state_bytes = 0;
+    for (struct dirent *item; (item = readdir(dir));)
+        if (!fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW) && S_ISREG(status.st_mode))
+            tour->bytes += (uint64_t)status.st_size;
+    closedir(dir);
+    return 0;
+}
+
+/* Fills the tour from its folder. SPL_E_NOT_FOUND: a crash while it began. */
+static int read_tour(struct spl_tour *tour, struct spl_error *err)
 {
     uint8_t *bytes = NULL;
     size_t length;
     json_t *json = NULL;
     json_error_t where;
+    int rc =
+        spl_tour_store_read(tour->tours->directory, tour->name, "tour.json", state_bytes_max, &bytes, &length, err);
+    if (!rc && !(json = json_loadb((const char *)bytes, length, JSON_REJECT_DUPLICATES, &where)))
+        rc = spl_fail(err, SPL_E_CORRUPT, "tour.json: line %d: %s", where.line, where.text);
+    if (!rc)
+        rc = from_json(tour, json, err);
+    if (!rc && !(tour->frames = spl_alloc(tour->spec.frames, 1, err)))
+        rc = SPL_E_NOMEM;
+    tour->bytes = tour->state_bytes = rc ? 0 : length;
+    free(bytes);
+    json_decref(json);
+    return rc ? rc : look_at_files(tour, err);
+}
+
+int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err)
+{
     struct spl_tour *tour = spl_alloc(1, sizeof *tour, err);
-    int rc = tour ? spl_tour_store_read(tours->directory, name, "tour.json", state_bytes_max, &bytes, &length, err)
-                  : SPL_E_NOMEM;
-    if (rc)
-        goto done;
+    struct spl_error why = {0};
+    if (!tour)
+        return SPL_E_NOMEM;
     tour->tours = tours;
     strcpy(tour->name, name);
-    if (!(json = json_loadb((const char *)bytes, length, JSON_REJECT_DUPLICATES, &where))) {
-        rc = spl_fail(err, SPL_E_CORRUPT, "tour.json: line %d: %s", where.line, where.text);
-        goto done;
+    int rc = read_tour(tour, &why);
+    if (rc == SPL_E_NOT_FOUND || rc == SPL_E_NOMEM) {
+        spl_fail(err, rc, "%s", why.message);
+    } else if (rc) {
+        spl_log_warn("tour %s is not understood, and kept as one that has failed: %s", name, why.message);
+        rc = stand_in(tour, &why, err);
     }
-    if ((rc = from_json(tour, json, err)))
-        goto done;
-    if (!(tour->frames = spl_alloc(tour->spec.frames, 1, err))) {
-        rc = SPL_E_NOMEM;
-        goto done;
+    if (rc) {
+        spl_tour_free(tour);
+        return rc;
     }
-    tour->bytes = tour->state_bytes = length;
-    if ((rc = look_at_files(tour, err)))
-        goto done;
     int64_t age_s = time(NULL) - tour->ended_s;
     tour->age_s = age_s > 0 ? (uint64_t)age_s : 0; // from here on by a clock that does not jump
     tour->ended_ns = spl_now_ns();
-done:
-    free(bytes);
-    json_decref(json);
-    if (rc)
-        spl_tour_free(tour);
-    else
-        *out = tour;
-    return rc;
+    *out = tour;
+    return 0;
 }

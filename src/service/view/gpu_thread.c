@@ -5,9 +5,8 @@
  * have had alone. Frames of tours have the turns that nobody wants.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets. Versions of datasets are added a page at a time between frames, so
- * that nobody waits for them. More than `rebuilds_max` losses within `rebuild_window_ns` end the process, for its
- * supervisor to decide.
+ * new renderer is made from the mapped datasets (gpu_datasets.c). More than SPL_GPU_REBUILDS_MAX losses within
+ * `rebuild_window_ns` end the process, for its supervisor to decide.
  *
  * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
  * lost, K times in all (1 when left out). */
@@ -18,177 +17,14 @@
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "dataset/dataset.h"
-#include "service/view/key.h"
-#include "service/view/stages.h"
-#include "service/view/turns.h"
+#include "service/view/gpu.h"
 
-enum { rebuilds_max = 3 };
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
-
-struct gpu {
-    struct spl_pipeline *pipeline;
-    struct spl_renderer *renderer;    // may be NULL
-    uint64_t losses_ns[rebuilds_max]; /* times of the latest losses, ring */
-    uint64_t losses;
-    uint64_t frames, inject_every, inject_left, inject_at;
-    struct spl_turns turns;                  /* large views */
-    struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
-    TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
-    uint64_t pages_evicted;                  /* of this renderer, as counted so far */
-};
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
 {
     atomic_store(&pipeline->state, (int)state);
     pipeline->options.wake(pipeline->options.wake_context);
-}
-
-/* Publishes what is on the device; a page that came may have driven out those of any dataset. */
-static void publish_residency(struct gpu *gpu)
-{
-    struct spl_pipeline *pipeline = gpu->pipeline;
-    struct spl_residency_info info;
-    struct spl_catalog_entry *entry;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    {
-        spl_renderer_get_residency(gpu->renderer, entry->dataset, &info);
-        atomic_store(&entry->resident_bytes, info.bytes);
-    }
-    spl_renderer_get_residency(gpu->renderer, NULL, &info);
-    atomic_store(&pipeline->device_bytes, info.taken_bytes);
-    atomic_store(&pipeline->device_limit_bytes, info.limit_bytes);
-    atomic_fetch_add(&pipeline->options.counters->pages_evicted, info.pages_evicted - gpu->pages_evicted);
-    gpu->pages_evicted = info.pages_evicted;
-}
-
-/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place costs its own
- * views only. */
-static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
-{
-    struct spl_error why = {0};
-    bool more = true;
-    int rc = 0;
-    for (uint32_t page = 0; more && !rc && !spl_queue_is_closed(gpu->pipeline->render); page++) {
-        rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, page, &more, &why);
-        spl_pipeline_touch(gpu->pipeline);
-    }
-    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
-        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
-        return 0;
-    }
-    return rc ? spl_fail(err, rc, "%s", why.message) : 0;
-}
-
-static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
-{
-    spl_renderer_remove(gpu->renderer, entry->dataset);
-    TAILQ_REMOVE(&gpu->entries, entry, resident);
-    publish_residency(gpu);
-}
-
-/* Gives back an entry that was to be added; the last unref() need not come here any more. */
-static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
-{
-    entry->err = *why;
-    entry->loading = false;
-    entry->release = NULL;
-    spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
-}
-
-/* What the device has no room for is refused at start, when nobody has asked for it yet; not in a device that is
- * reopened, where requests refer to it: there its views fail, and say why. */
-static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int rc, struct spl_error *err)
-{
-    if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
-        return rc;
-    if (spl_pipeline_get_state(gpu->pipeline) == SPL_PIPELINE_STARTING) {
-        let_entry_go(gpu, entry);
-        refuse_entry(gpu, entry, err);
-    } else {
-        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, err->message);
-    }
-    *err = (struct spl_error){0};
-    return 0;
-}
-
-static int build(struct gpu *gpu, struct spl_error *err)
-{
-    struct spl_pipeline *pipeline = gpu->pipeline;
-    struct spl_catalog_entry *entry, *next;
-    struct spl_renderer_options options = pipeline->options.renderer;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    {
-        size_t bytes = 0;
-        spl_dataset_get_page(entry->dataset, 0, &bytes);
-        if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
-            options.first_page_bytes = bytes + 4;
-    }
-    int rc = spl_renderer_create(&options, &gpu->renderer, err);
-    spl_pipeline_touch(pipeline);
-    if (rc)
-        return rc;
-    gpu->pages_evicted = 0;
-    pthread_mutex_lock(&pipeline->mutex);
-    pipeline->device = *spl_renderer_get_device(gpu->renderer);
-    pthread_mutex_unlock(&pipeline->mutex);
-    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    {
-        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
-        entry->pages_wanted = 0;
-        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
-            return rc;
-    }
-    for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
-        next = TAILQ_NEXT(entry, resident);
-        if (!entry->loading && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
-            return rc;
-    }
-    publish_residency(gpu);
-    return 0;
-}
-
-static void tear_down(struct gpu *gpu)
-{
-    struct spl_catalog_entry *entry;
-    if (!gpu->renderer)
-        return;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    spl_renderer_remove(gpu->renderer, entry->dataset);
-    spl_renderer_destroy(gpu->renderer);
-    gpu->renderer = NULL;
-    atomic_store(&gpu->pipeline->device_bytes, 0);
-}
-
-/* Takes up what the loop wants added and lets go of what nobody refers to any more. */
-static void take_orders(struct gpu *gpu)
-{
-    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
-        if (entry->state == SPL_ENTRY_LEAVING) {
-            let_entry_go(gpu, entry);
-            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
-            continue;
-        }
-        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
-        TAILQ_INSERT_TAIL(&gpu->entries, entry, resident);
-        entry->pages_wanted = 0;
-        entry->loading = true;
-        struct spl_error err = {0};
-        if (spl_renderer_add(gpu->renderer, entry->dataset, &err)) {
-            let_entry_go(gpu, entry);
-            refuse_entry(gpu, entry, &err);
-        }
-    }
-}
-
-static struct spl_catalog_entry *find_loading(struct gpu *gpu)
-{
-    struct spl_catalog_entry *entry;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    if (entry->loading)
-        return entry;
-    return NULL;
 }
 
 /* Takes over what waits beside small views. */
@@ -245,8 +81,8 @@ static void give_up(struct gpu *gpu, const struct spl_error *why)
 /* False when the bound on losses is reached; counts this one. */
 static bool may_rebuild(struct gpu *gpu)
 {
-    uint64_t now = spl_now_ns(), *slot = &gpu->losses_ns[gpu->losses % rebuilds_max];
-    bool allowed = gpu->losses < rebuilds_max || now - *slot > rebuild_window_ns;
+    uint64_t now = spl_now_ns(), *slot = &gpu->losses_ns[gpu->losses % SPL_GPU_REBUILDS_MAX];
+    bool allowed = gpu->losses < SPL_GPU_REBUILDS_MAX || now - *slot > rebuild_window_ns;
     *slot = now;
     gpu->losses++;
     spl_count(gpu->pipeline->options.counters, device_losses);
@@ -262,39 +98,20 @@ static bool recover(struct gpu *gpu, const struct spl_error *why)
     for (;;) {
         spl_log_warn("device lost: %s", err.message);
         refuse_waiting(gpu);
-        tear_down(gpu);
+        spl_gpu_tear_down(gpu);
         if (!may_rebuild(gpu)) {
             struct spl_error last = {0};
             spl_fail(&last, SPL_E_DEVICE_LOST, "the device was lost more than %d times within %d s; last: %.300s",
-                     (int)rebuilds_max, (int)(rebuild_window_ns / SPL_NS_PER_S), err.message);
+                     (int)SPL_GPU_REBUILDS_MAX, (int)(rebuild_window_ns / SPL_NS_PER_S), err.message);
             give_up(gpu, &last);
             return false;
         }
         err = (struct spl_error){0};
-        if (!build(gpu, &err))
+        if (!spl_gpu_build(gpu, &err))
             break;
     }
     spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
     set_state(gpu->pipeline, SPL_PIPELINE_READY);
-    return true;
-}
-
-/* Loads one page of an entry; false when the thread must end. */
-static bool load_page(struct gpu *gpu, struct spl_catalog_entry *entry)
-{
-    bool more;
-    struct spl_error err = {0};
-    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, entry->pages_wanted++, &more, &err);
-    if (rc == SPL_E_DEVICE_LOST)
-        return recover(gpu, &err);
-    publish_residency(gpu);
-    if (rc) {
-        let_entry_go(gpu, entry);
-        refuse_entry(gpu, entry, &err);
-    } else if (!more) {
-        entry->loading = false;
-        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
-    }
     return true;
 }
 
@@ -364,7 +181,7 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     spl_count(pipeline->options.counters, frames);
     follow(&pipeline->frame_ns, job->frame_ns);
     if (job->frame.stats.pages_loaded)
-        publish_residency(gpu);
+        spl_gpu_publish_residency(gpu);
     else
         atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
     job->rendered_ns = spl_now_ns();
@@ -449,15 +266,16 @@ static struct spl_job *choose(struct gpu *gpu, bool idle)
 static void run(struct gpu *gpu)
 {
     for (;;) {
-        take_orders(gpu);
-        struct spl_catalog_entry *loading = find_loading(gpu);
+        struct spl_error err = {0};
+        spl_gpu_take_orders(gpu);
+        struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
         struct spl_job *job = choose(gpu, !loading);
         if (!job && closed)
             break;
         if (job && !serve(gpu, job))
             break;
-        if (loading && !load_page(gpu, loading))
+        if (loading && spl_gpu_load_page(gpu, loading, &err) && !recover(gpu, &err))
             break;
     }
 }
@@ -475,15 +293,13 @@ void *spl_gpu_thread_run(void *argument)
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
-    if (build(&gpu, &err)) {
+    if (spl_gpu_build(&gpu, &err)) {
         give_up(&gpu, &err);
     } else {
         set_state(gpu.pipeline, SPL_PIPELINE_READY);
         run(&gpu);
     }
-    tear_down(&gpu);
-    err = (struct spl_error){.code = SPL_E_CANCELLED, .message = "the service is stopping"};
-    for (struct spl_catalog_entry *entry; (entry = find_loading(&gpu));)
-        refuse_entry(&gpu, entry, &err);
+    spl_gpu_tear_down(&gpu);
+    spl_gpu_refuse_loading(&gpu);
     return NULL;
 }

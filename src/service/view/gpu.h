@@ -1,0 +1,43 @@
+/* What the gpu thread has, and the datasets on its device. Only gpu_thread.c and gpu_datasets.c include it; everything
+ * is owned by that thread. */
+#ifndef SPL_SERVICE_GPU_H
+#define SPL_SERVICE_GPU_H
+
+#include "service/view/stages.h"
+#include "service/view/turns.h"
+
+enum { SPL_GPU_REBUILDS_MAX = 3 };
+
+struct gpu {
+    struct spl_pipeline *pipeline;
+    struct spl_renderer *renderer;            // may be NULL
+    uint64_t losses_ns[SPL_GPU_REBUILDS_MAX]; /* times of the latest losses, ring */
+    uint64_t losses;
+    uint64_t frames, inject_every, inject_left, inject_at;
+    struct spl_turns turns;                  /* large views */
+    struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
+    TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
+    uint64_t pages_evicted;                  /* of this renderer, as counted so far */
+};
+
+/* A renderer with the entries, and their pages on the device. What has no room is refused at start, when nobody has
+ * asked for it yet; later its views fail and say why. */
+int spl_gpu_build(struct gpu *gpu, struct spl_error *err);
+void spl_gpu_tear_down(struct gpu *gpu); /* idempotent; the entries stay */
+
+/* Takes up what the loop wants added and lets go of what nobody refers to any more. */
+void spl_gpu_take_orders(struct gpu *gpu);
+
+/* The entry whose pages are to be loaded next, or NULL. */
+struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
+
+/* Loads one of them and reports the entry with the last. SPL_E_DEVICE_LOST; everything else is the entry's fault. */
+int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err);
+
+/* Gives back what is still to be loaded when the service stops. */
+void spl_gpu_refuse_loading(struct gpu *gpu);
+
+/* Publishes what is on the device; a page that came may have driven out those of any dataset. */
+void spl_gpu_publish_residency(struct gpu *gpu);
+
+#endif

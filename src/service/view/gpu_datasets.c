@@ -1,0 +1,176 @@
+/* Datasets on the gpu thread's device: which ones the renderer knows, their pages, and what has no room. Versions are
+ * added a page at a time between frames, so that nobody waits for them. Owned by the gpu thread. */
+#include "base/log.h"
+#include "dataset/dataset.h"
+#include "service/view/gpu.h"
+#include "service/view/key.h"
+
+void spl_gpu_publish_residency(struct gpu *gpu)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_residency_info info;
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_renderer_get_residency(gpu->renderer, entry->dataset, &info);
+        atomic_store(&entry->resident_bytes, info.bytes);
+    }
+    spl_renderer_get_residency(gpu->renderer, NULL, &info);
+    atomic_store(&pipeline->device_bytes, info.taken_bytes);
+    atomic_store(&pipeline->device_limit_bytes, info.limit_bytes);
+    atomic_fetch_add(&pipeline->options.counters->pages_evicted, info.pages_evicted - gpu->pages_evicted);
+    gpu->pages_evicted = info.pages_evicted;
+}
+
+/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place costs its own
+ * views only. */
+static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    bool more = true;
+    int rc = 0;
+    for (uint32_t page = 0; more && !rc && !spl_queue_is_closed(gpu->pipeline->render); page++) {
+        rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, page, &more, &why);
+        spl_pipeline_touch(gpu->pipeline);
+    }
+    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
+        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
+        return 0;
+    }
+    return rc ? spl_fail(err, rc, "%s", why.message) : 0;
+}
+
+static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    TAILQ_REMOVE(&gpu->entries, entry, resident);
+    spl_gpu_publish_residency(gpu);
+}
+
+/* Gives back an entry that was to be added; the last unref() need not come here any more. */
+static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+{
+    entry->err = *why;
+    entry->loading = false;
+    entry->release = NULL;
+    spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
+}
+
+/* What the device has no room for is refused at start, when nobody has asked for it yet; not in a device that is
+ * reopened, where requests refer to it: there its views fail, and say why. */
+static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int rc, struct spl_error *err)
+{
+    if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
+        return rc;
+    if (spl_pipeline_get_state(gpu->pipeline) == SPL_PIPELINE_STARTING) {
+        let_entry_go(gpu, entry);
+        refuse_entry(gpu, entry, err);
+    } else {
+        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, err->message);
+    }
+    *err = (struct spl_error){0};
+    return 0;
+}
+
+int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
+{
+    struct spl_pipeline *pipeline = gpu->pipeline;
+    struct spl_catalog_entry *entry, *next;
+    struct spl_renderer_options options = pipeline->options.renderer;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        size_t bytes = 0;
+        spl_dataset_get_page(entry->dataset, 0, &bytes);
+        if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
+            options.first_page_bytes = bytes + 4;
+    }
+    int rc = spl_renderer_create(&options, &gpu->renderer, err);
+    spl_pipeline_touch(pipeline);
+    if (rc)
+        return rc;
+    gpu->pages_evicted = 0;
+    pthread_mutex_lock(&pipeline->mutex);
+    pipeline->device = *spl_renderer_get_device(gpu->renderer);
+    pthread_mutex_unlock(&pipeline->mutex);
+    atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    {
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        entry->pages_wanted = 0;
+        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
+            return rc;
+    }
+    for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
+        next = TAILQ_NEXT(entry, resident);
+        if (!entry->loading && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
+            return rc;
+    }
+    spl_gpu_publish_residency(gpu);
+    return 0;
+}
+
+void spl_gpu_tear_down(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    if (!gpu->renderer)
+        return;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    spl_renderer_remove(gpu->renderer, entry->dataset);
+    spl_renderer_destroy(gpu->renderer);
+    gpu->renderer = NULL;
+    atomic_store(&gpu->pipeline->device_bytes, 0);
+}
+
+void spl_gpu_take_orders(struct gpu *gpu)
+{
+    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
+        if (entry->state == SPL_ENTRY_LEAVING) {
+            let_entry_go(gpu, entry);
+            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+            continue;
+        }
+        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
+        TAILQ_INSERT_TAIL(&gpu->entries, entry, resident);
+        entry->pages_wanted = 0;
+        entry->loading = true;
+        struct spl_error err = {0};
+        if (spl_renderer_add(gpu->renderer, entry->dataset, &err)) {
+            let_entry_go(gpu, entry);
+            refuse_entry(gpu, entry, &err);
+        }
+    }
+}
+
+struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu)
+{
+    struct spl_catalog_entry *entry;
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    if (entry->loading)
+        return entry;
+    return NULL;
+}
+
+int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err)
+{
+    bool more;
+    struct spl_error why = {0};
+    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, entry->pages_wanted++, &more, &why);
+    if (rc == SPL_E_DEVICE_LOST)
+        return spl_fail(err, rc, "%s", why.message);
+    spl_gpu_publish_residency(gpu);
+    if (rc) {
+        let_entry_go(gpu, entry);
+        refuse_entry(gpu, entry, &why);
+    } else if (!more) {
+        entry->loading = false;
+        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
+    }
+    return 0;
+}
+
+void spl_gpu_refuse_loading(struct gpu *gpu)
+{
+    struct spl_error err = {.code = SPL_E_CANCELLED, .message = "the service is stopping"};
+    for (struct spl_catalog_entry *entry; (entry = spl_gpu_find_loading(gpu));)
+        refuse_entry(gpu, entry, &err);
+}
