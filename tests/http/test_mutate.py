@@ -8,7 +8,7 @@ import mutate
 from harness import FAKE, REAL, run
 from mutating import wrong_server
 
-SECONDS, SEED = float(os.environ.get("SPLATD_MUTATE_S", 15)), int(os.environ.get("SPLATD_MUTATE_SEED", 1))
+SECONDS, SEED = float(os.environ.get("SPLATD_MUTATE_S", 8)), int(os.environ.get("SPLATD_MUTATE_SEED", 1))
 
 
 def test_the_judge_finds_planted_faults():
