@@ -35,6 +35,9 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
     if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
         if (!connection)
             return;
+        // libmicrohttpd 0.9.75 forgets a request with two errors (its parameters, then its headers do not fit the pool)
+        if (connection->request)
+            spl_request_finish(connection->request, MHD_REQUEST_TERMINATED_WITH_ERROR);
         LIST_REMOVE(connection, link);
         service->connections_open--;
         free(connection);

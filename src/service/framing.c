@@ -1,11 +1,14 @@
 /* Where a request ends. A proxy in front and libmicrohttpd 0.9.75 behind it must not see two ends, or the rest of one
- * client's request becomes the beginning of another's (RFC 9112, 6.3 and 11.2): libmicrohttpd takes the first of
- * several lengths, a coding before a length, and a name with a space in it as one it has never heard of. Such a request
- * is refused once its headers are there, and the connection ends, so that nothing behind them is read.
+ * client's request becomes the beginning of another's (RFC 9112, 5.2, 6.3 and 11.2). libmicrohttpd takes the first of
+ * several lengths and a coding before a length, takes a name with a space in it for one it has never heard of, makes
+ * one name of a name and the line that is folded behind it, cuts a value at a NUL, and takes a line that begins with a
+ * colon for the end of the headers. Such a request is refused once its headers are there, and the connection ends, so
+ * that nothing behind them is read.
  *
- * What cannot be done here, since libmicrohttpd acts before it asks: a value is cut at a NUL; a single length that is
- * no number gets libmicrohttpd's own 400, an HTML page after two heads, and then the connection ends; a bare LF ends a
- * line. Owned by the loop's thread. */
+ * What cannot be done here, since libmicrohttpd acts before it asks: a single length that is no number gets its own
+ * 400, an HTML page after two heads, and then the connection ends; a bare LF ends a line, also one that is a colon
+ * alone. Owned by the loop's thread.
+ */
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -13,6 +16,8 @@
 #include "service/state.h"
 
 struct framing {
+    const char *begin, *end; /* of the request, as libmicrohttpd has cut it into strings; NULL: it is not known to */
+    const char *at;          /* end of the last value */
     unsigned lengths, codings;
     const char *coding;
     char fault[160]; /* "" while there is none */
@@ -36,13 +41,39 @@ static bool begins_longer(const char *name, size_t length, const char *framing)
     return length > strlen(framing) && !strncasecmp(name, framing, strlen(framing));
 }
 
+static bool is_blank(const char *from, const char *to, const char *allowed)
+{
+    for (; from < to; from++)
+        if (*from && !strchr(allowed, *from))
+            return false;
+    return true;
+}
+
+/* Does nothing but line ends lie between the last value and this header, and blanks between its name and its value?
+ * Versions of libmicrohttpd whose strings lie elsewhere are not looked at. */
+static bool follows(struct framing *framing, const char *name, size_t name_length, const char *value,
+                    size_t value_length)
+{
+    if (!framing->begin)
+        return true;
+    if (name < framing->begin || !value || value < name + name_length || value + value_length > framing->end)
+        return false; // folded: it was put together elsewhere
+    bool plain = (!framing->at || (name > framing->at && is_blank(framing->at, name, ""))) &&
+                 is_blank(name + name_length, value, " \t");
+    framing->at = value + value_length;
+    return plain;
+}
+
 static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *name, size_t name_length,
                             const char *value, size_t value_length)
 {
     (void)kind;
-    (void)value_length;
     struct framing *framing = context;
-    if (!is_token(name, name_length)) {
+    if (!follows(framing, name, name_length, value, value_length)) {
+        framing->field = "headers";
+        snprintf(framing->fault, sizeof framing->fault,
+                 "a header is folded, holds a NUL, or stands behind a line that has no name");
+    } else if (!is_token(name, name_length)) {
         framing->field = "headers";
         snprintf(framing->fault, sizeof framing->fault,
                  "a header's name holds a space or another character that none has");
@@ -79,10 +110,22 @@ static void judge(struct framing *framing, const char *version)
         snprintf(framing->fault, sizeof framing->fault, "%s", why);
 }
 
-bool spl_check_framing(struct request *request, const char *version)
+bool spl_check_framing(struct request *request, const char *line, const char *version)
 {
+    static const char cut_in_place[] = "0.9.75"; // the version whose way with the buffer was read
     struct framing framing = {0};
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(request->handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    if (info && !strcmp(MHD_get_version(), cut_in_place)) {
+        framing.begin = line;
+        framing.end = line + info->header_size;
+    }
     MHD_get_connection_values_n(request->handle, MHD_HEADER_KIND, look, &framing);
+    // behind the last value: its line's end and an empty line; with another character a name of none was there
+    if (!framing.fault[0] && framing.at && (framing.end > framing.at + 4 || !is_blank(framing.at, framing.end, ""))) {
+        framing.field = "headers";
+        snprintf(framing.fault, sizeof framing.fault, "a line of the headers has no name");
+    }
     if (!framing.fault[0])
         judge(&framing, version);
     if (!framing.fault[0])

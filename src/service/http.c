@@ -31,10 +31,12 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     request->service = service;
     request->handle = handle;
     request->connection = info->socket_context;
+    request->connection->request = request;
     request->began_ns = spl_now_ns();
     request->query = "";
     size_t length = strnlen(uri, uri_max + 1);
     if (length <= uri_max && !(request->uri = strdup(uri))) {
+        request->connection->request = NULL;
         free(request);
         return NULL;
     }
@@ -51,24 +53,28 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     return request;
 }
 
-static void on_completed(void *context, struct MHD_Connection *handle, void **request_context,
-                         enum MHD_RequestTerminationCode code)
+void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode code)
 {
-    (void)handle;
-    struct spl_service *service = context;
-    struct request *request = *request_context;
-    if (!request)
-        return;
     spl_access_log_write(request, code);
     spl_assert(!request->waits);
     spl_change_abandon(request);
+    request->connection->request = NULL;
     spl_connection_enter(request->connection, PHASE_IDLE);
-    service->requests_open--;
+    request->service->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
     free(request->body);
     free(request->uri);
     free(request);
+}
+
+static void on_completed(void *context, struct MHD_Connection *handle, void **request_context,
+                         enum MHD_RequestTerminationCode code)
+{
+    (void)context;
+    (void)handle;
+    if (*request_context)
+        spl_request_finish(*request_context, code);
     *request_context = NULL;
 }
 
@@ -147,15 +153,22 @@ static bool answer_headers(struct request *request)
     return true;
 }
 
-/* False: the connection had better end. */
+/* False: the connection had better end. A refusal is sent past libmicrohttpd then, which sends none before a body's
+ * end. */
 static bool take_body(struct request *request, const char *data, size_t length)
 {
     if (request->change)
         return spl_change_take(request, data, length);
-    if (!request->response)
-        return append_body(request, data, length);
-    request->body_seen += length; // refused; read and dropped
-    return request->body_seen <= drain_max;
+    bool refused = request->response != NULL;
+    if (!refused && !append_body(request, data, length) && request->body_seen <= drain_max)
+        return false; // no memory
+    if (refused)
+        request->body_seen += length; // read and dropped
+    if (request->body_seen <= drain_max)
+        return true;
+    spl_refuse_on_socket(request, refused ? request->status : MHD_HTTP_CONTENT_TOO_LARGE, "body",
+                         "the body is not taken, and too long to be read to its end");
+    return false;
 }
 
 static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, const char *url, const char *method,
@@ -176,7 +189,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_refuse_many_headers(request);
         if (request->abandoned)
             return MHD_NO;
-        return !spl_check_framing(request, version) || answer_headers(request) ? send_reply(request) : MHD_YES;
+        return !spl_check_framing(request, method, version) || answer_headers(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {
         bool taken = take_body(request, data, *length);

@@ -18,7 +18,7 @@ enum {
  * its pool, so such a request is answered past it, right on the socket, and the connection ended. `detail` needs no
  * quoting.
  */
-static void refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
+void spl_refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
 {
     char text[512], reply[sizeof text + 256];
     const char *title = MHD_get_reason_phrase_for(status);
@@ -46,7 +46,7 @@ void spl_refuse_many_parameters(struct request *request, const char *uri)
     for (; *uri && count <= parameters_max; uri++)
         count += *uri == '&';
     if (count > parameters_max)
-        refuse_on_socket(request, MHD_HTTP_URI_TOO_LONG, "url", "the URL has too many parameters");
+        spl_refuse_on_socket(request, MHD_HTTP_URI_TOO_LONG, "url", "the URL has too many parameters");
 }
 
 /* Once the headers are there. Cookies lie in the pool twice. */
@@ -59,6 +59,6 @@ void spl_refuse_many_headers(struct request *request)
     int values = MHD_get_connection_values(handle, (enum MHD_ValueKind)kinds, NULL, NULL);
     size_t used = (info ? info->header_size : 0) + value_memory * (size_t)values + (cookie ? strlen(cookie) : 0);
     if (used > connection_pool - reply_memory)
-        refuse_on_socket(request, MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE, "headers",
+        spl_refuse_on_socket(request, MHD_HTTP_REQUEST_HEADER_FIELDS_TOO_LARGE, "headers",
                          "URL and headers are larger than 12 KiB together; POST takes long views");
 }

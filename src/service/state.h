@@ -39,6 +39,7 @@ struct connection {
     enum phase phase;
     uint64_t since_ns;   /* when the phase began */
     uint64_t sent_bytes; /* at the end of the last request that was logged */
+    struct request *request; // may be NULL; the one that is under way
 };
 
 /* A claim on a view that is on its way; in the caller's storage. */
@@ -160,12 +161,14 @@ int spl_http_start(struct spl_service *service, struct spl_error *err);
 void spl_http_quiesce(struct spl_service *service); /* stops accepting; idempotent */
 void spl_http_stop(struct spl_service *service);    /* closes every connection; idempotent */
 void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
+void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode code); /* frees it */
 /* The one way to have libmicrohttpd leave a request alone, and take it up again; both idempotent. */
 void spl_request_suspend(struct request *request);
 void spl_request_resume(struct request *request);
 
-/* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. */
-bool spl_check_framing(struct request *request, const char *version);
+/* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. `line` and `version`
+ * are libmicrohttpd's method, where the request's bytes begin, and version. */
+bool spl_check_framing(struct request *request, const char *line, const char *version);
 
 /* Lets a daemon do what it can without waiting, and has one of the handles call back when it wants to go on. */
 void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timer, uv_idle_cb on_again);
@@ -180,6 +183,8 @@ void spl_connections_watch(struct spl_service *service);                    /* f
  * target, still encoded; the second is for when the headers are there. */
 void spl_refuse_many_parameters(struct request *request, const char *uri);
 void spl_refuse_many_headers(struct request *request);
+/* Answers past libmicrohttpd and ends the connection; `detail` needs no quoting. */
+void spl_refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail);
 
 /* flights.c: views on their way. Boards the flight of an equal request or launches one; SPL_E_BUSY when the queue is
  * full. The caller has set ticket->deadline_ns, route and done, and keeps the ticket where it is until then or until it

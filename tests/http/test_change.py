@@ -115,6 +115,22 @@ def test_whoever_leaves_in_a_chunk_leaves_nothing():
         assert put(d, "gone", pieces(LARGE, 1000)).status == 201
 
 
+def test_what_a_crash_leaves_is_swept_at_the_next_start():
+    with serving() as d:
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999999\r\n"
+                      f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + b"x" * 2_000_000)
+            eventually(lambda: left_over(d))
+            time.sleep(2.1)
+            with Daemon(FAKE, datasets=[str(d.home)]) as other:  # a second service on the folder leaves it alone
+                assert left_over(d) and other.ask("/v1/datasets").status == 200
+            d.process.kill()
+            d.wait_exit()
+            assert left_over(d)
+        with Daemon(FAKE, datasets=[str(d.home)]):
+            assert left_over(d) == []
+
+
 def test_what_the_device_refuses_changes_no_file():
     """Whatever may refuse a version is asked before its file takes the place of the one before."""
     with serving(binary=REAL) as d:

@@ -193,4 +193,36 @@ def test_lengths_that_can_be_read_in_two_ways_end_the_connection():
             assert problem["field"] == "Content-Length" and "several" in problem["detail"], problem
 
 
+def test_requests_that_do_not_fit_are_forgotten_by_nobody():
+    """libmicrohttpd never completes a request with two errors; it kept its memory, and SIGTERM waited for it."""
+    long = b"HEAD /v1/status?" + b"a=b&" * 2000 + b" HTTP/1.1\r\nHost: localhost\r\nX: 1\r\n\r\n"
+    view = f"GET {VIEW}?width=16&height=9 HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
+    with Daemon(FAKE, FAKE_FRAME_MS=5) as d:
+        for _ in range(20):
+            with Wire(d) as wire:
+                wire.send(view + long)
+                with contextlib.suppress(ConnectionResetError):
+                    while wire.more():
+                        pass
+        eventually(lambda: b"\nsplatd_requests_open 0\n" in d.ops("/metrics").body)
+
+
+def test_headers_that_are_not_what_they_seem():
+    """Lines that libmicrohttpd takes for the end of the headers, or reads a part of."""
+    with with_tours() as d:
+        for odd in (b": a", b":", b": ", b":a: b", b"\0: a", b"X: a\0b", b"X: a\r\n b", b"X:\r\n b", b"Host:\r\n evil.example",
+                    b"Content-Length: 5\0 6"):
+            for before, behind in ((b"Host: localhost\r\n", b""), (b"", b"Host: localhost\r\n")):
+                with Wire(d) as wire:
+                    wire.send(b"GET /v1/datasets/wall HTTP/1.1\r\n" + before + odd + b"\r\n" + behind + b"\r\n",
+                              b"GET /v1/status HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    with contextlib.suppress(ConnectionResetError):
+                        while wire.more():
+                            pass
+                    assert re.match(rb"HTTP/1.1 4\d\d ", wire.buffer) and b" 200 " not in wire.buffer, (odd, before, wire.buffer)
+        with Wire(d) as wire:  # blanks around a value are nothing odd
+            wire.send(b"GET /v1/status HTTP/1.1\r\nHost:localhost\r\nX:  a \t\r\nY:\r\nConnection: close\r\nZ: \r\n\r\n")
+            assert wire.reply()[0] == 200 and wire.ended()
+
+
 run(globals())

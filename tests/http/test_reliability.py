@@ -3,6 +3,7 @@ that is cut while it is served, days of work. deploy/operating.md says what each
 
 By option, through the environment: SPLATD_RANDOM_REQUESTS=100000 (2000), SPLATD_RANDOM_SEED=N, SPLATD_SOAK_S=1800 (1)."""
 import os
+import re
 import random
 import shutil
 import socket
@@ -166,11 +167,15 @@ def test_soak():
             memory.append((now, d.status()["memory"]["resident_bytes"]))
             descriptors.append((now, len(os.listdir(f"/proc/{d.process.pid}/fd"))))
         assert d.ask(picture, connection=connection).body == first.body, "the last picture differs from the first"
+        turns = dict(re.findall(r"(?m)^splatd_loop_stall_(cpu_seconds|seconds) ([\d.e+-]+)$", d.ops("/metrics").body.decode()))
         steady = len(memory) // 3  # allocators and drivers settle first
         grown, opened = slope(memory[steady:]) * 3600, slope(descriptors[steady:]) * 3600
         sixths = ", ".join(f"{memory[i * (len(memory) - 1) // 6][1] / 1e6:.2f}" for i in range(7))
         print(f"  {asked} requests in {seconds:.0f} s: memory {grown / 1e6:+.2f} MB/h, descriptors {opened:+.2f}/h, "
               f"resident MB at the start and after each sixth: {sixths}")
+        print(f"  the loop's longest turn: {float(turns['seconds']) * 1000:.1f} ms by the clock, "
+              f"{float(turns['cpu_seconds']) * 1000:.1f} ms of processor time", flush=True)
+        assert os.environ["SPLATD_SANITIZED"] == "1" or float(turns["cpu_seconds"]) < 0.05, turns
         if seconds >= 1800:  # glibc takes and gives in steps of 128 KiB, each 1.7 MB/h over ten minutes, 0.6 over thirty
             assert grown < 2e6 and abs(opened) < 1, (grown, opened)
 

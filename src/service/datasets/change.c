@@ -259,7 +259,9 @@ void spl_change_refuse_all(struct spl_service *service)
         struct request *request = change->request;
         if (!request || !request->suspended)
             continue;
-        request->abandoned = true;
+        struct spl_error err = {0};
+        spl_fail(&err, SPL_E_CANCELLED, "the service is stopping; what there was is unchanged, send the dataset again");
+        spl_reply_error(request, &err);
         spl_change_abandon(request);
         spl_request_resume(request);
     }

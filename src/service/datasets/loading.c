@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "service/datasets/store.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
 
@@ -25,6 +26,8 @@ static void run(uv_work_t *work)
     struct loading *loading = work->data;
     const struct spl_service_options *options = loading->service->options;
     loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
+    if (loading->directory)
+        spl_store_sweep(loading->directory);
     if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
                           &loading->service->library.cancelled, &loading->err) &&
         loading->tours)

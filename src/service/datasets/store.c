@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -18,7 +19,7 @@
 #include "measure/profile.h"
 
 static const char prefix[] = ".incoming-";
-enum { stale_s = 24 * 3600 };
+enum { fresh_s = 1, stale_s = 24 * 3600 }; /* not locked yet; where there are no locks */
 
 static int fail(struct spl_incoming *incoming, struct spl_error *err, const char *what)
 {
@@ -42,7 +43,29 @@ static void remove_folder(int directory, const char *folder)
     unlinkat(directory, folder, AT_REMOVEDIR);
 }
 
-static void sweep(const char *directory)
+/* Does nobody write into it any more? Whoever does has a lock on the file. */
+static bool is_left(int directory, const char *folder, time_t age_s)
+{
+    int fd = openat(directory, folder, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *dir = fd < 0 ? NULL : fdopendir(fd);
+    bool left = dir && age_s > fresh_s;
+    if (!dir && fd >= 0)
+        close(fd);
+    for (struct dirent *item; left && (item = readdir(dir));) {
+        if (!strcmp(item->d_name, ".") || !strcmp(item->d_name, ".."))
+            continue;
+        int file = openat(fd, item->d_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+        if (file >= 0 && flock(file, LOCK_EX | LOCK_NB))
+            left = errno != EWOULDBLOCK && age_s > stale_s;
+        if (file >= 0)
+            close(file);
+    }
+    if (dir)
+        closedir(dir);
+    return left;
+}
+
+void spl_store_sweep(const char *directory)
 {
     DIR *dir = opendir(directory);
     if (!dir)
@@ -52,7 +75,7 @@ static void sweep(const char *directory)
         struct stat status;
         if (!strncmp(item->d_name, prefix, sizeof prefix - 1) &&
             !fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW) && S_ISDIR(status.st_mode) &&
-            now - status.st_mtime > stale_s)
+            is_left(dirfd(dir), item->d_name, now - status.st_mtime))
             remove_folder(dirfd(dir), item->d_name);
     }
     closedir(dir);
@@ -87,7 +110,7 @@ int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
         goto done;
     }
-    sweep(directory);
+    spl_store_sweep(directory);
     if (!mkdtemp(folder)) {
         rc = fail(incoming, err, "make a folder for");
         goto done;
@@ -106,6 +129,7 @@ int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct
     }
     incoming->path = path;
     path = NULL;
+    flock(incoming->fd, LOCK_EX | LOCK_NB); // in use, until it is closed
 done:
     if (rc)
         spl_incoming_abort(incoming);

@@ -16,8 +16,11 @@ struct spl_incoming {
 /* SPL_E_LIMIT with both numbers where `bytes` do not fit on the disk of the file at `path`. Quick: it asks no disk. */
 int spl_store_check_room(const char *path, uint64_t bytes, struct spl_error *err);
 
-/* Makes the file beside `target`. Files that a crash has left there more than a day ago are removed. Nothing is left
- * after a failure, here and below. */
+/* Removes what uploads have left in `directory` that nobody writes to any more, say after a crash; without locks on its
+ * file system, what is older than a day. */
+void spl_store_sweep(const char *directory);
+
+/* Makes the file beside `target`, and sweeps there. Nothing is left after a failure, here and below. */
 int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct spl_error *err);
 int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err);
 

@@ -159,6 +159,8 @@ static int look_at_files(struct spl_tour *tour, struct spl_error *err)
         return spl_fail_errno(err, errno, "%s: cannot be listed", path);
     for (struct dirent *item; (item = readdir(dir));) {
         size_t frame = frame_of(tour, item->d_name);
+        if (item->d_name[0] == '.') // what a crash left half written; the folders . and .. stay
+            unlinkat(dirfd(dir), item->d_name, 0);
         bool video = spl_tour_has_ended(tour) && !strcmp(item->d_name, "video.mp4");
         if ((frame == SIZE_MAX && !video) || fstatat(dirfd(dir), item->d_name, &status, 0))
             continue;
