@@ -6,6 +6,7 @@
 #include "geom/camera_json.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "geom/camera_matrix.h"
@@ -87,6 +88,14 @@ const char *spl_json_type_name(const json_t *json)
         [JSON_REAL] = "a number",    [JSON_TRUE] = "true",      [JSON_FALSE] = "false", [JSON_NULL] = "null",
     };
     return json ? names[json_typeof(json)] : "missing";
+}
+
+const char *spl_json_show_shape(const json_t *json, char text[40])
+{
+    int length = snprintf(text, 40, "%s", spl_json_type_name(json));
+    if (json_is_array(json))
+        snprintf(text + length, 40 - (size_t)length, " of %zu", json_array_size(json));
+    return text;
 }
 
 static int number_from_json(struct spl_value *value, const json_t *json, const char *name, struct spl_error *err)

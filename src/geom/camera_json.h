@@ -93,6 +93,9 @@ int spl_json_get_number(const json_t *object, const char *path, double *out, str
 /* "an object", "text", …: for messages. */
 const char *spl_json_type_name(const json_t *json);
 
+/* The same with the length of what is an array: "an array of 3". Returns `text`. */
+const char *spl_json_show_shape(const json_t *json, char text[40]);
+
 /* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
  * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up
  * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left

@@ -279,6 +279,7 @@ def test_quotas():
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-frames", "8", "--tour-pixels", "20000",
                                     "--tour-disk", "60K") as d:
         assert begin(d, body(9), 400)["field"] == "frames"
+        assert "the limit is 8" in begin(d, body(1000000), 400)["detail"]  # not that of all paths
         assert begin(d, body(7), 400)["field"] == "frames"  # 21,504 pixels
         kept = begin(d, body(6))
         ended(d, kept["uri"])

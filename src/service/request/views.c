@@ -62,10 +62,11 @@ static int read_document(json_t *document, struct values *common, json_t **list,
     if (!json_is_object(document))
         return spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
                               spl_json_type_name(document));
+    char shape[40];
     *list = json_incref(json_object_get(document, "views"));
     if (!json_is_array(*list) || !json_array_size(*list) || json_array_size(*list) > SPL_VIEWS_MAX)
-        return spl_fail_field(err, SPL_E_INPUT, "views", "views must be an array of 1 to %d views, not %s of %zu",
-                              SPL_VIEWS_MAX, spl_json_type_name(*list), json_array_size(*list));
+        return spl_fail_field(err, SPL_E_INPUT, "views", "views must be an array of 1 to %d; it is %s", SPL_VIEWS_MAX,
+                              spl_json_show_shape(*list, shape));
     json_object_del(document, "views");
     return spl_values_from_object(common, document, SPL_BODY, err);
 }
