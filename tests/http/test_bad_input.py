@@ -240,7 +240,7 @@ def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_ope
                 assert log_format == "text" or lines_of_json(got)[0]["level"] == "error", got
         for text, args, said in [
             ("queue = 5\nqueu = 5\nqueue = 6\noops", (), ("line 2: there is no", "line 3: queue is given", "line 4: 'oops'")),
-            ("listen = a:1\nlisten = b:1", (), ("line 1: listen takes", "line 2: listen is given a second time")),
+            ("listen = a\nlisten = b:1", (), ("line 1: listen takes", "line 2: listen is given a second time")),
             ("queue = 5", ("--queue", "x"), ("splatd: --queue takes",)),  # not the file's fault
         ]:
             with open(conf, "w") as f:
