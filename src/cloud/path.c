@@ -117,8 +117,10 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     int rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
-        if ((rc = read_own_key(reader, json_array_get(list, i), &why)))
+        if ((rc = read_own_key(reader, json_array_get(list, i), &why))) {
+            spl_camera_locate(json_array_get(list, i), &why);
             spl_path_fail(reader, i, rc, &why, err);
+        }
     }
     return rc;
 }

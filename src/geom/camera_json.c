@@ -133,6 +133,15 @@ int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const
     return rc ? rc : spl_value_check(value, kind, name, err);
 }
 
+void spl_camera_locate(const json_t *view, struct spl_error *why)
+{
+    char field[sizeof why->field], member[sizeof why->field];
+    snprintf(member, sizeof member, "%.*s", (int)strcspn(why->field, "."), why->field);
+    bool inside = json_object_get(json_object_get(view, "camera"), member) && !json_object_get(view, member);
+    if (inside && (size_t)snprintf(field, sizeof field, "camera.%s", why->field) < sizeof field)
+        strcpy(why->field, field);
+}
+
 static int find(const char *name, enum spl_value_place place, struct spl_error *err)
 {
     for (int i = 0; i < SPL_CAMERA_PARAMS; i++)

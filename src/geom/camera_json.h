@@ -112,6 +112,10 @@ int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], con
 int spl_camera_from_json(json_t *view, const char *const *others, const struct spl_camera_defaults *defaults,
                          const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
+/* Puts "camera." before the field of `why` where the member stands in the "camera" object of `view`, so that who looks
+ * for it by its path finds it. */
+void spl_camera_locate(const json_t *view, struct spl_error *why);
+
 /* COLMAP's models by its own number, -1 for a name that is not taken; `names` lists those that are. */
 int spl_colmap_model_from_name(const char *name);
 extern const char spl_colmap_model_names[];

@@ -60,7 +60,7 @@ def test_bad_batches_are_refused_by_name():
             ("", "body"), ("[]", "body"), ("{", "body"), ("{}", "views"), ({"views": []}, "views"),
             ({"views": {}}, "views"),
             ({"views": [one] * 257}, "views"), ({"views": [5]}, "views[0]"), ({"views": [one, []]}, "views[1]"),
-            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].fov"),
+            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].camera.fov"),
             ({"views": [{**one, "a": 1}]}, "views[0].a"),
             ({"views": [{**one, "layers": ["color"]}]}, "views[0].layers"), ({"views": [one], "layers": "color"},
                                                                              "views[0].layers"),

@@ -40,7 +40,9 @@ static int resolve_all(const struct values *common, json_t *list, const struct s
         struct spl_view_request *view = &out->views[out->count];
         struct spl_error why = {0};
         char field[sizeof why.field + 24];
-        int rc = resolve_view(common, json_array_get(list, out->count), defaults, limits, view, &why);
+        json_t *json = json_array_get(list, out->count);
+        int rc = resolve_view(common, json, defaults, limits, view, &why);
+        spl_camera_locate(json, &why);
         snprintf(field, sizeof field, "views[%zu]%s%s", out->count, why.field[0] ? "." : "", why.field);
         if (rc)
             return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);

@@ -194,9 +194,9 @@ static void test_bad_paths_are_named(void **state)
         {OWN("{}"), "keyframes[1].camera"},
         {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
              "\"znear\":1,\"aspectRatio\":1}}}}"),
-         "keyframes[1].gltf.perspective.aspectRatio"},
+         "keyframes[1].camera.gltf.perspective.aspectRatio"},
         {OWN("5"), "keyframes[1].views"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[0,0,0],\"fov\":60}}"), "keyframes[1].target"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[0,0,0],\"fov\":60}}"), "keyframes[1].camera.target"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"time\":\"x\"}"), "keyframes[1].time"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"time\":4}"), "keyframes[1].time"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"colour\":4}"), "keyframes[1].colour"},
