@@ -37,12 +37,12 @@ static int parse_line(const struct spl_source *source, const char *line, size_t 
             n[count] = strtod(copy, &stop);
         if (stop == copy || *stop || !isfinite(n[count]))
             return spl_source_fail_line(source, source->line, columns[count], err, "'%.32s' is no number%s", copy,
-                                        count ? "" : "; text, so it was read as a TUM trajectory: JSON begins with '{'");
+                                        count ? "" : "; text, so it was read as a TUM trajectory; JSON begins with {");
     }
-    return count == 8 ? 0
-                      : spl_source_fail_line(source, source->line, "", err,
-                                             "%d numbers; a line of a TUM trajectory has 8: timestamp tx ty tz qx qy qz qw",
-                                             count);
+    if (count == 8)
+        return 0;
+    return spl_source_fail_line(source, source->line, count < 8 ? columns[count] : "", err,
+                                "%d numbers; a line of a TUM trajectory has 8: timestamp tx ty tz qx qy qz qw", count);
 }
 
 /* Camera to world, so the camera's rotation is the inverse's. */

@@ -245,7 +245,7 @@ def test_bad_tours_are_refused_by_field():
         ({"path": "1 2 3"}, "tz"), ({**body(), "shade": 1}, "shade"), ({**body(), "frames": 0}, "frames"),
         ({**body(), "frames": 1.5}, "frames"), ({**body(), "frames": "2"}, "frames"), ({**body(), "fps": 0}, "fps"),
         ({**body(), "seconds": 2}, "seconds"), ({"path": body()["path"]}, "frames"),
-        ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].eye"),
+        ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].camera.eye"),
         ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
         ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
         ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),

@@ -200,8 +200,8 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         return spl_fail_field(err, SPL_E_INPUT, "frames", "frames %g is no whole number from 1 on", frames);
     if ((rc = parse_settings(json_object_get(body, "settings"), defaults, &limits->image, &out->view, err)) ||
         (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
-        (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, limits->frames, &out->frames,
-                                    &out->fps, err)) ||
+        (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, limits->frames,
+                                    &out->frames, &out->fps, err)) ||
         (rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))

@@ -179,7 +179,7 @@ static void test_bad_paths_are_named(void **state)
         {"{\"cameras_txt\":\"1 PINHOLE 64 48 50 50 32 24\",\"images_txt\":\"#\"}", "images"},
         {"{\"cameras_txt\":\"1 PINHOLE 64 48 50 50 32 24\",\"images_txt\":\"1 0 0 0 0 0 0 0 1 a\\n\\n\"}", "q"},
         {"# nothing\n", "path"},
-        {"1 2 3 4 0 0 0", ""},
+        {"1 2 3 4 0 0 0", "qw"},
         {"1 2 3 4 0 0 0 1 9", ""},
         {"1 2 x 4 0 0 0 1", "ty"},
         {"1 2 nan 4 0 0 0 1", "ty"},
@@ -216,8 +216,8 @@ static void test_what_is_no_trajectory_says_so(void **state)
     (void)state;
     static const char *const cases[][2] = {
         {"listen = 127.0.0.1:8080\n", "timestamp: 'listen' is no number; text, so it was read as a TUM trajectory"},
-        {"1 2 3 4 0 0 0\n", "7 numbers; a line of a TUM trajectory has 8: timestamp tx"},
-        {"1\n", "line 1: 1 numbers"},
+        {"1 2 3 4 0 0 0\n", "line 1: qw: 7 numbers; a line of a TUM trajectory has 8: timestamp tx"},
+        {"1\n", "line 1: tx: 1 numbers"},
         {"1 2 3 4 0 0 0 1 9 9\n", "line 1: 10 numbers"},
         {"0 2 3 4 0 0 0 1\n1 2 x 4 0 0 0 1\n", "line 2: ty: 'x' is no number"},
     };

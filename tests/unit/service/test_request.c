@@ -316,7 +316,8 @@ static void bodies_are_refused_by_name(void **state)
         {"{\"transparent\":\"true\"}", "transparent"},
         {"{\"background\":[1,2,3]}", "background"},
         {"{\"camera\":{\"matrix\":[1,2,3],\"convention\":\"opencv\"}}", "matrix"},
-        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}", "convention"},
+        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}",
+         "convention"},
         {"{\"camera\":{\"convention\":\"opengl\"}}", "matrix"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"directx\"}}", "convention"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1],\"convention\":\"opengl\"}}", "matrix"},
@@ -481,7 +482,8 @@ static void refusals_of_bodies_say_what_to_write(void **state)
 {
     (void)state;
     static const char *const rows[][2] = {
-        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}", "'convention' is needed where 'matrix' is given: opengl or opencv"},
+        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}",
+         "'convention' is needed where 'matrix' is given: opengl or opencv"},
         {"{\"camera\":{\"matrix\":[[1,0,0,0]],\"convention\":\"opengl\"}}", "3 or 4 rows of 4; it is an array of 1 rows"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
