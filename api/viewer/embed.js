@@ -36,7 +36,8 @@ async function open() {
   }
 }
 
-notices(stage, document.getElementById("notice"), document.getElementById("again"), open);
+const where = "ask whoever embedded this for a signed URL";
+notices(stage, document.getElementById("notice"), document.getElementById("again"), open, where);
 stage.addEventListener("frame", ({detail}) => {
   if (detail.full && parent !== window) parent.postMessage({splatd: "camera", ...detail.camera}, "*");
 });

@@ -189,9 +189,10 @@ stage.addEventListener("frame", showFrame);
 stage.addEventListener("click", ({detail}) => points.add(detail));
 stage.addEventListener("dblclick", lookAt);
 points.addEventListener("change", showPoints);
-notices(stage, $("notice"), $("again"), open);
+notices(stage, $("notice"), $("again"), open, "enter it in the panel, under Token");
 stage.addEventListener("state", ({detail: problem}) => {
   $("token").hidden = problem?.kind !== "token";
+  if (!$("token").hidden) fold($("toggle"), $("panel"), true); // the field lies there
 });
 editTour(tour, say);
 renderTours(tour, say);

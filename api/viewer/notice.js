@@ -1,5 +1,7 @@
 // What stands over the picture when there is none, or none that is new.
 
+import {hasToken} from "./service.js";
+
 const TITLES = {
   busy: "The service is busy",
   rebuilding: "The device is being rebuilt",
@@ -9,15 +11,17 @@ const TITLES = {
   offline: "No connection",
 };
 
-/** Shows the stage's state in `box`; its button asks again, by `open` when nothing is open yet. */
-export function notices(stage, box, again, open) {
+/** Shows the stage's state in `box`; its button asks again, by `open` when nothing is open yet. Who has shown no token yet
+ * is told `where` to get one in: the service's own words are for programs. */
+export function notices(stage, box, again, open, where) {
   let counting = 0;
   stage.addEventListener("state", ({detail: problem}) => {
     clearInterval(counting);
     box.hidden = !problem;
     if (!problem) return;
     let seconds = Math.ceil(problem.seconds ?? 0);
-    box.querySelector("p").textContent = `${TITLES[problem.kind] ?? "Failed"}: ${problem.message}`;
+    const message = problem.kind === "token" && !hasToken() ? where : problem.message;
+    box.querySelector("p").textContent = `${TITLES[problem.kind] ?? "Failed"}: ${message}`;
     const tell = () => {
       box.querySelector("small").textContent = !problem.seconds
         ? ""

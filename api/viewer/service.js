@@ -14,6 +14,7 @@ export const setPass = (parameters) => (pass = parameters);
 
 const TOKEN = "splatd-token";
 export const setToken = (token) => sessionStorage.setItem(TOKEN, token);
+export const hasToken = () => Boolean(sessionStorage.getItem(TOKEN));
 
 function kindOf(status, problem) {
   if (problem.field === "exp" || problem.field === "sig") return "refused"; // a token would not mend it

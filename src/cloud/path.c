@@ -103,7 +103,7 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
             return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; known are %s, closed, fps",
                                   name, reader->list);
         if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
-            return spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number above 0, at most 1000");
+            return spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number above 0, up to 1000");
         if (flag && !json_is_boolean(value))
             return spl_fail_field(err, SPL_E_INPUT, name, "closed must be true or false, not %s",
                                   spl_json_type_name(value));
@@ -117,8 +117,10 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     int rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
-        if ((rc = read_own_key(reader, json_array_get(list, i), &why)))
+        if ((rc = read_own_key(reader, json_array_get(list, i), &why))) {
+            spl_camera_locate(json_array_get(list, i), &why);
             spl_path_fail(reader, i, rc, &why, err);
+        }
     }
     return rc;
 }

@@ -20,28 +20,29 @@ static int parse_line(const struct spl_source *source, const char *line, size_t 
     static const char *const columns[] = {"timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
     static const char blanks[] = " \t,";
     const char *at = line, *end = line + length;
-    for (int i = 0; i <= 8; i++) {
+    int count = 0;
+    for (size_t word;; count++, at += word) {
         while (at < end && *at && strchr(blanks, *at))
             at++;
-        size_t word = 0;
-        while (at + word < end && at[word] && !strchr(blanks, at[word]))
-            word++;
-        if (i == 8 && at < end)
-            return spl_source_fail_line(source, source->line, "", err, "more than 8 numbers: '%.*s'",
-                                        (int)(word < 32 ? word : 32), at);
-        if (i == 8)
+        if (at == end)
             break;
+        for (word = 0; at + word < end && !(at[word] && strchr(blanks, at[word])); word++)
+            ;
+        if (count >= 8)
+            continue;
         char copy[64], *stop = copy;
         snprintf(copy, sizeof copy, "%.*s", (int)(word < 63 ? word : 63), at);
         /* strtod alone would also take hex floats, "nan" and "infinity" */
-        if (word && word < sizeof copy && strspn(copy, "0123456789+-.eE") == word)
-            n[i] = strtod(copy, &stop);
-        if (stop == copy || *stop || !isfinite(n[i]))
-            return spl_source_fail_line(source, source->line, columns[i], err, "%s '%.32s' is no number", columns[i],
-                                        copy);
-        at += word;
+        if (word < sizeof copy && strspn(copy, "0123456789+-.eE") == word)
+            n[count] = strtod(copy, &stop);
+        if (stop == copy || *stop || !isfinite(n[count]))
+            return spl_source_fail_line(source, source->line, columns[count], err, "'%.32s' is no number%s", copy,
+                                        count ? "" : "; text, so it was read as a TUM trajectory; JSON begins with {");
     }
-    return 0;
+    if (count == 8)
+        return 0;
+    return spl_source_fail_line(source, source->line, count < 8 ? columns[count] : "", err,
+                                "%d numbers; a line of a TUM trajectory has 8: timestamp tx ty tz qx qy qz qw", count);
 }
 
 /* Camera to world, so the camera's rotation is the inverse's. */

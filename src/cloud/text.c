@@ -124,7 +124,7 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
             return spl_source_fail_line(source, source->line, "", err, "more than %d columns", SPL_TEXT_FIELDS);
         if (spl_layout_lacks(layout) >= 0)
             return spl_source_fail_line(source, source->line, spl_column_name(spl_layout_lacks(layout)), err,
-                                        "no column has this name; name the columns with the option \"columns\"");
+                                        "no column has this name; name the columns with --columns");
         *named = true;
     }
 }

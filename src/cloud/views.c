@@ -154,6 +154,21 @@ static bool has(const char *folder, const char *name)
     return snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path && is_file(path);
 }
 
+/* A COLMAP project keeps its models in sparse/0, sparse/1, …; whoever names a folder above means the first. */
+static int load_text_model(struct spl_view_list *list, const char *path,
+                           const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    static const char *const below[] = {"0", "sparse/0", "sparse"}, *const parts[] = {"cameras.bin", "cameras.txt"};
+    char inner[64];
+    for (int i = 0; i < 6 && !has(path, "cameras.txt"); i++) {
+        snprintf(inner, sizeof inner, "%s/%s", below[i / 2], parts[i % 2]);
+        if (has(path, inner))
+            return spl_fail(err, SPL_E_NOT_FOUND, "%.200s: no cameras.txt or cameras.bin; did you mean '%.200s/%s'?",
+                            path, path, below[i / 2]);
+    }
+    return spl_view_list_load_colmap(list, path, photographs, err);
+}
+
 static int load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *photographs,
                 struct spl_error *err)
 {
@@ -164,13 +179,17 @@ static int load(struct spl_view_list *list, const char *path, const struct spl_p
         return spl_view_list_load_colmap_bin(list, path, photographs, err);
     if (has(path, "camera-intrinsics.txt"))
         return spl_view_list_load_poses(list, path, photographs, err);
-    return spl_view_list_load_colmap(list, path, photographs, err);
+    return load_text_model(list, path, photographs, err);
 }
 
 int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
                                    const struct spl_photograph_options *options, struct spl_error *err)
 {
+    const char *images = options ? options->images : NULL;
+    struct stat status;
     *list = (struct spl_view_list){0};
+    if (images && (stat(images, &status) || !S_ISDIR(status.st_mode)))
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "images", "--images '%.200s' is no folder", images);
     int rc = load(list, path, options, err);
     if (!rc && !list->count)
         rc = spl_fail_field(err, SPL_E_INPUT, "views", "%s holds no view", path);

@@ -189,11 +189,12 @@ int spl_view_list_read_open3d(struct spl_view_list *list, const char *path, cons
     const json_t *frames = json_object_get(document, "parameters");
     char *folder = folder_of(path, err), *found = NULL;
     struct dirent **entries = NULL;
+    char shape[40];
     int count = 0, rc = folder ? list_images(folder, photographs, &found, &entries, &count, err) : SPL_E_NOMEM;
     if (!rc && (!json_is_array(frames) || json_array_size(frames) != (size_t)count))
         rc = spl_fail_field(err, SPL_E_INPUT, "parameters",
-                            "%s: parameters is %s of %zu cameras; %s holds %d photographs, and they must be as many",
-                            path, spl_json_type_name(frames), json_array_size(frames), found, count);
+                            "%s: parameters is %s; %s holds %d photographs, and cameras must be as many", path,
+                            spl_json_show_shape(frames, shape), found, count);
     for (int i = 0; !rc && i < count; i++) {
         struct spl_error why = {0}, place = {0};
         if (!(rc = add_open3d(list, path, found, entries[i]->d_name, json_array_get(frames, (size_t)i), photographs,

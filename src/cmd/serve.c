@@ -167,11 +167,12 @@ int spl_cmd_serve(int argc, char **argv)
         rc = parse(&o, argc, argv, flags.options, &err);
     spl_log_set_level((enum spl_log_level)o.log_level);
     spl_log_set_format((enum spl_log_format)o.log_format); // also for what parse() has found wrong after it
-    if (!rc)
-        rc = spl_service_run(&o, &err);
-    if (rc < 0)
-        locate(&o, &err);
+    if (!rc && (rc = spl_service_run(&o, &err)) < 0)
+        locate(&o, &err); // what parse() refuses says itself whether a line or a flag is at fault
+    int code = rc < 0 ? spl_cmd_fail(&err) : 0;
+    for (size_t i = 0; i < o.mistakes; i++)
+        spl_cmd_fail(&o.mistake[i]);
     free_flags(&flags);
     spl_service_options_finish(&o);
-    return rc < 0 ? spl_cmd_fail(&err) : 0;
+    return code;
 }

@@ -163,7 +163,8 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     if (rc || (rc = spl_camera_path_load(a->path, &path_options, &path, err)))
         return rc;
     path.closed |= a->closed;
-    if ((rc = spl_camera_path_count(&path, a->frames, a->fps, a->seconds, &a->count, &a->fps, err)))
+    if ((rc = spl_camera_path_count(&path, a->frames, a->fps, a->seconds, SPL_CAMERA_PATH_MAX, &a->count, &a->fps,
+                                    err)))
         goto done;
     if (!(a->cameras = spl_alloc_raw(a->count, sizeof *a->cameras, err)))
         rc = SPL_E_NOMEM;

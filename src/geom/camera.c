@@ -68,7 +68,7 @@ int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t w
                        struct spl_error *err)
 {
     if (!(fov_degrees > 0 && fov_degrees <= 179))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "a vertical field of view of %g degrees is not in 0..179",
+        return spl_fail_field(err, SPL_E_INPUT, "fov", "a vertical field of view must be above 0, up to 179 degrees, not %g",
                               fov_degrees);
     if (!width)
         return spl_fail_field(err, SPL_E_INPUT, "width", "an image needs at least one pixel of width");

@@ -6,6 +6,7 @@
 #include "geom/camera_json.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "geom/camera_matrix.h"
@@ -89,6 +90,14 @@ const char *spl_json_type_name(const json_t *json)
     return json ? names[json_typeof(json)] : "missing";
 }
 
+const char *spl_json_show_shape(const json_t *json, char text[40])
+{
+    int length = snprintf(text, 40, "%s", spl_json_type_name(json));
+    if (json_is_array(json))
+        snprintf(text + length, 40 - (size_t)length, " of %zu", json_array_size(json));
+    return text;
+}
+
 static int number_from_json(struct spl_value *value, const json_t *json, const char *name, struct spl_error *err)
 {
     if (!json_is_number(json))
@@ -122,6 +131,15 @@ int spl_value_from_json(struct spl_value *value, enum spl_value_kind kind, const
             rc = number_from_json(value, json_array_get(json, i), name, err);
     }
     return rc ? rc : spl_value_check(value, kind, name, err);
+}
+
+void spl_camera_locate(const json_t *view, struct spl_error *why)
+{
+    char field[sizeof why->field], member[sizeof why->field];
+    snprintf(member, sizeof member, "%.*s", (int)strcspn(why->field, "."), why->field);
+    bool inside = json_object_get(json_object_get(view, "camera"), member) && !json_object_get(view, member);
+    if (inside && (size_t)snprintf(field, sizeof field, "camera.%s", why->field) < sizeof field)
+        strcpy(why->field, field);
 }
 
 static int find(const char *name, enum spl_value_place place, struct spl_error *err)

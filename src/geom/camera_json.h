@@ -93,6 +93,9 @@ int spl_json_get_number(const json_t *object, const char *path, double *out, str
 /* "an object", "text", …: for messages. */
 const char *spl_json_type_name(const json_t *json);
 
+/* The same with the length of what is an array: "an array of 3". Returns `text`. */
+const char *spl_json_show_shape(const json_t *json, char text[40]);
+
 /* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
  * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up
  * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left
@@ -108,6 +111,10 @@ int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], con
  * other keys are refused by name. `defaults` as above. Borrows `view`. */
 int spl_camera_from_json(json_t *view, const char *const *others, const struct spl_camera_defaults *defaults,
                          const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
+
+/* Puts "camera." before the field of `why` where the member stands in the "camera" object of `view`, so that who looks
+ * for it by its path finds it. */
+void spl_camera_locate(const json_t *view, struct spl_error *why);
 
 /* COLMAP's models by its own number, -1 for a name that is not taken; `names` lists those that are. */
 int spl_colmap_model_from_name(const char *name);

@@ -20,10 +20,11 @@ static int read_number(const json_t *json, const char *name, unsigned row, unsig
 static int read_row(const json_t *json, const char *name, unsigned row, unsigned columns, double *out,
                     struct spl_error *err)
 {
+    char shape[40];
     int rc = 0;
     if (!json_is_array(json) || json_array_size(json) != columns)
-        return spl_fail_field(err, SPL_E_INPUT, name, "row %u of %s must hold %u numbers; it is %s of %zu", row + 1,
-                              name, columns, spl_json_type_name(json), json_array_size(json));
+        return spl_fail_field(err, SPL_E_INPUT, name, "row %u of %s must hold %u numbers; it is %s", row + 1, name,
+                              columns, spl_json_show_shape(json, shape));
     for (unsigned i = 0; !rc && i < columns; i++)
         rc = read_number(json_array_get(json, i), name, row, i, out + i, err);
     return rc;
@@ -34,11 +35,12 @@ int spl_json_get_matrix(const json_t *json, const char *name, unsigned rows, uns
 {
     size_t size = json_array_size(json);
     bool nested = json_is_array(json_array_get(json, 0)), pose = rows == 4 && columns == 4;
+    char shape[40];
     unsigned given = pose && nested && size == 3 ? 3 : rows;
     int rc = 0;
     if (!json_is_array(json) || size != (nested ? given : rows * columns))
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %u numbers, or %u rows of %u; it is %s of %zu%s",
-                              name, rows * columns, rows, columns, spl_json_type_name(json), size,
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %u numbers, or %s%u rows of %u; it is %s%s", name,
+                              rows * columns, pose ? "3 or " : "", rows, columns, spl_json_show_shape(json, shape),
                               nested ? " rows" : "");
     for (unsigned i = 0; i < columns && given < rows; i++)
         out[given * columns + i] = i == columns - 1;

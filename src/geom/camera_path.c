@@ -71,32 +71,29 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
 }
 
 int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, double fps, double seconds,
-                          size_t *count_out, double *fps_out, struct spl_error *err)
+                          size_t most, size_t *count_out, double *fps_out, struct spl_error *err)
 {
     bool timed = path->times && path->count > 1, given = !isnan(seconds);
     if (!isnan(fps) && !(fps > 0 && fps <= fps_max))
-        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps %g is outside 0 (exclusive) to %g", fps, fps_max);
+        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps must be above 0, up to %g, not %g", fps_max, fps);
     if (!isnan(seconds) && !(seconds > 0 && seconds <= seconds_max))
-        return spl_fail_field(err, SPL_E_INPUT, "seconds", "seconds %g is outside 0 (exclusive) to %g", seconds,
-                              seconds_max);
+        return spl_fail_field(err, SPL_E_INPUT, "seconds", "seconds must be above 0, up to %g, not %g", seconds_max,
+                              seconds);
     if (frames && !isnan(seconds))
         return spl_fail_field(err, SPL_E_INPUT, "seconds", "'frames' and 'seconds' exclude each other");
     *fps_out = !isnan(fps) ? fps : path->fps > 0 ? path->fps : fps_default;
-    if (!frames && isnan(seconds) && path->whole && !(timed && !isnan(fps))) {
-        *count_out = path->count;
-        return 0;
-    }
-    if (!frames && isnan(seconds) && !timed)
+    bool each = !frames && isnan(seconds) && path->whole && !(timed && !isnan(fps));
+    if (!frames && isnan(seconds) && !timed && !each)
         return spl_fail_field(err, SPL_E_INPUT, "frames",
                               "keyframes without times do not say how long the way is; give frames or seconds");
-    if (!frames && isnan(seconds))
+    if (!frames && isnan(seconds) && !each)
         seconds = path->times[path->count - 1] - path->times[0];
     if (!frames && !given && path->closed) // the way back takes the mean of the others
         seconds *= (double)path->count / (double)(path->count - 1);
-    double count = frames ? (double)frames : floor(seconds * *fps_out + 0.5);
-    if (count > SPL_CAMERA_PATH_MAX)
-        return spl_fail_field(err, SPL_E_LIMIT, frames ? "frames" : "seconds", "%.0f frames; the limit is %d", count,
-                              SPL_CAMERA_PATH_MAX);
+    double count = each ? (double)path->count : frames ? (double)frames : floor(seconds * *fps_out + 0.5);
+    if (count > (double)most)
+        return spl_fail_field(err, SPL_E_LIMIT, frames || each ? "frames" : "seconds", "%.0f frames; the limit is %zu",
+                              count, most);
     *count_out = count < 1 ? 1 : (size_t)count;
     return 0;
 }

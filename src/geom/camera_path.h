@@ -60,8 +60,9 @@ int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_
 /* Frames of a tour: `frames` (0 = not given) or `fps` times `seconds` (NAN = not given), which exclude each other. A
  * whole path without either has as many frames as cameras, but for one with times and an fps; those and keyframes
  * with times last as long as the times say, at `fps` or 30. `*fps_out` is what a video of it runs at: fps, the path's
- * own, or 30. Fields "frames", "fps", "seconds". */
+ * own, or 30. At most `most` frames, SPL_E_LIMIT; no more than SPL_CAMERA_PATH_MAX of them can be sampled. Fields
+ * "frames", "fps", "seconds". */
 int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, double fps, double seconds,
-                          size_t *count_out, double *fps_out, struct spl_error *err);
+                          size_t most, size_t *count_out, double *fps_out, struct spl_error *err);
 
 #endif

@@ -41,8 +41,11 @@ static int conflict(const struct spl_value *v, enum spl_camera_param param, enum
 
 static int missing(enum spl_camera_param param, enum spl_camera_param because, struct spl_error *err)
 {
-    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' is needed where '%s' is given", names[param],
-                          names[because]);
+    const char *choices = param == SPL_CAMERA_convention ? "opengl or opencv"
+                          : param == SPL_CAMERA_model    ? spl_colmap_model_names
+                                                         : "";
+    return spl_fail_field(err, SPL_E_INPUT, names[param], "'%s' is needed where '%s' is given%s%s", names[param],
+                          names[because], *choices ? ": " : "", choices);
 }
 
 /* glTF's aspect ratio is that of the image: sides that are given may differ from it by the rounding to pixels. */

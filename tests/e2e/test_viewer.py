@@ -735,6 +735,8 @@ def test_a_token_is_asked_for():
         with Daemon(REAL, "--tokens", str(file)) as guarded:
             site = f"http://127.0.0.1:{guarded.port}"
             with page(site, ready="!document.querySelector('#token').hidden", complaints="401") as tab:
+                assert tab.text("#notice p") == "A token is needed: enter it in the panel, under Token"
+                assert not tab.run("document.querySelector('#panel').hidden")
                 for text in ("some-other-token-than-that", token):
                     tab.run(
                         f"""document.querySelector('#token input').value = '{text}';
@@ -747,6 +749,8 @@ def test_a_token_is_asked_for():
                     )
                 settled(tab)
                 assert token not in tab.run("location.href") + json.dumps(tab.run(VIEWS))
+            with page(f"{site}/embed/wall", ready="!document.querySelector('#notice').hidden", complaints="401") as tab:
+                assert tab.text("#notice p") == "A token is needed: ask whoever embedded this for a signed URL"
             with elsewhere(site, f'<splat-view dataset="wall" token="{token}"></splat-view>') as url:
                 with page(url, ready="document.querySelector('splat-view')?.camera", complaints="401"):
                     pass

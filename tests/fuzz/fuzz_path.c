@@ -43,7 +43,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     size_t count;
     double fps;
-    if (!spl_camera_path_count(&path, 0, NAN, NAN, &count, &fps, NULL))
+    if (!spl_camera_path_count(&path, 0, NAN, NAN, SPL_CAMERA_PATH_MAX, &count, &fps, NULL))
         require(count >= 1 && count <= SPL_CAMERA_PATH_MAX && fps > 0 && fps <= 1000);
     spl_camera_path_finish(&path);
     return 0;

@@ -238,6 +238,18 @@ def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_ope
                 assert code == 2 and f"{conf}, line 3: " in got, (text, code, got)
                 assert all(word in got for word in said) and "health" not in got and got.count("\n") == 1, (text, got)
                 assert log_format == "text" or lines_of_json(got)[0]["level"] == "error", got
+        for text, args, said in [
+            ("queue = 5\nqueu = 5\nqueue = 6\noops", (), ("line 2: there is no", "line 3: queue is given", "line 4: 'oops'")),
+            ("listen = a\nlisten = b:1", (), ("line 1: listen takes", "line 2: listen is given a second time")),
+            ("queue = 5", ("--queue", "x"), ("splatd: --queue takes",)),  # not the file's fault
+        ]:
+            with open(conf, "w") as f:
+                f.write(text)
+            code, got = refused("--config", conf, *args, WALL)
+            lines = got.splitlines()
+            assert code == 2 and len(lines) == len(said), got
+            assert all(word in line and line.count(conf) <= 1 for word, line in zip(said, lines)), got
+            assert args == () or conf not in got, got
         big, fifo = os.path.join(folder, "big"), os.path.join(folder, "fifo")
         with open(big, "wb") as f:
             f.truncate(1 << 30)

@@ -60,7 +60,7 @@ def test_bad_batches_are_refused_by_name():
             ("", "body"), ("[]", "body"), ("{", "body"), ("{}", "views"), ({"views": []}, "views"),
             ({"views": {}}, "views"),
             ({"views": [one] * 257}, "views"), ({"views": [5]}, "views[0]"), ({"views": [one, []]}, "views[1]"),
-            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].fov"),
+            ({"views": [one, {**one, "camera": {"fov": 180}}]}, "views[1].camera.fov"),
             ({"views": [{**one, "a": 1}]}, "views[0].a"),
             ({"views": [{**one, "layers": ["color"]}]}, "views[0].layers"), ({"views": [one], "layers": "color"},
                                                                              "views[0].layers"),
@@ -75,6 +75,8 @@ def test_bad_batches_are_refused_by_name():
         ]:
             reply = d.post(body, BATCH)
             assert reply.status == 400 and reply.json()["field"] == field, (body, reply.body)
+        for body, said in ((b"{}", "1 to 256; it is missing"), ({"views": []}, "it is an array of 0"), ({"views": 5}, "it is a number")):
+            assert d.post(body, BATCH).json()["detail"].endswith(said)
         wrong = d.post({"views": [one, {**one, "v": "0" * 16}]}, BATCH)
         assert wrong.status == 404 and wrong.json()["field"] == "v"
         assert d.ask(BATCH).status == 405 and d.ask(BATCH + "?width=5", "POST", "{}").json()["field"] == "width"

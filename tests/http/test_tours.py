@@ -245,7 +245,7 @@ def test_bad_tours_are_refused_by_field():
         ({"path": "1 2 3"}, "tz"), ({**body(), "shade": 1}, "shade"), ({**body(), "frames": 0}, "frames"),
         ({**body(), "frames": 1.5}, "frames"), ({**body(), "frames": "2"}, "frames"), ({**body(), "fps": 0}, "fps"),
         ({**body(), "seconds": 2}, "seconds"), ({"path": body()["path"]}, "frames"),
-        ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].eye"),
+        ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].camera.eye"),
         ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
         ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
         ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),
@@ -279,6 +279,7 @@ def test_quotas():
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-frames", "8", "--tour-pixels", "20000",
                                     "--tour-disk", "60K") as d:
         assert begin(d, body(9), 400)["field"] == "frames"
+        assert "the limit is 8" in begin(d, body(1000000), 400)["detail"]  # not that of all paths
         assert begin(d, body(7), 400)["field"] == "frames"  # 21,504 pixels
         kept = begin(d, body(6))
         ended(d, kept["uri"])

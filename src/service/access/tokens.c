@@ -72,9 +72,11 @@ static int parse_scopes(struct spl_token *token, char *text, const struct place 
         int scope = SPL_SCOPE_VIEW;
         while (scope < SPL_SCOPES && strcmp(name, spl_scope_names[scope]))
             scope++;
+        bool secret = strlen(name) >= token_least; // what is that long may be a token in the wrong place
         if (scope == SPL_SCOPES)
-            return spl_fail(err, SPL_E_USAGE, "%s, line %zu: the second field is view, tour, admin, joined by commas",
-                            at->path, at->line);
+            return spl_fail(err, SPL_E_USAGE,
+                            "%s, line %zu: the second field holds %s%s%s; it takes view, tour, admin, joined by commas",
+                            at->path, at->line, secret ? "" : "'", secret ? "something long" : name, secret ? "" : "'");
         token->scopes |= 1u << scope;
     }
     return 0;

@@ -26,9 +26,9 @@ static char *trim(char *begin, char *end)
     return begin;
 }
 
-/* `given` marks the names that were seen. */
+/* `given` holds the line that has each name, 0 for none. */
 static int parse_line(struct spl_service_options *options, const char *path, unsigned number, char *line, char *end,
-                      bool given[SPL_PARAMETERS], struct spl_error *err)
+                      unsigned given[SPL_PARAMETERS], struct spl_error *err)
 {
     char where[256], *text = trim(line, end), *equals = strchr(text, '=');
     if (!*text || (*text == '#' && !strchr(text, '\r')))
@@ -44,8 +44,9 @@ static int parse_line(struct spl_service_options *options, const char *path, uns
         return spl_fail(err, SPL_E_USAGE, "%sthere is no parameter '%.80s'; 'splatd serve --help' lists them", where,
                         name);
     if (given[index] && spl_parameters[index].type != SPL_PARAMETER_LIST)
-        return spl_fail_field(err, SPL_E_USAGE, name, "%s%s is given a second time, as '%.80s'", where, name, value);
-    given[index] = true;
+        return spl_fail_field(err, SPL_E_USAGE, name, "%s%s is given a second time, as '%.80s'; line %u has it already",
+                              where, name, value, given[index]);
+    given[index] = number;
     return spl_service_options_set(options, index, value, SPL_FROM_FILE, where, err);
 }
 
@@ -53,7 +54,7 @@ int spl_service_options_parse(struct spl_service_options *options, const char *p
                               struct spl_error *err)
 {
     static const char mark[] = "\xef\xbb\xbf"; // what editors for Windows put first
-    bool given[SPL_PARAMETERS] = {0};
+    unsigned given[SPL_PARAMETERS] = {0};
     unsigned number = 1;
     const char *zero = memchr(data, '\0', length);
     for (const char *c = data; zero && c < zero; c++)
@@ -67,10 +68,15 @@ int spl_service_options_parse(struct spl_service_options *options, const char *p
     copy[length] = '\0';
     int rc = 0;
     char *first = copy + (strncmp(copy, mark, sizeof mark - 1) ? 0 : sizeof mark - 1);
-    for (char *line = first, *next; !rc && line < copy + length; line = next, number++) {
+    for (char *line = first, *next; rc != SPL_E_NOMEM && line < copy + length; line = next, number++) {
         char *end = strchrnul(line, '\n');
+        struct spl_error why = {0};
         next = end + 1;
-        rc = parse_line(options, path, number, line, end, given, err);
+        int code = parse_line(options, path, number, line, end, given, &why);
+        if (code && rc && options->mistakes < SPL_MISTAKES_MAX)
+            options->mistake[options->mistakes++] = why;
+        if (code && (!rc || code == SPL_E_NOMEM))
+            rc = spl_fail_field(err, code, why.field, "%s", why.message);
     }
     free(copy);
     return rc;

@@ -26,6 +26,8 @@ enum spl_parameter_type {
 /* Who has set a value; a weaker source never replaces a stronger one's. */
 enum spl_origin { SPL_FROM_DEFAULT, SPL_FROM_FILE, SPL_FROM_FLAG };
 
+enum { SPL_MISTAKES_MAX = 16 }; /* of a file, beside the first, that are kept */
+
 struct spl_text_list {
     char **items;
     size_t count;
@@ -52,6 +54,8 @@ struct spl_service_options {
 #undef PARAMETER
     enum spl_origin origin[SPL_PARAMETERS];
     char *where[SPL_PARAMETERS]; // may be NULL; "FILE, line 3: " of what a file has set last
+    struct spl_error mistake[SPL_MISTAKES_MAX]; // what a file has wrong behind its first error, in its order
+    size_t mistakes;
 };
 
 struct spl_parameter {
@@ -89,7 +93,8 @@ void spl_service_options_locate(const struct spl_service_options *options, const
 /* Reads a config file: lines `name = value`, blank lines, and lines whose first character is '#'. Space around name and
  * value is dropped, everything else of the value is kept as it stands. A name may be given once, a LIST several times.
  * Line ends may be CRLF, a byte order mark may come first. A regular file of at most 1 MiB.
- * SPL_E_USAGE with file, line, name and value. Blocks on disk. */
+ * SPL_E_USAGE with file, line, name and value of the first mistake; `options` holds those behind it, so that one start
+ * tells all of them. Blocks on disk. */
 int spl_service_options_read(struct spl_service_options *options, const char *path, struct spl_error *err);
 
 /* The same from memory; `path` is for messages. */

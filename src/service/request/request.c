@@ -120,8 +120,8 @@ static int resolve_demand(const struct values *values, const struct spl_camera_l
     struct spl_demand *demand = &out->demand;
     double budget = get(values, PARAM_budget, NAN), psnr = get(values, PARAM_psnr, NAN);
     if (given(values, PARAM_budget) && !(budget > 0 && budget <= longest_ms))
-        return spl_fail_field(err, SPL_E_INPUT, "budget", "budget %g ms is outside 0 (exclusive) to %.0f", budget,
-                              longest_ms);
+        return spl_fail_field(err, SPL_E_INPUT, "budget", "budget must be above 0, up to %.0f ms, not %g", longest_ms,
+                              budget);
     if (given(values, PARAM_psnr) && !(psnr >= 0 && psnr <= SPL_PROFILE_PSNR_MAX))
         return spl_fail_field(err, SPL_E_INPUT, "psnr", "psnr %g is outside 0 to %g", psnr, SPL_PROFILE_PSNR_MAX);
     if (given(values, PARAM_psnr) && out->layer != SPL_LAYER_COLOR)

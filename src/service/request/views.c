@@ -40,7 +40,9 @@ static int resolve_all(const struct values *common, json_t *list, const struct s
         struct spl_view_request *view = &out->views[out->count];
         struct spl_error why = {0};
         char field[sizeof why.field + 24];
-        int rc = resolve_view(common, json_array_get(list, out->count), defaults, limits, view, &why);
+        json_t *json = json_array_get(list, out->count);
+        int rc = resolve_view(common, json, defaults, limits, view, &why);
+        spl_camera_locate(json, &why);
         snprintf(field, sizeof field, "views[%zu]%s%s", out->count, why.field[0] ? "." : "", why.field);
         if (rc)
             return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);
@@ -62,10 +64,11 @@ static int read_document(json_t *document, struct values *common, json_t **list,
     if (!json_is_object(document))
         return spl_fail_field(err, SPL_E_INPUT, "body", "the body must be a JSON object, not %s",
                               spl_json_type_name(document));
+    char shape[40];
     *list = json_incref(json_object_get(document, "views"));
     if (!json_is_array(*list) || !json_array_size(*list) || json_array_size(*list) > SPL_VIEWS_MAX)
-        return spl_fail_field(err, SPL_E_INPUT, "views", "views must be an array of 1 to %d views, not %s of %zu",
-                              SPL_VIEWS_MAX, spl_json_type_name(*list), json_array_size(*list));
+        return spl_fail_field(err, SPL_E_INPUT, "views", "views must be an array of 1 to %d; it is %s", SPL_VIEWS_MAX,
+                              spl_json_show_shape(*list, shape));
     json_object_del(document, "views");
     return spl_values_from_object(common, document, SPL_BODY, err);
 }

@@ -159,9 +159,6 @@ static int check_limits(const struct spl_view *settings, const struct spl_camera
         return spl_fail_field(err, SPL_E_LIMIT, "settings.layers", "frames of %llu bytes; the limit is %llu",
                               (unsigned long long)spl_view_get_frame_bytes(&view),
                               (unsigned long long)limits->image.bytes);
-    if (frames > limits->frames)
-        return spl_fail_field(err, SPL_E_LIMIT, "frames", "%zu frames; the limit is %llu", frames,
-                              (unsigned long long)limits->frames);
     if (frames > limits->pixels / samples)
         return spl_fail_field(err, SPL_E_LIMIT, "frames",
                               "%zu frames of %llu samples; the limit of a tour is %llu", frames,
@@ -203,8 +200,8 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         return spl_fail_field(err, SPL_E_INPUT, "frames", "frames %g is no whole number from 1 on", frames);
     if ((rc = parse_settings(json_object_get(body, "settings"), defaults, &limits->image, &out->view, err)) ||
         (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
-        (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, &out->frames, &out->fps,
-                                    err)) ||
+        (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, limits->frames,
+                                    &out->frames, &out->fps, err)) ||
         (rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))

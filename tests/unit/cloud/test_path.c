@@ -194,9 +194,9 @@ static void test_bad_paths_are_named(void **state)
         {OWN("{}"), "keyframes[1].camera"},
         {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
              "\"znear\":1,\"aspectRatio\":1}}}}"),
-         "keyframes[1].gltf.perspective.aspectRatio"},
+         "keyframes[1].camera.gltf.perspective.aspectRatio"},
         {OWN("5"), "keyframes[1].views"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[0,0,0],\"fov\":60}}"), "keyframes[1].target"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[0,0,0],\"fov\":60}}"), "keyframes[1].camera.target"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"time\":\"x\"}"), "keyframes[1].time"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"time\":4}"), "keyframes[1].time"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"fov\":60},\"colour\":4}"), "keyframes[1].colour"},
@@ -208,6 +208,25 @@ static void test_bad_paths_are_named(void **state)
         if (!rc || strcmp(err.field, cases[i].field) || !err.message[0])
             fail_msg("%s: wanted field '%s', got '%s': %s", cases[i].text, cases[i].field, err.field, err.message);
         assert_true(path.count == 0 && !path.cameras && !path.times);
+    }
+}
+
+static void test_what_is_no_trajectory_says_so(void **state)
+{
+    (void)state;
+    static const char *const cases[][2] = {
+        {"listen = 127.0.0.1:8080\n", "timestamp: 'listen' is no number; text, so it was read as a TUM trajectory"},
+        {"1 2 3 4 0 0 0\n", "line 1: qw: 7 numbers; a line of a TUM trajectory has 8: timestamp tx"},
+        {"1\n", "line 1: tx: 1 numbers"},
+        {"1 2 3 4 0 0 0 1 9 9\n", "line 1: 10 numbers"},
+        {"0 2 3 4 0 0 0 1\n1 2 x 4 0 0 0 1\n", "line 2: ty: 'x' is no number"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_camera_path path;
+        struct spl_error err = {0};
+        assert_int_equal(parse(cases[i][0], (struct spl_path_options){0}, &path, &err), SPL_E_INPUT);
+        if (!strstr(err.message, cases[i][1]))
+            fail_msg("%s: '%s' does not say '%s'", cases[i][0], err.message, cases[i][1]);
     }
 }
 
@@ -301,6 +320,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_golden_vectors),  cmocka_unit_test(test_own_sizes_and_defaults),
         cmocka_unit_test(test_times_and_order), cmocka_unit_test(test_bad_paths_are_named),
+        cmocka_unit_test(test_what_is_no_trajectory_says_so),
         cmocka_unit_test(test_files),           cmocka_unit_test(test_a_binary_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

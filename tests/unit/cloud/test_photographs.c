@@ -129,6 +129,17 @@ static void assert_refused(const char *path, int code, const char *field, const 
     assert_null(list.views);
 }
 
+static void images_that_are_no_folder_are_named_by_their_flag(void **state)
+{
+    (void)state;
+    struct spl_view_list list;
+    struct spl_error err = {0};
+    assert_int_equal(load(&list, folder, at("none"), NULL, &err), SPL_E_NOT_FOUND);
+    assert_string_equal(err.field, "images");
+    assert_non_null(strstr(err.message, "--images '"));
+    assert_non_null(strstr(err.message, "none' is no folder"));
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -244,10 +255,10 @@ static void a_fault_of_one_photograph_is_handed_out(void **state)
     struct spl_error err = {0};
     put_text("cameras.txt", "1 PINHOLE 640 480 500 510 331.25 228.5\n2 FOV 640 480 500 510 331.25 228.5 0.9\n");
     put_text("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 0 0 0 0 0 0 0 1 b.jpg\n\n3 1 0 0 0 0 0 0 2 c.jpg\n\n");
-    if (load(&list, folder, "/elsewhere", &refused, &err))
+    if (load(&list, folder, "/tmp", &refused, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 1);
-    assert_string_equal(list.views[0].photograph, "/elsewhere/a.jpg");
+    assert_string_equal(list.views[0].photograph, "/tmp/a.jpg");
     assert_int_equal(refused.count, 3); /* the camera, b's pose, c for its camera */
     assert_non_null(strstr(refused.first.message, "FOV"));
     spl_view_list_finish(&list);
@@ -422,6 +433,7 @@ static void no_refused_allocation_is_passed_over(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(images_that_are_no_folder_are_named_by_their_flag),
         cmocka_unit_test_teardown(binary_means_what_text_means, clean),
         cmocka_unit_test_teardown(broken_binary_models_are_refused_by_offset, clean),
         cmocka_unit_test_teardown(a_fault_of_one_photograph_is_handed_out, clean),

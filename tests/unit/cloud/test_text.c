@@ -96,6 +96,12 @@ static void columns_are_recognised_by_their_values(void **state)
     loaded_finish(&l);
 }
 
+static void a_header_without_names_asks_for_columns(void **state)
+{
+    (void)state;
+    refused_text("easting northing height\n1 2 3\n", SPL_E_INPUT, "x", "name the columns with --columns");
+}
+
 static void counted_files(void **state)
 {
     struct loaded l;
@@ -223,6 +229,7 @@ int main(void)
         cmocka_unit_test(named_columns),
         cmocka_unit_test(columns_are_recognised_by_their_values),
         cmocka_unit_test(counted_files),
+        cmocka_unit_test(a_header_without_names_asks_for_columns),
         cmocka_unit_test(samples_are_checked_against_the_rest),
         cmocka_unit_test(broken_text_is_refused),
         cmocka_unit_test(the_option_is_checked),

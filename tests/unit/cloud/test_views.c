@@ -228,6 +228,13 @@ static void photographs_are_found_where_colmap_keeps_them(void **state)
     assert_int_equal(spl_view_list_load(&list, path, NULL), 0);
     assert_int_equal(access(list.views[0].photograph, R_OK), 0);
     spl_view_list_finish(&list);
+    snprintf(path, sizeof path, "%s/project/sparse", folder);
+    assert_refused(path, SPL_E_NOT_FOUND, "", "did you mean");
+    assert_refused(path, SPL_E_NOT_FOUND, "", "project/sparse/0'?");
+    snprintf(path, sizeof path, "%s/project", folder);
+    assert_refused(path, SPL_E_NOT_FOUND, "", "project/sparse/0'?");
+    snprintf(path, sizeof path, "%s/project/images", folder);
+    assert_refused(path, SPL_E_NOT_FOUND, "", "cameras.txt");
 }
 
 static void no_refused_allocation_is_passed_over(void **state)

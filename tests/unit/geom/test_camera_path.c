@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <math.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
@@ -293,12 +294,25 @@ static void test_frames_are_counted(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_error err = {0};
         int rc =
-            spl_camera_path_count(cases[i].path, cases[i].frames, cases[i].fps, cases[i].seconds, &count, &fps, &err);
+            spl_camera_path_count(cases[i].path, cases[i].frames, cases[i].fps, cases[i].seconds, SPL_CAMERA_PATH_MAX,
+                                  &count, &fps, &err);
         assert_int_equal(rc != 0, cases[i].field != NULL);
         if (rc)
             assert_string_equal(err.field, cases[i].field);
         else
             assert_true(count == cases[i].count && fps == cases[i].rate);
+    }
+    static const char *const fields[] = {"frames", "seconds", "seconds", "frames"};
+    for (int i = 0; i < 4; i++) { /* the caller's limit is the one that is named, whatever asks for the frames */
+        struct spl_error err = {0};
+        const struct spl_camera_path *path = i == 3 ? &whole : i == 2 ? &timed : &plain;
+        double seconds = i == 1 ? 1 : NAN;
+        int rc = spl_camera_path_count(path, i ? 0 : 1000000, NAN, seconds, keys - 1, &count, &fps, &err);
+        assert_int_equal(rc, SPL_E_LIMIT);
+        assert_string_equal(err.field, fields[i]);
+        char said[32];
+        snprintf(said, sizeof said, "the limit is %d", (int)keys - 1);
+        assert_non_null(strstr(err.message, said));
     }
     spl_camera_path_finish(&plain);
     spl_camera_path_finish(&timed);

@@ -74,7 +74,7 @@ static void bad_lines_say_where_and_what(void **state)
         {"cors = https://", {"line 1: cors takes"}},
         {"host-name = scans.example:8080", {"line 1: host-name takes", "'scans.example:8080'"}},
         {"host-name = https://scans.example", {"line 1: host-name takes"}},
-        {"queue = 5\nencoders = 1\nqueue = 6", {"line 3", "queue", "second", "'6'"}},
+        {"queue = 5\nencoders = 1\nqueue = 6", {"line 3: queue", "second", "'6'", "line 1 has it already"}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_error err = {0};
@@ -90,6 +90,27 @@ static void bad_lines_say_where_and_what(void **state)
     assert_non_null(strstr(err.message, "x.conf, line 2"));
     assert_int_equal(spl_service_options_read(&options, "/no/such.conf", NULL), SPL_E_USAGE);
     assert_int_equal(spl_service_options_read(&options, "/", NULL), SPL_E_USAGE);
+}
+
+static void every_mistake_of_a_file_is_kept(void **state)
+{
+    (void)state;
+    static const char *const said[] = {"line 3: there is no parameter", "line 4: 'oops'", "line 5: queue is given"};
+    struct spl_error err = {0};
+    assert_int_equal(parse("listen = x\nqueue = 5\nqueu = 5\noops\nqueue = 6\nencoders = 2", &err), SPL_E_USAGE);
+    assert_non_null(strstr(err.message, "line 1: listen"));
+    assert_int_equal(options.mistakes, 3);
+    for (int i = 0; i < 3; i++)
+        if (!strstr(options.mistake[i].message, said[i]))
+            fail_msg("'%s' is not in '%s'", said[i], options.mistake[i].message);
+    assert_int_equal(options.queue, 5);
+    char lines[100 * 5 + 1] = "";
+    for (int i = 0; i < 100; i++)
+        strcat(lines, "oops\n");
+    end(NULL);
+    begin(NULL);
+    assert_int_equal(parse(lines, NULL), SPL_E_USAGE);
+    assert_int_equal(options.mistakes, SPL_MISTAKES_MAX);
 }
 
 static void a_file_sets_every_type(void **state)
@@ -213,6 +234,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(bad_lines_say_where_and_what, begin, end),
+        cmocka_unit_test_setup_teardown(every_mistake_of_a_file_is_kept, begin, end),
         cmocka_unit_test_setup_teardown(a_file_sets_every_type, begin, end),
         cmocka_unit_test_setup_teardown(values_that_contradict_each_other_are_refused, begin, end),
         cmocka_unit_test_setup_teardown(flags_win_over_the_file_in_either_order, begin, end),

@@ -316,7 +316,8 @@ static void bodies_are_refused_by_name(void **state)
         {"{\"transparent\":\"true\"}", "transparent"},
         {"{\"background\":[1,2,3]}", "background"},
         {"{\"camera\":{\"matrix\":[1,2,3],\"convention\":\"opencv\"}}", "matrix"},
-        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}", "convention"},
+        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}",
+         "convention"},
         {"{\"camera\":{\"convention\":\"opengl\"}}", "matrix"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"convention\":\"directx\"}}", "convention"},
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1],\"convention\":\"opengl\"}}", "matrix"},
@@ -462,13 +463,33 @@ static void refusals_say_what_to_write(void **state)
         {"eye=0,0,5&target=0,0,0", "up=0,1,0"},
         {"eye=0,5,0&target=0,0,0&up=0,1,0", "up=0,0,1"},
         {"background=#fff", "a CSS name such as white, RRGGBB"},
+        {"background=", "'#' is written %23 in a URL, or left out"},
         {"zoom=3", "/v1/openapi.json"},
+        {"eye=1,0,0&target=0,0,0&fov=0", "above 0, up to 179 degrees, not 0"},
+        {"budget=0", "above 0, up to 600000"},
         {"height=8192", "the width that follows from height is 14564; at most 8192"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_view_request r;
         struct spl_error err;
         assert_int_equal(query(rows[i][0], &r, &err), SPL_E_INPUT);
+        if (!strstr(err.message, rows[i][1]))
+            fail_msg("%s: '%s' does not say '%s'", rows[i][0], err.message, rows[i][1]);
+    }
+}
+
+static void refusals_of_bodies_say_what_to_write(void **state)
+{
+    (void)state;
+    static const char *const rows[][2] = {
+        {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}",
+         "'convention' is needed where 'matrix' is given: opengl or opencv"},
+        {"{\"camera\":{\"matrix\":[[1,0,0,0]],\"convention\":\"opengl\"}}", "3 or 4 rows of 4; it is an array of 1 rows"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view_request r;
+        struct spl_error err;
+        assert_int_equal(json(rows[i][0], &r, &err), SPL_E_INPUT);
         if (!strstr(err.message, rows[i][1]))
             fail_msg("%s: '%s' does not say '%s'", rows[i][0], err.message, rows[i][1]);
     }
@@ -502,6 +523,7 @@ int main(void)
         cmocka_unit_test(a_side_that_is_left_out_follows),
         cmocka_unit_test(matrices_are_taken_as_rows),
         cmocka_unit_test(colours_have_names),                cmocka_unit_test(refusals_say_what_to_write),
+        cmocka_unit_test(refusals_of_bodies_say_what_to_write),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
