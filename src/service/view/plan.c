@@ -9,6 +9,7 @@
 
 #include <math.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -80,6 +81,24 @@ static bool is_usable(const struct spl_setting *setting)
     return view.supersample == setting->supersample;
 }
 
+/* What clients read: where the file lies is not their business. `err` is about the profile's file, and names it. */
+static void say_to_clients(const struct spl_plan *plan, struct spl_error *err)
+{
+    size_t folder = (size_t)(strrchr(plan->path, '/') ? strrchr(plan->path, '/') + 1 - plan->path : 0);
+    if (err->code == SPL_E_NOT_FOUND) {
+        snprintf(err->message, sizeof err->message,
+                 "dataset '%s' has no profile; 'splatd bench %s.spld -o FOLDER' makes one", plan->info->id,
+                 plan->info->id);
+        return;
+    }
+    char *at = strstr(err->message, plan->path);
+    if (at)
+        memmove(at, at + folder, strlen(at + folder) + 1);
+    else if (folder && strchr(err->message, '/')) // the path was too long to be named whole
+        snprintf(err->message, sizeof err->message, "the profile of dataset '%s' is ignored; the service's log says why",
+                 plan->info->id);
+}
+
 static void read_profile(struct spl_plan *plan)
 {
     struct spl_profile profile;
@@ -88,6 +107,8 @@ static void read_profile(struct spl_plan *plan)
     int rc = spl_profile_load(plan->path, plan->info, &plan->device, &profile, &err);
     if (rc && rc != SPL_E_NOT_FOUND)
         spl_log_warn("profile ignored: %s", err.message);
+    if (rc)
+        say_to_clients(plan, &err);
     if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
         spl_planner_finish(&plan->planner);
         plan->planner = planner;
