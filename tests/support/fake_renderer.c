@@ -123,6 +123,8 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
                     struct spl_frame_steps **out, struct spl_error *err)
 {
     (void)dataset;
+    if (spl_view_get_samples(view) > (uint64_t)setting("FAKE_ROOM_PX", 1 << 30))
+        return spl_fail(err, SPL_E_LIMIT, "a draw list of 9 bytes has no room on the fake device");
     struct spl_frame_steps *steps = *out = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;

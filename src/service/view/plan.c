@@ -9,13 +9,13 @@
 
 #include <math.h>
 #include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/datasets/catalog.h"
 #include "shared.h"
 
 static const double encoding_margin = 1.25, encoding_gain = 0.2, encoding_step = 1; /* ln */
@@ -81,22 +81,19 @@ static bool is_usable(const struct spl_setting *setting)
     return view.supersample == setting->supersample;
 }
 
-/* What clients read: where the file lies is not their business. `err` is about the profile's file, and names it. */
-static void say_to_clients(const struct spl_plan *plan, struct spl_error *err)
+/* What clients read: where the file lies is not their business. */
+static void hide_place(const struct spl_plan *plan, struct spl_error *err)
 {
-    size_t folder = (size_t)(strrchr(plan->path, '/') ? strrchr(plan->path, '/') + 1 - plan->path : 0);
-    if (err->code == SPL_E_NOT_FOUND) {
-        snprintf(err->message, sizeof err->message,
-                 "dataset '%s' has no profile; 'splatd bench %s.spld -o FOLDER' makes one", plan->info->id,
-                 plan->info->id);
-        return;
-    }
-    char *at = strstr(err->message, plan->path);
-    if (at)
-        memmove(at, at + folder, strlen(at + folder) + 1);
-    else if (folder && strchr(err->message, '/')) // the path was too long to be named whole
-        snprintf(err->message, sizeof err->message, "the profile of dataset '%s' is ignored; the service's log says why",
-                 plan->info->id);
+    enum { cut = 140 }; // messages name less of longer paths: too little to be found in them
+    const char *slash = strrchr(plan->path, '/'), *id = plan->info->id;
+    struct spl_error own = {0};
+    if (err->code == SPL_E_NOT_FOUND)
+        spl_fail(&own, err->code, "dataset '%s' has no profile; 'splatd bench %s.spld -o FOLDER' makes one", id, id);
+    else if (slash && slash - plan->path > cut)
+        spl_fail(&own, err->code, "the profile of dataset '%s' is ignored; the service's log says why", id);
+    else
+        spl_catalog_hide_folder(own.message, sizeof own.message, err->message, plan->path);
+    memcpy(err->message, own.message, sizeof err->message);
 }
 
 static void read_profile(struct spl_plan *plan)
@@ -108,7 +105,7 @@ static void read_profile(struct spl_plan *plan)
     if (rc && rc != SPL_E_NOT_FOUND)
         spl_log_warn("profile ignored: %s", err.message);
     if (rc)
-        say_to_clients(plan, &err);
+        hide_place(plan, &err);
     if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
         spl_planner_finish(&plan->planner);
         plan->planner = planner;
