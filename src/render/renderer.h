@@ -75,8 +75,8 @@ struct spl_tile {
 
 enum spl_stage { SPL_STAGE_BEGIN, SPL_STAGE_CLEAR, SPL_STAGE_DEPTH, SPL_STAGE_SHADE, SPL_STAGE_RESOLVE };
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
-                     struct spl_error *err);
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
+                     const struct spl_renderer_options *options, struct spl_error *err);
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
 /* Copies the draw list into the mapped buffers, growing them where it does not fit, at the cost of pages that the frame
  * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */

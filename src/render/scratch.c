@@ -6,7 +6,7 @@
 
 enum {
     chunks_at_start = 16384,
-    entries_at_start = 262144,
+    chunk_entries_at_start = 16, // 128 splats in runs of 32 are 4; near ones are listed once a window
     lines_at_start = 65536, // wires are drawn whole whatever pages there are: more than most scans have in view
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
@@ -17,8 +17,8 @@ static uint64_t taken(uint64_t bytes)
     return (bytes + 15) / 16 * 16;
 }
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
-                     struct spl_error *err)
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
+                     const struct spl_renderer_options *options, struct spl_error *err)
 {
     const struct spl_gpu_limits *limits = spl_gpu_get_limits(gpu);
     if (samples * 16 > limits->binding_bytes)
@@ -26,6 +26,11 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
     if (samples > (uint64_t)limits->workgroups * SPL_WORKGROUP) /* the resolve pass is one dispatch */
         samples = (uint64_t)limits->workgroups * SPL_WORKGROUP;
     *scratch = (struct spl_scratch){.samples = samples};
+    uint64_t chunks = options->first_page_chunks + options->first_page_chunks / 4; // near ones, in several windows
+    if (chunks < chunks_at_start)
+        chunks = chunks_at_start;
+    if (chunks > limits->binding_bytes / sizeof(struct spl_draw_chunk))
+        chunks = limits->binding_bytes / sizeof(struct spl_draw_chunk);
     bool software = spl_gpu_get_device(gpu)->software;
     const struct {
         struct spl_gpu_buffer **buffer;
@@ -38,12 +43,13 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
         {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
-        {&scratch->chunks, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_draw_chunk)},
-        {&scratch->bounds, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_chunk_bounds)},
-        {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
+        {&scratch->chunks, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_draw_chunk)},
+        {&scratch->bounds, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_chunk_bounds)},
+        {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
         {&scratch->lines, SPL_GPU_UPLOAD, lines_at_start * sizeof(struct spl_draw_line)},
     };
-    uint64_t working = 0, mib = 1 << 20, page = taken(page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
+    uint64_t working = 0, mib = 1 << 20;
+    uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
         working += taken(wanted[i].bytes);
     if (working > limits->memory_bytes) // a page that has no room is its dataset's business
@@ -95,8 +101,9 @@ static int upload(struct spl_scratch *scratch, struct spl_residency *residency, 
             larger = most;
         larger = taken(larger <= left ? larger : bytes);
         if (larger > left) // both are there for a moment
-            return spl_fail(err, SPL_E_LIMIT, "a draw list of %" PRIu64 " bytes has no room beside working memory and the "
-                            "largest dataset's first page; raise lod, or memory-limit above %" PRIu64, bytes,
+            return spl_fail(err, SPL_E_LIMIT,
+                            "a draw list of %" PRIu64 " bytes has no room beside working memory and the largest dataset's "
+                            "first page; raise lod, or memory-limit above %" PRIu64, bytes,
                             spl_gpu_get_limits(gpu)->memory_bytes);
         struct spl_gpu_buffer *replacement;
         int rc = spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, larger, &replacement, err);
@@ -114,10 +121,18 @@ static int upload(struct spl_scratch *scratch, struct spl_residency *residency, 
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err)
 {
-    int rc = upload(scratch, residency, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
-    if (!rc)
-        rc = upload(scratch, residency, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
-    if (!rc)
-        rc = upload(scratch, residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
-    return rc ? rc : upload(scratch, residency, &scratch->lines, list->lines, list->line_count * sizeof *list->lines, err);
+    const struct {
+        struct spl_gpu_buffer **buffer;
+        const void *from;
+        uint64_t bytes;
+    } all[] = {
+        {&scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks},
+        {&scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds},
+        {&scratch->entries, list->entries, list->entry_count * sizeof *list->entries},
+        {&scratch->lines, list->lines, list->line_count * sizeof *list->lines},
+    };
+    int rc = SPL_OK;
+    for (size_t i = 0; i < sizeof all / sizeof *all && !rc; i++)
+        rc = upload(scratch, residency, all[i].buffer, all[i].from, all[i].bytes, err);
+    return rc;
 }

@@ -1,6 +1,7 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
  * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), in steps of a
- * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, and FAKE_HANG_MS that the first frame
+ * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
+ * no room for frames of more than FAKE_ROOM_PX samples, and FAKE_HANG_MS that the first frame
  * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
  * its own code. */
 #include <splatd/render.h>
