@@ -99,6 +99,7 @@ struct spl_renderer_options {
     uint64_t memory_limit;      /* bytes of device memory, 0 = 3/4 of what the device reports */
     uint64_t scratch_samples;   /* largest tile in samples, 0 = SPL_TILE_SAMPLES */
     uint64_t first_page_bytes;  /* largest first page of datasets to come, for the least limit; 0 = unknown */
+    uint32_t first_page_chunks; /* most chunks in one of these pages: the draw list has room for them from the start */
 };
 #define SPL_TILE_SAMPLES (4ull << 20)
 

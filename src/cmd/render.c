@@ -163,12 +163,16 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_frame_stats *stats,
-                   const struct arguments *a, const struct spl_encoded *encoded)
+static void report(const struct spl_device_info *device, const struct spl_dataset_info *info,
+                   const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
+    const double *low = info->bounds_min, *high = info->bounds_max;
     fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms%s\n", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms,
             stats->complete ? "" : "; coarser than asked for: not everything fits the memory limit");
+    if (!stats->splats_drawn)
+        fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
+                low[0], low[1], low[2], high[0], high[1], high[2]);
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
@@ -196,7 +200,7 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
     if (!rc)
-        report(spl_renderer_get_device(renderer), &frame.stats, a, &encoded);
+        report(spl_renderer_get_device(renderer), spl_dataset_get_info(dataset), &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
     spl_frame_finish(&frame);
     if (renderer && dataset)

@@ -46,7 +46,7 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
 {
     const struct spl_camera *first = path->cameras;
     if (path->count == SPL_CAMERA_PATH_MAX)
-        return spl_fail(err, SPL_E_LIMIT, "more than %d cameras", SPL_CAMERA_PATH_MAX);
+        return spl_fail_field(err, SPL_E_LIMIT, "cameras", "more than %d cameras", SPL_CAMERA_PATH_MAX);
     if (path->count && (camera->width != first->width || camera->height != first->height))
         return spl_fail_field(err, SPL_E_INPUT, "width", "%u x %u after cameras of %u x %u", camera->width,
                               camera->height, first->width, first->height);

@@ -78,6 +78,32 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
     return SPL_OK;
 }
 
+/* Selects and uploads. Pages are taken while selecting; where they leave the draw list no room, it takes that of some,
+ * and the tile is selected anew from those that then fit. */
+static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_renderer *r = job->renderer;
+    struct spl_frame_stats *stats = &job->frame->stats;
+    for (int attempt = 0;; attempt++) {
+        uint64_t clock = spl_now_ns();
+        int rc = select_tile(job, tile, err);
+        stats->select_ms += spl_since_ms(&clock);
+        if (rc)
+            return rc;
+        struct spl_error why = {0};
+        rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+        bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
+        if (again) {
+            why = (struct spl_error){0};
+            spl_residency_begin_frame(&r->residency); // what this frame asked for may go, too
+            rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+        }
+        stats->upload_ms += spl_since_ms(&clock);
+        if (rc || !again)
+            return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+    }
+}
+
 /* Records every group and layer of the view; the n-th requested layer starts at word n * pixels. */
 static int record(struct spl_tile *tile, struct spl_error *err)
 {
@@ -132,14 +158,10 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
 {
     struct spl_renderer *r = job->renderer;
     struct spl_frame_stats *stats = &job->frame->stats;
-    uint64_t ticket, clock = spl_now_ns();
-    if (clock >= job->view->deadline_ns)
+    uint64_t ticket, clock;
+    if (spl_now_ns() >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
-    int rc = select_tile(job, tile, err);
-    stats->select_ms += spl_since_ms(&clock);
-    if (!rc)
-        rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, err);
-    stats->upload_ms += spl_since_ms(&clock);
+    int rc = list_tile(job, tile, err);
     if (!rc)
         rc = record(tile, err);
     if (!rc)

@@ -20,7 +20,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     if (!rc) {
         spl_residency_init(&renderer->residency, renderer->gpu);
         uint64_t samples = options->scratch_samples ? options->scratch_samples : SPL_TILE_SAMPLES;
-        rc = spl_scratch_init(&renderer->scratch, renderer->gpu, samples, options->first_page_bytes, err);
+        rc = spl_scratch_init(&renderer->scratch, renderer->gpu, samples, options, err);
     }
     if (rc) {
         spl_renderer_destroy(renderer);

@@ -34,6 +34,7 @@ enum spl_kernel_slot {
 /* Fixed, pre-sized device memory of one tile. */
 struct spl_scratch {
     uint64_t samples;                /* capacity */
+    uint64_t taken_bytes;            /* by all buffers below */
     struct spl_gpu_buffer *depth;    /* 4 bytes a sample; 8 with 64 bit atomics (method points) */
     struct spl_gpu_buffer *sums;     /* 16 bytes a sample */
     struct spl_gpu_buffer *ids;      /* 4 bytes a sample, and room for the summed textures of a run */
@@ -74,10 +75,11 @@ struct spl_tile {
 
 enum spl_stage { SPL_STAGE_BEGIN, SPL_STAGE_CLEAR, SPL_STAGE_DEPTH, SPL_STAGE_SHADE, SPL_STAGE_RESOLVE };
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
-                     struct spl_error *err);
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
+                     const struct spl_renderer_options *options, struct spl_error *err);
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
-/* Copies the draw list into the mapped buffers, growing them where it does not fit, at the cost of pages of others. */
+/* Copies the draw list into the mapped buffers, growing them where it does not fit, at the cost of pages that the frame
+ * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err);
 

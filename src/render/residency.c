@@ -172,6 +172,16 @@ bool spl_residency_has_room(const struct spl_residency *residency, const struct 
            spl_gpu_get_memory(residency->gpu) + needed <= spl_gpu_get_limits(residency->gpu)->memory_bytes;
 }
 
+uint64_t spl_residency_get_reserve(const struct spl_residency *residency)
+{
+    uint64_t most = 0;
+    for (size_t i = 0; i < residency->dataset_count; i++) {
+        uint64_t bytes = (bytes_of(&residency->datasets[i], 0) + 15) / 16 * 16;
+        most = bytes > most ? bytes : most;
+    }
+    return most * (spl_gpu_get_device(residency->gpu)->software ? 1 : 2);
+}
+
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
 {
     uint64_t bytes = 0;

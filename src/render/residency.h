@@ -66,6 +66,9 @@ void spl_residency_begin_frame(struct spl_residency *residency);
 int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
                               struct spl_gpu_buffer **out, struct spl_error *err);
 
+/* What the largest first page takes, on its way too: without it a dataset has no picture at all. */
+uint64_t spl_residency_get_reserve(const struct spl_residency *residency);
+
 /* Makes slot `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
 int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
                       struct spl_error *err);

@@ -6,8 +6,8 @@
 
 enum {
     chunks_at_start = 16384,
-    entries_at_start = 262144,
-    lines_at_start = 1024,
+    chunk_entries_at_start = 16, // 128 splats in runs of 32 are 4; near ones are listed once a window
+    lines_at_start = 65536, // wires are drawn whole whatever pages there are: more than most scans have in view
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
 
@@ -17,8 +17,8 @@ static uint64_t taken(uint64_t bytes)
     return (bytes + 15) / 16 * 16;
 }
 
-int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples, uint64_t page_bytes,
-                     struct spl_error *err)
+int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
+                     const struct spl_renderer_options *options, struct spl_error *err)
 {
     const struct spl_gpu_limits *limits = spl_gpu_get_limits(gpu);
     if (samples * 16 > limits->binding_bytes)
@@ -26,6 +26,11 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
     if (samples > (uint64_t)limits->workgroups * SPL_WORKGROUP) /* the resolve pass is one dispatch */
         samples = (uint64_t)limits->workgroups * SPL_WORKGROUP;
     *scratch = (struct spl_scratch){.samples = samples};
+    uint64_t chunks = options->first_page_chunks + options->first_page_chunks / 4; // near ones, in several windows
+    if (chunks < chunks_at_start)
+        chunks = chunks_at_start;
+    if (chunks > limits->binding_bytes / sizeof(struct spl_draw_chunk))
+        chunks = limits->binding_bytes / sizeof(struct spl_draw_chunk);
     bool software = spl_gpu_get_device(gpu)->software;
     const struct {
         struct spl_gpu_buffer **buffer;
@@ -38,19 +43,21 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
         {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
-        {&scratch->chunks, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_draw_chunk)},
-        {&scratch->bounds, SPL_GPU_UPLOAD, chunks_at_start * sizeof(struct spl_chunk_bounds)},
-        {&scratch->entries, SPL_GPU_UPLOAD, entries_at_start * sizeof(uint32_t)},
+        {&scratch->chunks, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_draw_chunk)},
+        {&scratch->bounds, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_chunk_bounds)},
+        {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
         {&scratch->lines, SPL_GPU_UPLOAD, lines_at_start * sizeof(struct spl_draw_line)},
     };
-    uint64_t working = 0, page = taken(page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
+    uint64_t working = 0, mib = 1 << 20;
+    uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
         working += taken(wanted[i].bytes);
     if (working > limits->memory_bytes) // a page that has no room is its dataset's business
         return spl_fail_field(err, SPL_E_LIMIT, "memory-limit",
                               "memory-limit, %" PRIu64 " bytes of device memory, is too little: working memory takes %"
-                              PRIu64 ", and the largest dataset's first page %" PRIu64 "; it takes at least %" PRIu64,
-                              limits->memory_bytes, working, page, working + page);
+                              PRIu64 ", and the largest dataset's first page %" PRIu64 "; it takes at least %" PRIu64
+                              ", say %" PRIu64 "M",
+                              limits->memory_bytes, working, page, working + page, (working + page + mib - 1) / mib);
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         int rc = wanted[i].bytes ? spl_gpu_buffer_create(gpu, wanted[i].kind, wanted[i].bytes, wanted[i].buffer, err)
                                  : SPL_OK;
@@ -59,6 +66,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
             return rc;
         }
     }
+    scratch->taken_bytes = working;
     return SPL_OK;
 }
 
@@ -72,22 +80,38 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
     *scratch = (struct spl_scratch){0};
 }
 
-static int upload(struct spl_residency *residency, struct spl_gpu_buffer **buffer, const void *from, uint64_t bytes,
-                  struct spl_error *err)
+/* What the buffers may still take. They never shrink, so they leave every dataset the room of its first page. */
+static uint64_t room(const struct spl_scratch *scratch, const struct spl_residency *residency)
+{
+    uint64_t limit = spl_gpu_get_limits(residency->gpu)->memory_bytes;
+    uint64_t kept = scratch->taken_bytes + spl_residency_get_reserve(residency);
+    return limit > kept ? limit - kept : 0;
+}
+
+static int upload(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
+                  const void *from, uint64_t bytes, struct spl_error *err)
 {
     struct spl_gpu *gpu = residency->gpu;
     if (spl_gpu_buffer_get_bytes(*buffer) < bytes) {
-        uint64_t larger = spl_gpu_buffer_get_bytes(*buffer), most = spl_gpu_get_limits(gpu)->binding_bytes;
+        uint64_t have = spl_gpu_buffer_get_bytes(*buffer), larger = have, left = room(scratch, residency);
+        uint64_t most = spl_gpu_get_limits(gpu)->binding_bytes;
         while (larger < bytes)
             larger *= 2;
         if (larger > most && bytes <= most)
             larger = most;
+        larger = taken(larger <= left ? larger : bytes);
+        if (larger > left) // both are there for a moment
+            return spl_fail(err, SPL_E_LIMIT,
+                            "a draw list of %" PRIu64 " bytes has no room beside working memory and the largest dataset's "
+                            "first page; raise lod, or memory-limit above %" PRIu64, bytes,
+                            spl_gpu_get_limits(gpu)->memory_bytes);
         struct spl_gpu_buffer *replacement;
         int rc = spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, larger, &replacement, err);
         if (rc)
             return rc;
         spl_gpu_buffer_destroy(gpu, *buffer);
         *buffer = replacement;
+        scratch->taken_bytes += larger - taken(have);
     }
     if (bytes)
         memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
@@ -97,10 +121,18 @@ static int upload(struct spl_residency *residency, struct spl_gpu_buffer **buffe
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err)
 {
-    int rc = upload(residency, &scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks, err);
-    if (!rc)
-        rc = upload(residency, &scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds, err);
-    if (!rc)
-        rc = upload(residency, &scratch->entries, list->entries, list->entry_count * sizeof *list->entries, err);
-    return rc ? rc : upload(residency, &scratch->lines, list->lines, list->line_count * sizeof *list->lines, err);
+    const struct {
+        struct spl_gpu_buffer **buffer;
+        const void *from;
+        uint64_t bytes;
+    } all[] = {
+        {&scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks},
+        {&scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds},
+        {&scratch->entries, list->entries, list->entry_count * sizeof *list->entries},
+        {&scratch->lines, list->lines, list->line_count * sizeof *list->lines},
+    };
+    int rc = SPL_OK;
+    for (size_t i = 0; i < sizeof all / sizeof *all && !rc; i++)
+        rc = upload(scratch, residency, all[i].buffer, all[i].from, all[i].bytes, err);
+    return rc;
 }

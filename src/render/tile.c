@@ -89,8 +89,8 @@ int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot 
 
 static int too_many(struct spl_error *err)
 {
-    return spl_fail(err, SPL_E_LIMIT, "a view takes more than %d dispatches, as of so many pages; raise lod",
-                    SPL_PARAMS_SLOTS);
+    return spl_fail_field(err, SPL_E_LIMIT, "lod",
+                          "a view takes more than %d dispatches, as of so many pages; raise lod", SPL_PARAMS_SLOTS);
 }
 
 static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t slot,

@@ -83,16 +83,20 @@ static char *problem_text(const struct request *request, unsigned status, const 
     return text;
 }
 
-/* 413 is about bodies; a parameter beyond a limit is the client's to change, like any other. */
-static unsigned status_of(const struct spl_error *err)
+/* 413 is about bodies, which only PUT brings; a parameter beyond a limit is the client's to change, like any other, and
+ * for a view the device has too little memory, whatever was sent. */
+static unsigned status_of(const struct request *request, const struct spl_error *err)
 {
-    bool field = err->code == SPL_E_LIMIT && err->field[0];
-    return field ? MHD_HTTP_BAD_REQUEST : (unsigned)spl_code_get_info(err->code)->http_status;
+    if (err->code == SPL_E_LIMIT && err->field[0])
+        return MHD_HTTP_BAD_REQUEST;
+    if (err->code == SPL_E_LIMIT && strcmp(request->method, MHD_HTTP_METHOD_PUT))
+        return MHD_HTTP_INSUFFICIENT_STORAGE;
+    return (unsigned)spl_code_get_info(err->code)->http_status;
 }
 
 char *spl_problem_text(const struct request *request, const struct spl_error *err)
 {
-    return problem_text(request, status_of(err), spl_code_get_info(err->code)->name, err->field, err->message);
+    return problem_text(request, status_of(request, err), spl_code_get_info(err->code)->name, err->field, err->message);
 }
 
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
@@ -104,9 +108,10 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
 void spl_reply_error(struct request *request, const struct spl_error *err)
 {
     const struct spl_code_info *info = spl_code_get_info(err->code);
-    if (info->http_status >= 500 && !info->retry && spl_access_log_admit(request->service))
+    unsigned status = status_of(request, err);
+    if (status >= 500 && !info->retry && spl_access_log_admit(request->service))
         spl_log_error("request %s: %s", request->id, err->message);
-    spl_reply_problem(request, status_of(err), info->name, err->field, err->message);
+    spl_reply_problem(request, status, info->name, err->field, err->message);
     if (request->response && info->retry)
         header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", 
                spl_pipeline_get_retry_after(request->service->pipeline, request->large));

@@ -44,6 +44,12 @@ for size in 32 x18; do
     bytes=$("$splatd" render courtyard.spld --size $size --layer id --format raw -o - 2>/dev/null | wc -c)
     [ "$bytes" = $((32 * 18 * 4)) ] || fail "--size $size: $bytes bytes instead of those of 32x18"
 done
+"$splatd" render courtyard.spld --size 32 --format raw -o - 2>messages | wc -c >/dev/null
+grep -q 'nothing is in view' messages && fail "the default view is not empty: $(cat messages)"
+"$splatd" render courtyard.spld --size 32 --eye 0,0,900 --target 0,0,990 --up 0,1,0 --format raw -o - 2>messages >/dev/null
+grep -Eq "nothing is in view; the dataset's bounds are -?[0-9.]+,-?[0-9.]+,-?[0-9.]+ to " messages ||
+    fail "a view of nothing says: $(cat messages)"
+rm -f messages
 "$splatd" render --help | grep -q 'A first look' || fail "no help"
 "$splatd" render courtyard.spld --size 8x8 -o a.png 2>/dev/null
 cp a.png before.png

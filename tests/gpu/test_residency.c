@@ -10,6 +10,7 @@
 
 #include <splatd/render.h>
 
+#include "dataset/dataset.h"
 #include "support/make_dataset.h"
 
 enum { splats = 4000000, splats_beside = 400000, width = 96, height = 64 };
@@ -137,6 +138,46 @@ static void a_draw_list_that_grows_takes_the_place_of_others(void **state)
     spl_renderer_destroy(roomy);
 }
 
+/* Whatever the limit is between the least and everything: pages fill it, and the draw list still grows. */
+static void pages_of_the_same_view_make_room_for_its_draw_list(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_residency_info info;
+    struct spl_renderer *renderer = open_renderer(1ull << 30, &err);
+    uint64_t scratch = spl_renderer_get_memory(renderer), pages = spl_dataset_get_info(dataset)->page_bytes;
+    assert_int_equal(spl_renderer_add(renderer, dataset, &err) || spl_renderer_preload(renderer, dataset, &err), 0);
+    uint64_t all = spl_renderer_get_memory(renderer);
+    spl_renderer_destroy(renderer);
+    assert_true(all >= scratch + pages);
+
+    struct spl_view view = looking(0, 0);
+    const double eye[3] = {-5, -6, 4}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, middle, up, NULL), SPL_OK);
+    size_t first_page;
+    spl_dataset_get_page(dataset, 0, &first_page);
+    uint64_t least = scratch + first_page + 2 * 16;
+    bool stood_in = false;
+    for (int step = 0; step <= 4; step++) {
+        uint64_t limit = least + (all - least) * (uint64_t)step / 4;
+        renderer = open_renderer(limit, &err);
+        assert_non_null(renderer);
+        assert_int_equal(spl_renderer_add(renderer, dataset, &err) || spl_renderer_preload(renderer, dataset, &err), 0);
+        for (int again = 0; again < 2; again++) {
+            struct spl_frame frame;
+            if (spl_renderer_render(renderer, dataset, &view, &frame, &err))
+                fail_msg("limit %d/4: %s", step, err.message);
+            stood_in |= !frame.stats.complete;
+            assert_true(frame.stats.splats_drawn > 0);
+            spl_frame_finish(&frame);
+            spl_renderer_get_residency(renderer, dataset, &info);
+            assert_true(info.bytes > 0 && info.taken_bytes <= limit);
+        }
+        spl_renderer_destroy(renderer);
+    }
+    assert_true(stood_in);
+}
+
 static void preloading_leaves_others_where_they_are(void **state)
 {
     (void)state;
@@ -192,6 +233,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pages_come_and_go_within_the_limit),
         cmocka_unit_test(a_draw_list_that_grows_takes_the_place_of_others),
+        cmocka_unit_test(pages_of_the_same_view_make_room_for_its_draw_list),
         cmocka_unit_test(preloading_leaves_others_where_they_are),
         cmocka_unit_test(a_limit_below_the_scratch_is_refused_with_numbers),
     };

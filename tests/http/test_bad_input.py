@@ -281,6 +281,17 @@ def test_every_line_is_json_where_that_is_asked_for():
         lines_of_json("".join(other.lines))
 
 
+def test_what_the_device_has_no_room_for_is_no_body_too_large():
+    with Daemon(FAKE, FAKE_ROOM_PX="0") as d:
+        pick = VIEW.replace("view", "pick")
+        for reply in (d.view(width=640, height=480), d.post({"width": 64, "height": 48}),
+                      d.ask(pick + "?x=3&y=4"), d.post({"x": 3, "y": 4}, pick)):
+            assert reply.status == 507 and reply.json()["type"] == "urn:splatd:error:limit", (reply.status, reply.body)
+            assert "no room" in reply.json()["detail"] and reply.headers["Retry-After"] is None, reply.body
+    with Daemon(FAKE, FAKE_ROOM_PX=str(64 * 48)) as d:
+        assert d.view(width=640, height=480).status == 507 and d.view(width=64, height=48).status == 200
+
+
 def test_the_least_memory_limit_is_said_and_works():
     def start(limit):
         done = subprocess.run([REAL, "serve", "--log-format", "json", "--memory-limit", str(limit), "--listen",
@@ -288,7 +299,9 @@ def test_the_least_memory_limit_is_said_and_works():
         last = lines_of_json(done.stderr)[-1]["message"]
         assert done.returncode == 2 and "memory-limit" in last and str(limit) in last, done.stderr
         assert "largest that device" not in last, last
-        return int(re.search(r"at least (\d+)", last)[1])
+        exact, mib = map(int, re.search(r"at least (\d+), say (\d+)M", last).groups())
+        assert 0 <= (mib << 20) - exact < 1 << 20, last
+        return exact
     least = start("20971520")
     assert start(1) == least > 20 << 20
     with Daemon(REAL, "--memory-limit", str(least - 1)) as d:  # enough to work with: a page without room is its dataset's state
@@ -297,6 +310,8 @@ def test_the_least_memory_limit_is_said_and_works():
     with Daemon(REAL, "--memory-limit", str(least)) as d:
         assert d.view(width=1280, height=720, method="splat").status == 200
         assert d.view(width=1280, height=720, layer="depth", format="png", method="points").status == 200
+        for query in (dict(method="fill"), dict(lod=0, supersample=4), dict(eye="0.02,0,1", target="0,0.1,1", fov=150, lod=0)):
+            assert d.view(width=1280, height=720, **query).status == 200, query
 
 
 run(globals())

@@ -82,15 +82,19 @@ def test_profile_is_served():
 
 
 def test_without_a_profile_the_choice_is_cautious():
-    with serving(None) as (d, _):
+    with serving(None) as (d, path):
         reply = d.ask(PROFILE)
-        assert reply.status == 404 and "splatd bench" in reply.json()["detail"], reply.body
+        assert str(path.parent) not in reply.json()["detail"], reply.body
+        assert reply.status == 404 and "'wall'" in reply.json()["detail"], reply.body
+        assert "splatd bench wall.spld -o" in reply.json()["detail"], reply.body
         assert d.ask("/v1/datasets/wall").json()["profile"] is None
         setting, reply = ask(d, budget="10ms")
         assert setting[0] == "points" and "psnr" not in reply.headers["Splatd-Promised"]
         assert ask(d, budget="10ms", method="fill")[0][0] == "fill"
+        assert reply.headers["Splatd-Demand-Reason"] is None
         setting, reply = ask(d, psnr=20)
         assert setting == ("splat", 1, 2) and reply.headers["Splatd-Demand"] == "best-effort"
+        assert reply.headers["Splatd-Demand-Reason"] == "not-measured"
 
 
 def test_budget_and_psnr_choose():
@@ -107,6 +111,7 @@ def test_budget_and_psnr_choose():
         assert setting == ("splat", 4, 1) and reply.headers["Splatd-Demand"] == "met"
         setting, reply = ask(d, psnr=50)
         assert setting == ("splat", 1, 2) and reply.headers["Splatd-Demand"] == "best-effort"
+        assert reply.headers["Splatd-Demand-Reason"] == "out-of-reach"
         setting, reply = ask(d, psnr=32, budget="24ms")  # a busy machine may have taught it to be careful by now
         assert setting in [("splat", 2, 1), ("splat", 4, 1)] and reply.headers["Splatd-Demand"] == "best-effort"
         setting, reply = ask(d, budget="1ms")
@@ -177,9 +182,10 @@ def test_profiles_that_cannot_be_trusted_are_ignored():
              (profile(VERSION, device={**DEVICE, "driver": "tests 2"}), "tests 2"),
              (profile(VERSION, points=[]), "points"), ("x" * (2 << 20), "no profile")]
     for document, said in cases:
-        with serving(document) as (d, _):
+        with serving(document) as (d, path):
             reply = d.ask(PROFILE)
             assert reply.status == 404 and said in reply.json()["detail"], (said, reply.body)
+            assert str(path.parent) not in reply.json()["detail"], "where files lie is not the client's business"
             assert d.ask("/v1/datasets/wall").json()["profile"] is None
             assert ask(d, budget="10ms")[0][0] == "points"
             warnings = [line for line in d.lines if "warning" in line and "profile ignored" in line]

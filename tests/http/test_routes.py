@@ -143,7 +143,9 @@ def test_view_headers():
         camera = json.loads(headers["Splatd-Camera"])
         assert camera["eye"] == [3, 0.5, 1] and len(camera["rotation"]) == 9
         assert {k: camera[k] for k in wanted} == wanted
-        assert headers["Splatd-Complete"] == "true"
+        assert headers["Splatd-Complete"] == "true" and int(headers["Splatd-Splats"]) > 0
+        away = d.view(eye="3,0.5,1", target="6,0.5,1", width=64, height=48)
+        assert away.status == 200 and away.headers["Splatd-Splats"] == "0", away.headers
         assert headers["Splatd-Device"].startswith(d.status()["device"]["backend"])
 
 

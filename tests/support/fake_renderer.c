@@ -1,6 +1,7 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
  * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), in steps of a
- * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, and FAKE_HANG_MS that the first frame
+ * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
+ * no room for frames of more than FAKE_ROOM_PX samples, and FAKE_HANG_MS that the first frame
  * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
  * its own code. */
 #include <splatd/render.h>
@@ -123,6 +124,8 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
                     struct spl_frame_steps **out, struct spl_error *err)
 {
     (void)dataset;
+    if (spl_view_get_samples(view) > (uint64_t)setting("FAKE_ROOM_PX", 1 << 30))
+        return spl_fail(err, SPL_E_LIMIT, "a draw list of 9 bytes has no room on the fake device");
     struct spl_frame_steps *steps = *out = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;

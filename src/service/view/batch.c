@@ -66,8 +66,9 @@ static void settle(struct batch *batch, size_t i, struct spl_rendering *renderin
     struct item *item = &batch->items[i];
     batch->done++;
     if (rendering && batch->bytes + rendering->encoded.length > batch_bytes_max) {
-        spl_fail(&item->err, SPL_E_LIMIT, "the views before it have %zu bytes already; at most %d go into one reply",
-                 batch->bytes, (int)batch_bytes_max);
+        spl_fail_field(&item->err, SPL_E_LIMIT, "views",
+                       "the views before it have %zu bytes already; at most %d go into one reply", batch->bytes,
+                       (int)batch_bytes_max);
     } else if (rendering) {
         item->rendering = spl_rendering_ref(rendering);
         batch->bytes += rendering->encoded.length;

@@ -72,6 +72,15 @@ static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int r
     return 0;
 }
 
+static uint32_t count_first_page_chunks(const struct spl_dataset *dataset)
+{
+    uint32_t count, chunks = 0;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &count);
+    for (uint32_t i = 0; i < count; i++)
+        chunks += nodes[i].page == 0 ? nodes[i].chunk_count : 0; // every chunk is of one node
+    return chunks;
+}
+
 int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -83,6 +92,9 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
         spl_dataset_get_page(entry->dataset, 0, &bytes);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
+        uint32_t chunks = count_first_page_chunks(entry->dataset);
+        if (options.first_page_chunks < chunks)
+            options.first_page_chunks = chunks;
     }
     int rc = spl_renderer_create(&options, &gpu->renderer, err);
     spl_pipeline_touch(pipeline);

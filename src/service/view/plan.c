@@ -15,6 +15,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/datasets/catalog.h"
 #include "shared.h"
 
 static const double encoding_margin = 1.25, encoding_gain = 0.2, encoding_step = 1; /* ln */
@@ -80,6 +81,21 @@ static bool is_usable(const struct spl_setting *setting)
     return view.supersample == setting->supersample;
 }
 
+/* What clients read: where the file lies is not their business. */
+static void hide_place(const struct spl_plan *plan, struct spl_error *err)
+{
+    enum { cut = 140 }; // messages name less of longer paths: too little to be found in them
+    const char *slash = strrchr(plan->path, '/'), *id = plan->info->id;
+    struct spl_error own = {0};
+    if (err->code == SPL_E_NOT_FOUND)
+        spl_fail(&own, err->code, "dataset '%s' has no profile; 'splatd bench %s.spld -o FOLDER' makes one", id, id);
+    else if (slash && slash - plan->path > cut)
+        spl_fail(&own, err->code, "the profile of dataset '%s' is ignored; the service's log says why", id);
+    else
+        spl_catalog_hide_folder(own.message, sizeof own.message, err->message, plan->path);
+    memcpy(err->message, own.message, sizeof err->message);
+}
+
 static void read_profile(struct spl_plan *plan)
 {
     struct spl_profile profile;
@@ -88,6 +104,8 @@ static void read_profile(struct spl_plan *plan)
     int rc = spl_profile_load(plan->path, plan->info, &plan->device, &profile, &err);
     if (rc && rc != SPL_E_NOT_FOUND)
         spl_log_warn("profile ignored: %s", err.message);
+    if (rc)
+        hide_place(plan, &err);
     if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
         spl_planner_finish(&plan->planner);
         plan->planner = planner;

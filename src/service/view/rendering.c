@@ -32,6 +32,9 @@ static void add_plan(struct spl_headers *headers, const struct spl_job *job)
     spl_headers_add(headers, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
     spl_headers_add(headers, "Splatd-Took", "ms=%.2f", took_ms);
     spl_headers_add(headers, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");
+    if (!choice->meets)
+        spl_headers_add(headers, "Splatd-Demand-Reason", "%s",
+                        isfinite(job->request.demand.psnr) && !isfinite(choice->psnr) ? "not-measured" : "out-of-reach");
 }
 
 static bool write_headers(const struct spl_job *job, char **text, size_t *length)
@@ -41,6 +44,8 @@ static bool write_headers(const struct spl_job *job, char **text, size_t *length
     spl_headers_add_view(&headers, &job->request, &job->encoded);
     add_plan(&headers, job);
     spl_headers_add(&headers, "Splatd-Complete", "%s", job->stats.complete ? "true" : "false");
+    if (!job->request.picks)
+        spl_headers_add(&headers, "Splatd-Splats", "%llu", (unsigned long long)job->stats.splats_drawn);
     spl_headers_add(&headers, "Splatd-Device", "%s", job->device);
     bool good = spl_headers_close(&headers);
     *text = headers.text;
