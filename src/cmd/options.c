@@ -43,7 +43,8 @@ int spl_cmd_parse_bytes(const char *option, const char *text, uint64_t unit, uin
     uint64_t value;
     if (!spl_bytes_from_text(text, unit, &value) || value < min * unit || value / unit > max)
         return spl_fail(err, SPL_E_USAGE,
-                        "%s takes a whole number from %" PRIu64 " to %" PRIu64 "%s, or bytes with K, M, G or T, not '%s'",
+                        "%s takes a whole number from %" PRIu64 " to %" PRIu64 "%s, or bytes with K, M, G or T, not "
+                        "'%s'",
                         option, min, max, unit == 1 ? "" : " MiB", text);
     *out = value;
     return 0;

@@ -15,7 +15,7 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
 const char *spl_cmd_ending(const char *path);
 
 /* Fails with SPL_E_USAGE, naming `option`, where `path` does not end in ".`ending`", so that what is written is not
- * taken for something else and is not written over something else. "-" and what is no regular file may have any name. */
+ * taken for something else and is not written over something else. "-" and what is no regular file has any name. */
 int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err);
 
 /* The same where `path` is to be a folder: a name that ends like a file's is refused, unless it is a folder's already

@@ -45,12 +45,15 @@ for words, wanted in {
     "render a.spld -o b.png --background rad": "white",
     "tour a.spld --path b.json -o c.avi": r"NAME\.mp4 or a folder.*without \.avi",
     "tour a.spld --path b.json -o -": "NAME\\.mp4",
-    "pack a.xyz -o b.ply": r"-o NAME\.spld, not 'b\.ply'", "pack a.xyz -o b": r"-o NAME\.spld", "pack a.xyz -o -": r"-o NAME\.spld",
-    "info a.spld --dictionary b.spld": r"--dictionary NAME\.png", "compare a.png b.png --error-map c.npy": r"--error-map NAME\.png",
+    "pack a.xyz -o b.ply": r"-o NAME\.spld, not 'b\.ply'",
+    "pack a.xyz -o b": r"-o NAME\.spld", "pack a.xyz -o -": r"-o NAME\.spld",
+    "info a.spld --dictionary b.spld": r"--dictionary NAME\.png",
+    "compare a.png b.png --error-map c.npy": r"--error-map NAME\.png",
     "synth courtyard -o b.ply": r"a folder: give 'b\.ply' without \.ply", "bench a.spld -o b.html": "a folder",
     "bench --textures a.tex -o b.png": "a folder", "bench --left-out a.spld --cameras b -o c.csv": "a folder",
     "render a.spld --format png -o b.spld": r"ends in \.png", "render a.spld --format png -o b.jpg": r"ends in \.png",
-    "render a.spld --memory-limit 1X -o b.png": "K, M, G or T", "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
+    "render a.spld --memory-limit 1X -o b.png": "K, M, G or T",
+    "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
     "render a.spld -o": "requires an argument.*\n.*splatd render --help",
 }.items():
     said = check(words.split(), 2, "stderr")
@@ -77,7 +80,7 @@ with tempfile.TemporaryDirectory() as folder:
             wrong.append(f"splatd tour -o {name}: {said!r}")
     # Each stage counts in a unit or not at all, and photographs and their share of the points are told apart.
     packed = folder + "/packed.spld"
-    said = subprocess.run([SPLATD, "pack", str(scan), "-o", packed], stderr=subprocess.PIPE, text=True, timeout=60).stderr
+    said = subprocess.run([SPLATD, "pack", scan, "-o", packed], stderr=subprocess.PIPE, text=True, timeout=60).stderr
     if "looking at colours: 1 scan in" not in said or re.search(r"^[a-z ,]*: \d+ in ", said, re.MULTILINE):
         wrong.append(f"pack's stages: {said!r}")
     if "derived" not in check(["info", packed], 0, "stdout"):
