@@ -43,11 +43,8 @@ class Dataset:
         self.center = [(a + b) / 2 for a, b in zip(low, high)]
 
     def view(self, **params):
-        """One view. Parameters as in api/openapi.yaml; vectors are lists. A `camera` (a dict, in any convention) is sent
-        as JSON."""
-        if "camera" in params:
-            return View(*self.service.ask(self.info["view"], json.dumps(params).encode()))
-        return View(*self.service.ask(f"{self.info['view']}?{query(params)}"))
+        """One view. Parameters as in api/openapi.yaml; vectors are lists. A `camera` is a dict, in any convention."""
+        return View(*self.ask(self.info["view"], params))
 
     def depth(self, layer="depth", **params):
         """(width, height, array of floats row by row): metres, NaN where nothing is."""
@@ -59,7 +56,14 @@ class Dataset:
 
     def pick(self, x, y, **params):
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
-        return self.service.json(f"{self.info['uri']}/pick?{query({'x': x, 'y': y, **params})}")
+        return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
+
+    def ask(self, path, params):
+        """(bytes, headers): a `camera` only goes as JSON. What is None is left out."""
+        given = {name: value for name, value in params.items() if value is not None}
+        if "camera" in given:
+            return self.service.ask(path, json.dumps(given).encode())
+        return self.service.ask(f"{path}?{query(given)}")
 
 
 class Splatd:
@@ -104,7 +108,7 @@ def query(params):
             return str(value).lower()
         return ",".join(map(text, value)) if isinstance(value, (list, tuple)) else str(value)
 
-    return urllib.parse.urlencode({name: text(value) for name, value in params.items() if value is not None}, safe=",:")
+    return urllib.parse.urlencode({name: text(value) for name, value in params.items()}, safe=",:")
 
 
 def ring(target, count, radius, height, up=(0, 0, 1)):

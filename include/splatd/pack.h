@@ -11,9 +11,10 @@
 
 struct spl_progress {          /* one call about every 100 ms while work runs, from the calling thread */
     const char *stage;         /* static: "reading scan.ply", "neighbours", … (valid during the call) */
+    const char *unit;          /* static: what is counted, a plural in s; NULL = nothing that a user knows */
     uint64_t done, total;      /* items of this stage; total 0 = unknown */
     double rate;               /* items per second */
-    double left_s;             /* of everything, not of this stage alone; 0 = unknown */
+    double left_s;             /* of everything, so never less than of this stage; 0 = unknown */
 };
 
 /* How photographs are coded: into nothing but the splats' colours; as sums of atoms of a dictionary, of which a splat

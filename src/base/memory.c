@@ -1,9 +1,12 @@
 /* Checked allocation with an injectable failure; the counter is atomic, everything else is malloc. */
 #include "base/memory.h"
 
+#include <ctype.h>
+#include <errno.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 static atomic_long fail_countdown;
 
@@ -43,4 +46,20 @@ void *spl_realloc(void *old, size_t count, size_t size, struct spl_error *err)
     size_t bytes = count * size;
     void *p = injected() ? NULL : realloc(old, bytes ? bytes : 1);
     return p ? p : refuse(count, size, err);
+}
+
+bool spl_bytes_from_text(const char *text, uint64_t unit, uint64_t *out)
+{
+    static const char suffixes[] = "KMGT";
+    char *end;
+    errno = 0;
+    uint64_t value = strtoull(text, &end, 10);
+    if (!isdigit((unsigned char)*text) || errno)
+        return false;
+    const char *suffix = *end ? strchr(suffixes, *end++) : NULL;
+    if (suffix)
+        unit = UINT64_C(1) << 10 * (suffix - suffixes + 1);
+    else if (end[-1] < '0' || end[-1] > '9')
+        return false;
+    return !*end && !__builtin_mul_overflow(value, unit, out);
 }

@@ -44,6 +44,24 @@ bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t l
     return true;
 }
 
+/* A colour or a normal of one or two components would be left out without a word. */
+static int check_threes(const struct spl_layout *layout, struct spl_error *err)
+{
+    static const int firsts[] = {SPL_COLUMN_RED, SPL_COLUMN_NX};
+    for (size_t i = 0; i < sizeof firsts / sizeof *firsts; i++)
+        for (int k = 0; k < 3; k++) {
+            int a = firsts[i] + k, b = firsts[i] + (k + 1) % 3, c = firsts[i] + (k + 2) % 3;
+            if (has_column(layout, a) || !(has_column(layout, b) || has_column(layout, c)))
+                continue;
+            bool both = has_column(layout, b) && has_column(layout, c);
+            int have = has_column(layout, b) ? b : c;
+            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s%s%s without %s; '-' skips a column",
+                                  spl_column_name(both && c < b ? c : have), both ? " and " : "",
+                                  both ? spl_column_name(c < b ? b : c) : "", spl_column_name(a));
+        }
+    return SPL_OK;
+}
+
 int spl_layout_from_option(struct spl_layout *layout, const char *columns, struct spl_error *err)
 {
     struct spl_fields fields = spl_fields_begin(columns, strlen(columns), ',');
@@ -67,7 +85,7 @@ int spl_layout_from_option(struct spl_layout *layout, const char *columns, struc
     if (got == SPL_FIELD_BAD || lacks >= 0)
         return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is missing (as in \"x,y,z,intensity,r,g,b,-\")",
                               spl_column_name(lacks >= 0 ? lacks : SPL_COLUMN_X));
-    return SPL_OK;
+    return check_threes(layout, err);
 }
 
 bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout *layout, const char *line,

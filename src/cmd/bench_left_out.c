@@ -159,7 +159,7 @@ int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err)
         else if (option == 'i')
             a.images = optarg;
         else if (option == 'o')
-            a.folder = optarg;
+            rc = spl_cmd_check_folder("-o", a.folder = optarg, "a folder", err);
         else if (option == 'd')
             a.device = optarg;
         else if (option == 'l')

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "geom/size.h"
 #include "shared.h"
 
@@ -74,6 +75,7 @@ static int take_sweep_option(struct spl_cmd_bench_arguments *a, int option, stru
     switch (option) {
     case 'o':
         a->sweep.output = optarg;
+        status = spl_cmd_check_folder("-o", optarg, "a folder", err);
         break;
     case 'r':
         a->sweep.sweep.reference = (struct spl_reference){.kind = SPL_REFERENCE_EXACT, .folder = optarg};
@@ -136,8 +138,7 @@ static int take_option(struct spl_cmd_bench_arguments *a, int option, struct spl
         status = spl_cmd_parse_size("--size", optarg, &a->size[0], &a->size[1], err);
         break;
     case 'b':
-        status = spl_cmd_parse_count("--memory-limit", optarg, 1, 1u << 24, &count, err);
-        a->bench.memory_limit = count << 20;
+        status = spl_cmd_parse_bytes("--memory-limit", optarg, 1 << 20, 1, 1u << 24, &a->bench.memory_limit, err);
         break;
     case 'd':
         a->bench.device_count = 0;

@@ -10,6 +10,7 @@
 #include "cmd/bench.h"
 #include "cmd/bench_textures.h"
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "image/load.h"
 
 static void show_epoch(void *context, const char *what, const struct spl_train_progress *epoch)
@@ -36,7 +37,7 @@ static int get_size(const char *path, uint32_t *width, uint32_t *height, struct 
 
 struct arguments {
     const char *textures, *dataset, *folder, *cameras, *images, *device;
-    uint64_t epochs, sample, threads, memory_mb, views, rounds;
+    uint64_t epochs, sample, threads, memory_bytes, views, rounds;
     uint32_t width, height;
     unsigned runs;
 };
@@ -80,7 +81,7 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
                                             {NULL, 0, NULL, 0}};
     int option, rc = 0;
     *a = (struct arguments){.epochs = 12,
-                            .memory_mb = 2048,
+                            .memory_bytes = UINT64_C(2048) << 20,
                             .views = 8,
                             .rounds = 9,
                             .width = 1280,
@@ -90,6 +91,7 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
         switch (option) {
         case 'o':
             a->folder = optarg;
+            rc = spl_cmd_check_folder("-o", optarg, "a folder", err);
             break;
         case 'e':
             rc = spl_cmd_parse_count("--epochs", optarg, 1, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
@@ -104,7 +106,7 @@ static int parse(struct arguments *a, int argc, char **argv, struct spl_error *e
             rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a->threads, err);
             break;
         case 'm':
-            rc = spl_cmd_parse_count("--memory", optarg, 1, 1u << 24, &a->memory_mb, err);
+            rc = spl_cmd_parse_bytes("--memory", optarg, 1 << 20, 1, 1u << 24, &a->memory_bytes, err);
             break;
         case 'c':
             a->cameras = optarg;
@@ -172,7 +174,7 @@ static int render(struct bench *b, struct spl_error *err)
                                                         .photographs = &b->cameras,
                                                         .texture_size = b->file.header.size,
                                                         .views = (uint32_t)b->a.views,
-                                                        .memory_bytes = b->a.memory_mb << 20,
+                                                        .memory_bytes = b->a.memory_bytes,
                                                         .threads = (unsigned)b->a.threads,
                                                         .progress = show_photograph};
         rc = spl_projected_measure(&projected, &b->projected, err);
@@ -210,7 +212,7 @@ int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err)
                                              .epochs = (uint32_t)b->a.epochs,
                                              .runs = b->a.runs,
                                              .sample = b->a.sample,
-                                             .memory_bytes = b->a.memory_mb << 20,
+                                             .memory_bytes = b->a.memory_bytes,
                                              .seed = 1,
                                              .threads = (unsigned)b->a.threads,
                                              .progress = show_epoch};

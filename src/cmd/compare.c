@@ -220,6 +220,7 @@ int spl_cmd_compare(int argc, char **argv)
             break;
         case opt_map:
             a.map = optarg;
+            rc = spl_cmd_check_ending("--error-map", optarg, "png", &err);
             break;
         case opt_json:
             a.json = true;

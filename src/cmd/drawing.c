@@ -75,7 +75,7 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
         d->renderer.require_gpu = true;
         return SPL_OK;
     case SPL_CMD_MEMORY_LIMIT:
-        return spl_cmd_parse_count("--memory-limit", text, 1, UINT64_MAX, &d->renderer.memory_limit, err);
+        return spl_cmd_parse_bytes("--memory-limit", text, 1, 1, UINT64_MAX, &d->renderer.memory_limit, err);
     case SPL_CMD_NO_VERIFY:
         d->no_verify = true;
         return SPL_OK;

@@ -7,10 +7,12 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <jansson.h>
 
 #include "cmd/dictionary.h"
+#include "cmd/output.h"
 #include "dataset/chunk_clip.h"
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
@@ -166,16 +168,30 @@ static void print_atoms(const struct report *report)
     }
 }
 
-/* Photographs first: they have taken the place of the others. */
-static void print_colors(const json_t *colors)
+/* Photographs first: they have taken the place of the others, of which only the sum that is left is known. */
+static void print_colors(const json_t *colors, uint64_t kept)
 {
     const json_t *color;
+    bool photographs = false;
     char text[32];
     size_t i;
     json_array_foreach(colors, i, color)
-        printf("%-16s%s: %s points of %s\n", i ? "" : "  color from", json_string_value(json_object_get(color, "from")),
-               grouped((uint64_t)json_integer_value(json_object_get(color, "points")), text),
-               json_string_value(json_object_get(color, "source")));
+    {
+        const char *from = json_string_value(json_object_get(color, "from"));
+        const char *source = json_string_value(json_object_get(color, "source")), *label = i ? "" : "  color from";
+        uint64_t points = (uint64_t)json_integer_value(json_object_get(color, "points"));
+        if (!strcmp(from, "photographs")) {
+            photographs = true;
+            kept -= points < kept ? points : kept;
+            printf("%-16s%s: %s points, with the poses of %s\n", label, from, grouped(points, text), source);
+        } else if (!photographs) {
+            printf("%-16s%s: %s points of %s\n", label, from, grouped(points, text), source);
+        } else if (kept && json_array_size(colors) == 2) {
+            printf("%-16s%s: the other %s points, of %s\n", label, from, grouped(kept, text), source);
+        } else if (kept) {
+            printf("%-16s%s: of the other %s points, those of %s\n", label, from, grouped(kept, text), source);
+        }
+    }
 }
 
 static void print_table(const struct report *report)
@@ -190,9 +206,9 @@ static void print_table(const struct report *report)
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
-    printf("  given         %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
-           info->has_uncertainty ? ", uncertainty" : "");
-    print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"));
+    printf("  attributes    %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
+           info->has_uncertainty ? ", uncertainty (derived from the points)" : "");
+    print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
@@ -345,6 +361,9 @@ int spl_cmd_info(int argc, char **argv)
         fprintf(stderr, "splatd: --dictionary is the picture of one dataset, not of %d\n", argc - optind);
         return 2;
     }
+    struct spl_error wrong = {0};
+    if (picture && spl_cmd_check_ending("--dictionary", picture, "png", &wrong))
+        return spl_cmd_fail(&wrong);
     int worst = 0; /* the remaining files are still told of */
     for (int i = optind; i < argc; i++) {
         struct spl_dataset *dataset = NULL;

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "geom/size.h"
 #include "image/color.h"
 
@@ -32,6 +33,19 @@ int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint
     if (!isdigit((unsigned char)*text) || *end || errno || value < min || value > max)
         return spl_fail(err, SPL_E_USAGE, "%s takes a whole number from %" PRIu64 " to %" PRIu64 ", not '%s'", option,
                         min, max, text);
+    *out = value;
+    return 0;
+}
+
+int spl_cmd_parse_bytes(const char *option, const char *text, uint64_t unit, uint64_t min, uint64_t max, uint64_t *out,
+                        struct spl_error *err)
+{
+    uint64_t value;
+    if (!spl_bytes_from_text(text, unit, &value) || value < min * unit || value / unit > max)
+        return spl_fail(err, SPL_E_USAGE,
+                        "%s takes a whole number from %" PRIu64 " to %" PRIu64 "%s, or bytes with K, M, G or T, not "
+                        "'%s'",
+                        option, min, max, unit == 1 ? "" : " MiB", text);
     *out = value;
     return 0;
 }

@@ -14,6 +14,11 @@ int spl_cmd_parse_real(const char *option, const char *text, double min, double 
 int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint64_t max, uint64_t *out,
                         struct spl_error *err);
 
+/* Bytes, with a suffix K, M, G or T of 1024; a number without one counts `unit` bytes (1, or 1 << 20 where an option
+ * has always been in MiB). The range is in units too. */
+int spl_cmd_parse_bytes(const char *option, const char *text, uint64_t unit, uint64_t min, uint64_t max, uint64_t *out,
+                        struct spl_error *err);
+
 /* "X,Y,Z" */
 int spl_cmd_parse_vector(const char *option, const char *text, double out[3], struct spl_error *err);
 

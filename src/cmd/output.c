@@ -1,9 +1,11 @@
 /* Where a result goes: a file as a whole, or what takes bytes as they come. Owned by the command's thread. */
 #include "cmd/output.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,4 +25,47 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
     int rc = spl_write_all(fd, bytes, length) ? spl_fail_errno(err, errno, "cannot write '%s'", path) : SPL_OK;
     close(fd);
     return rc;
+}
+
+const char *spl_cmd_ending(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    return dot && dot > name && strcmp(name, "..") ? dot + 1 : "";
+}
+
+int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err)
+{
+    struct stat status;
+    if (!strcasecmp(spl_cmd_ending(path), ending) || !strcmp(path, "-") ||
+        (!stat(path, &status) && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)))
+        return SPL_OK;
+    return spl_fail(err, SPL_E_USAGE, "%s writes a .%s file, so its name ends like one: %s NAME.%s, not '%s'", option,
+                    ending, option, ending, path);
+}
+
+/* Of a format: "avi", "mp4", "7z"; not the "5" of "lod-1.5". */
+static bool is_of_a_file(const char *ending)
+{
+    size_t letters = 0, length = strlen(ending);
+    for (size_t i = 0; i < length; i++) {
+        if (!isalnum((unsigned char)ending[i]))
+            return false;
+        letters += isalpha((unsigned char)ending[i]) != 0;
+    }
+    return letters && length <= 5;
+}
+
+int spl_cmd_check_folder(const char *option, const char *path, const char *takes, struct spl_error *err)
+{
+    struct stat status;
+    if (!*path || !strcmp(path, "-"))
+        return spl_fail(err, SPL_E_USAGE, "%s takes %s, not '%s'", option, takes, path);
+    if (!stat(path, &status))
+        return S_ISDIR(status.st_mode)
+                   ? SPL_OK
+                   : spl_fail(err, SPL_E_USAGE, "%s takes %s, and '%s' is a file", option, takes, path);
+    if (is_of_a_file(spl_cmd_ending(path)))
+        return spl_fail(err, SPL_E_USAGE, "%s takes %s: give '%s' without .%s, or a slash behind it if it is a folder",
+                        option, takes, path, spl_cmd_ending(path));
+    return SPL_OK;
 }

@@ -10,4 +10,16 @@
  * failure leaves what was there before. Devices and pipes are written to directly. */
 int spl_cmd_write_output(const char *path, const void *bytes, size_t length, struct spl_error *err);
 
+/* What stands behind the last dot of the path's last name, "" where there is none: "mp4" of "a.b/c.mp4", "" of "a.b/c",
+ * ".c", "a.b/" and "..". Borrows from `path`. */
+const char *spl_cmd_ending(const char *path);
+
+/* Fails with SPL_E_USAGE, naming `option`, where `path` does not end in ".`ending`", so that what is written is not
+ * taken for something else and is not written over something else. "-" and what is no regular file has any name. */
+int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err);
+
+/* The same where `path` is to be a folder: a name that ends like a file's is refused, unless it is a folder's already
+ * or a slash says that it is one; so is "-", and a file. `takes`: what the option takes, "a folder". */
+int spl_cmd_check_folder(const char *option, const char *path, const char *takes, struct spl_error *err);
+
 #endif

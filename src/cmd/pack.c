@@ -14,6 +14,7 @@
 #include <splatd/pack.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "cmd/progress.h"
 
 static void usage(FILE *out)
@@ -61,7 +62,7 @@ static void usage(FILE *out)
         "                           alone that textures are coded to, all together, 20 to 60 (normal: 40)\n"
         "      --keep-going         photographs that cannot be used are named and left out\n"
         "      --keep-textures FILE as they are before coding too, for 'splatd bench --textures FILE'\n"
-        "      --memory MIB         of the photographs' pass (default 2048)\n"
+        "      --memory MIB         of the photographs' pass, or 4G and such (default 2048)\n"
         "      --device D           that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name\n"
         "      --threads N          default: all cores; the file does not depend on it\n\n"
         "About 80 bytes of memory a point. Progress and the summary go to stderr.\n");
@@ -305,8 +306,7 @@ int spl_cmd_pack(int argc, char **argv)
             photos.refused = name_refused;
             break;
         case opt_memory:
-            result = spl_cmd_parse_count("--memory", optarg, 64, 1 << 20, &number, &err);
-            photos.memory_bytes = number << 20;
+            result = spl_cmd_parse_bytes("--memory", optarg, 1 << 20, 64, 1 << 20, &photos.memory_bytes, &err);
             break;
         case opt_textures:
             result = parse_textures(optarg, &photos.textures, &err);
@@ -339,6 +339,10 @@ int spl_cmd_pack(int argc, char **argv)
     }
     if (!o.output) {
         fprintf(stderr, "splatd: pack needs a dataset to write: -o NAME.spld\n");
+        return 2;
+    }
+    if (strcmp(spl_cmd_ending(o.output), "spld")) {
+        fprintf(stderr, "splatd: pack writes a dataset, whose name ends in .spld: -o NAME.spld, not '%s'\n", o.output);
         return 2;
     }
     const char *contradiction = find_contradiction(&o, &photos, textures, quality);

@@ -1,6 +1,6 @@
-/* Progress lines: "stage  42 %  1.2 M/s  3 s left, 50 s until all is done", rewritten in place on a terminal. A log gets two plain
- * lines a stage instead and one every ten seconds, so that it stays readable and short, and nobody takes work for a
- * hang. A stage ends where the next begins or the work is over. */
+/* Progress lines: "stage  42 %  1.2 M points/s  3 s left, 50 s until all is done", rewritten in place on a terminal. A
+ * log gets two plain lines a stage instead and one every ten seconds, so that it stays readable and short, and nobody
+ * takes work for a hang. A stage ends where the next begins or the work is over. */
 #include "cmd/progress.h"
 
 #include <math.h>
@@ -34,8 +34,9 @@ void spl_cmd_progress_finish(struct spl_cmd_progress *state)
     double seconds = (double)(spl_now_ns() - state->start_ns) / 1e9;
     char done[16];
     spl_cmd_progress_clear();
-    if (state->done)
-        fprintf(stderr, "%s: %s in %.1f s\n", state->stage, scaled((double)state->done, done), seconds);
+    if (state->done && state->unit)
+        fprintf(stderr, "%s: %s %.*s in %.1f s\n", state->stage, scaled((double)state->done, done),
+                (int)strlen(state->unit) - (state->done == 1), state->unit, seconds); /* 1 point, 2 points */
     else
         fprintf(stderr, "%s: %.1f s\n", state->stage, seconds);
     state->stage[0] = 0;
@@ -56,9 +57,9 @@ static void print_line(const struct spl_cmd_progress *state, const struct spl_pr
     char text[32];
     fprintf(stderr, "%s", state->stage);
     if (p->total)
-        fprintf(stderr, "  %3.0f %%", 100.0 * fmin((double)p->done / (double)p->total, 1));
-    if (p->rate > 0)
-        fprintf(stderr, "  %s/s", scaled(p->rate, text));
+        fprintf(stderr, "  %3.0f %%", floor(100.0 * fmin((double)p->done / (double)p->total, 1)));
+    if (p->rate > 0 && p->unit)
+        fprintf(stderr, "  %s %s/s", scaled(p->rate, text), p->unit);
     if (p->rate > 0 && p->total > p->done)
         fprintf(stderr, "  %s left", rough((double)(p->total - p->done) / p->rate, text));
     if (p->left_s > 0)
@@ -79,6 +80,7 @@ void spl_cmd_progress(void *context, const struct spl_progress *progress)
             fprintf(stderr, "%s...\n", state->stage);
     }
     state->done = progress->done;
+    state->unit = progress->unit;
     if (!terminal && now - state->said_ns < interval_ns)
         return;
     state->said_ns = now;

@@ -7,6 +7,7 @@
 
 struct spl_cmd_progress { /* zero before use */
     char stage[128];      /* "" before the first report */
+    const char *unit;     /* of done; NULL: it is not shown */
     uint64_t done;
     uint64_t start_ns, said_ns;
 };

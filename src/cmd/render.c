@@ -66,7 +66,7 @@ static void usage(FILE *out)
             "Machine:\n"
             "  --device NAME            'vulkan', 'egl', 'vulkan:1', a UUID or part of a name; see 'splatd devices'\n"
             "  --require-gpu            refuse software devices\n"
-            "  --memory-limit BYTES     of device memory\n"
+            "  --memory-limit BYTES     of device memory; 2G and such, too\n"
             "  --no-verify              trust the file's checksums\n");
 }
 
@@ -120,10 +120,14 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
 {
     if (!a->drawing.output)
         return spl_fail(err, SPL_E_USAGE, "render needs a file to write to: -o OUT.jpg, .png or .npy");
-    if (a->drawing.format < 0) {
-        const char *dot = strrchr(a->drawing.output, '.');
-        a->drawing.format = dot ? spl_format_from_name(dot + 1) : -1;
-    }
+    const char *ending = spl_cmd_ending(a->drawing.output);
+    int named = spl_format_from_name(ending);
+    if (a->drawing.format < 0)
+        a->drawing.format = named;
+    else if ((named >= 0 && named != a->drawing.format) || !strcmp(ending, "spld"))
+        return spl_fail(err, SPL_E_USAGE, "'%s' is no name of a %s: give one that ends in .%s, or another --format",
+                        a->drawing.output, spl_format_name((enum spl_format)a->drawing.format),
+                        spl_format_name((enum spl_format)a->drawing.format));
     if (a->drawing.format < 0)
         return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);

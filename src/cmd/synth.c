@@ -10,6 +10,7 @@
 #include <splatd/synth.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "cmd/progress.h"
 #include "synth/exact.h"
 #include "synth/pictures.h"
@@ -203,7 +204,7 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
         return 0;
     default: /* 'o' */
         a->scan.directory = text;
-        return 0;
+        return spl_cmd_check_folder("-o", text, "a folder", err);
     }
 }
 

@@ -7,10 +7,12 @@
 
 #include <errno.h>
 #include <getopt.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -36,6 +38,8 @@ struct arguments {
     struct spl_cmd_drawing drawing;
     struct spl_camera *cameras; // owned
     size_t count;
+    uint64_t saturated;      /* pixels beyond what a depth PNG can hold, of all frames */
+    size_t saturated_frames; /* those that have some */
 };
 
 static void usage(FILE *out)
@@ -65,7 +69,7 @@ static void usage(FILE *out)
             "  --atoms N; of method fill --visibility V, --kernel N, --threshold T, --pyramid N\n"
             "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"
             "Output:\n"
-            "  -o, --output OUT         OUT.mp4, or a folder that gets 000000.jpeg and so on\n"
+            "  -o, --output OUT         OUT.mp4, or, without an ending, a folder that gets 000000.jpeg and so on\n"
             "  --format jpeg|png|npy|raw  of images (jpeg)\n"
             "  --quality Q, --depth-scale S\n"
             "Machine:\n"
@@ -132,12 +136,18 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
 
 static int resolve_output(struct arguments *a, struct spl_error *err)
 {
-    const char *dot = a->drawing.output ? strrchr(a->drawing.output, '.') : NULL;
+    const char *output = a->drawing.output;
+    struct stat status;
+    int rc;
     if (!a->path)
         return spl_fail(err, SPL_E_USAGE, "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
-    if (!a->drawing.output)
+    if (!output)
         return spl_fail(err, SPL_E_USAGE, "tour needs a video or a folder to write to: -o OUT.mp4 or -o FOLDER");
-    a->video = dot && !strcmp(dot, ".mp4");
+    a->video = !strcasecmp(spl_cmd_ending(output), "mp4");
+    if (a->video && !stat(output, &status) && S_ISDIR(status.st_mode))
+        return spl_fail(err, SPL_E_USAGE, "'%s' is a folder, where a video cannot be written", output);
+    if (!a->video && (rc = spl_cmd_check_folder("-o", output, "NAME.mp4 or a folder", err)))
+        return rc;
     if (a->video && (a->drawing.format >= 0 || a->drawing.layer != SPL_LAYER_COLOR))
         return spl_fail(err, SPL_E_USAGE, "a video is of color and takes no --format; give a folder for images");
     a->drawing.encode.format = a->drawing.format < 0 ? SPL_FORMAT_JPEG : (enum spl_format)a->drawing.format;
@@ -179,7 +189,7 @@ done:
     return rc;
 }
 
-static int write_image(const struct arguments *a, size_t frame, const struct spl_image *image, struct spl_error *err)
+static int write_image(struct arguments *a, size_t frame, const struct spl_image *image, struct spl_error *err)
 {
     struct spl_encoded encoded = {0};
     char path[4096];
@@ -189,6 +199,8 @@ static int write_image(const struct arguments *a, size_t frame, const struct spl
     int rc = spl_image_encode(image, &a->drawing.encode, &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(path, encoded.bytes, encoded.length, err);
+    a->saturated += encoded.saturated;
+    a->saturated_frames += encoded.saturated > 0;
     spl_encoded_finish(&encoded);
     return rc;
 }
@@ -197,7 +209,7 @@ static int render_frames(struct arguments *a, const struct spl_dataset *dataset,
                          struct spl_video *video, struct spl_error *err)
 {
     struct spl_cmd_progress state = {0};
-    struct spl_progress progress = {.stage = "frames", .total = a->count};
+    struct spl_progress progress = {.stage = "frames", .unit = "frames", .total = a->count};
     uint64_t began = spl_now_ns();
     int rc = SPL_OK;
     for (size_t i = 0; !rc && i < a->count; i++) {
@@ -213,6 +225,11 @@ static int render_frames(struct arguments *a, const struct spl_dataset *dataset,
         spl_cmd_progress(&state, &progress);
     }
     spl_cmd_progress_finish(&state);
+    if (a->saturated)
+        fprintf(stderr,
+                "splatd: %" PRIu64 " pixels in %zu of %zu frames lie beyond 65535 steps; a smaller --depth-scale "
+                "reaches farther\n",
+                a->saturated, a->saturated_frames, a->count);
     return rc;
 }
 

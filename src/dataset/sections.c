@@ -43,8 +43,9 @@ static int not_a_dataset(const struct spl_dataset *dataset, const char first[8],
     } kinds[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (dataset->map_bytes > strlen(kinds[i].start) && !memcmp(first, kinds[i].start, strlen(kinds[i].start)))
-            return spl_fail(err, SPL_E_INPUT, "%s is %s, not a packed dataset; 'splatd pack %s -o NAME.spld' makes one",
-                            dataset->path, kinds[i].kind, dataset->path);
+            return spl_fail(err, SPL_E_INPUT,
+                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one",
+                            dataset->path, kinds[i].kind);
     size_t letters = dataset->map_bytes < 4 ? dataset->map_bytes : 4;
     if (dataset->map_bytes >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");

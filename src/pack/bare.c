@@ -72,7 +72,7 @@ static int size_points(struct bare *b, unsigned threads, struct spl_error *err)
 int spl_bare_points(struct spl_points *points, struct spl_stage *stage, struct spl_error *err)
 {
     struct bare b = {.points = points};
-    spl_stage_begin(stage, "spacing", points->count);
+    spl_stage_begin(stage, "spacing", "points", points->count);
     free(points->normal);
     points->normal = spl_alloc(points->count + SPL_POINTS_PAD, sizeof *points->normal, err);
     points->radius = spl_alloc(points->count, sizeof *points->radius, err);

@@ -101,7 +101,7 @@ int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neigh
     points->clip = spl_alloc(points->count, sizeof *points->clip, err);
     if (!points->clip)
         return SPL_E_NOMEM;
-    spl_stage_begin(stage, "clip lines", points->count);
+    spl_stage_begin(stage, "clip lines", "points", points->count);
     spl_parallel_for(stage->threads, points->count, 4096, find_lines, &lines);
     spl_stage_end(stage);
     return SPL_OK;

@@ -268,7 +268,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     size_t chunk_capacity = 0, splats = 0;
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
-    spl_stage_begin(stage, "encoding", splats);
+    spl_stage_begin(stage, "encoding", "splats", splats);
     int rc = allocate(&e, out, err);
     for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
         size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;

@@ -126,7 +126,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     uint32_t attributes = info->attributes;
     char name[128];
     snprintf(name, sizeof name, "reading %.100s", scan->name);
-    spl_stage_begin(stage, name, info->points_expected);
+    spl_stage_begin(stage, name, "points", info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. */
     if (info->points_expected && info->points_expected < UINT32_MAX - 1 - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);

@@ -258,7 +258,7 @@ int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, str
     for (uint32_t i = 0; i < tree->count; i++)
         if (tree->nodes[i].child_count)
             order[inner++] = i;
-    spl_stage_begin(stage, "levels of detail", inner);
+    spl_stage_begin(stage, "levels of detail", "nodes", inner);
     /* Breadth first order: each depth is a run of it. */
     for (size_t end = inner, begin; end > 0; end = begin) {
         for (begin = end; begin > 0 && tree->nodes[order[begin - 1]].depth == tree->nodes[order[end - 1]].depth;)

@@ -50,7 +50,7 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
     struct spl_linear_level l = {0}, above = {0};
     uint64_t marked = 0;
     double finest = 0;
-    spl_stage_begin(stage, "wires, poles and cables", levels_max);
+    spl_stage_begin(stage, "wires, poles and cables", NULL, levels_max);
     points->linear = spl_alloc(points->count, 1, err);
     int rc = points->linear ? spl_cells_init(&l.cells, points, cell_points, stage->threads, err) : SPL_E_NOMEM;
     for (unsigned k = 0; !rc && k < levels_max; k++) {

@@ -255,7 +255,7 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     int rc = SPL_E_NOMEM;
     o.pieces = stage->threads;
     o.piece = (o.count + o.pieces - 1) / o.pieces;
-    spl_stage_begin(stage, "ordering", o.count);
+    spl_stage_begin(stage, "ordering", "points", o.count);
     o.key = spl_alloc_raw(o.count, sizeof *o.key, err);
     o.key_to = spl_alloc_raw(o.count, sizeof *o.key, err);
     o.index = spl_alloc_raw(o.count, sizeof *o.index, err);

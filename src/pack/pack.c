@@ -130,7 +130,7 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
-    spl_stage_begin(p->stage, "writing", 0);
+    spl_stage_begin(p->stage, "writing", NULL, 0);
     rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);
     json_decref(meta);

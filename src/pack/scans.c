@@ -90,7 +90,7 @@ int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t co
     scans->list = spl_alloc(count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
-    spl_stage_begin(stage, "looking at colours", count);
+    spl_stage_begin(stage, "looking at colours", "scans", count);
     for (size_t i = 0; !rc && i < count; i++) {
         struct spl_cloud *cloud = NULL;
         struct spl_scan *scan = &scans->list[i];
@@ -147,7 +147,17 @@ static void compare_kinds(const struct saying *s)
     }
     if (blank.count && s->scans->count > 1)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", list(&blank));
-    if (kinds > 1)
+    if (kinds > 1 && s->scans->intensity) {
+        struct group lack = {0};
+        for (size_t i = 0; i < s->scans->count; i++)
+            if (s->scans->list[i].points_from[SPL_COLORS_RGB] || s->scans->list[i].points_from[SPL_COLORS_CONSTANT])
+                add(&lack, &s->scans->list[i]);
+        say(s,
+            "no intensity, which --intensity asks for, in %zu (%s); the scans' colours are of different kinds: %s. "
+            "Each was taken as it is, and a seam shows where they meet. --cameras takes the colours of photographs; or "
+            "pack each kind as a dataset of its own",
+            lack.count, list(&lack), text);
+    } else if (kinds > 1)
         say(s,
             "the scans' colours are of different kinds: %s. Each was taken as it is, and a seam shows where they meet. "
             "--intensity takes intensity from all that have it, --cameras the colours of photographs; or pack each "

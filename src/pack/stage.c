@@ -52,10 +52,13 @@ static void report(struct spl_stage *stage, uint64_t now)
     uint64_t done = atomic_load_explicit(&stage->done, memory_order_relaxed);
     double seconds = (double)(now - stage->begin_ns) / 1e9;
     struct spl_progress progress = {.stage = stage->name,
+                                    .unit = stage->unit,
                                     .done = done,
                                     .total = stage->total,
                                     .rate = seconds > 0 ? (double)done / seconds : 0,
                                     .left_s = spl_stage_left_s(stage, now)};
+    if (progress.left_s > 0 && progress.rate > 0 && stage->total > done) /* of two guesses one contains the other */
+        progress.left_s = fmax(progress.left_s, (double)(stage->total - done) / progress.rate);
     stage->reported_ns = now;
     if (stage->callback)
         stage->callback(stage->context, &progress);
@@ -80,11 +83,12 @@ static void change_part(struct spl_stage *stage, const char *name, uint64_t now)
     stage->part = next;
 }
 
-void spl_stage_begin(struct spl_stage *stage, const char *name, uint64_t total)
+void spl_stage_begin(struct spl_stage *stage, const char *name, const char *unit, uint64_t total)
 {
     uint64_t now = spl_now_ns();
     change_part(stage, name, now);
     stage->name = name;
+    stage->unit = unit;
     stage->total = total;
     stage->begin_ns = now;
     atomic_store(&stage->done, 0);

@@ -23,7 +23,7 @@ struct spl_stage {
     void (*callback)(void *context, const struct spl_progress *progress); /* may be NULL */
     void *context;
     unsigned threads; /* of all parallel loops of this run, >= 1 */
-    const char *name;
+    const char *name, *unit;
     uint64_t total, begin_ns, reported_ns;
     atomic_uint_fast64_t done;
 
@@ -40,7 +40,8 @@ void spl_stage_plan(struct spl_stage *stage, const char *name, double work, uint
  * done, and the stage at work more and more by its own speed. 0 = nothing is planned. `now_ns` as of spl_now_ns(). */
 double spl_stage_left_s(const struct spl_stage *stage, uint64_t now_ns);
 
-void spl_stage_begin(struct spl_stage *stage, const char *name, uint64_t total);
+/* `name`, `unit` and `total` as in struct spl_progress. */
+void spl_stage_begin(struct spl_stage *stage, const char *name, const char *unit, uint64_t total);
 
 /* Adds `items` done; reports at most every 100 ms, and only from worker 0, which is the caller's thread. */
 void spl_stage_add(struct spl_stage *stage, uint64_t items, unsigned worker);

@@ -257,7 +257,7 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
 {
     struct surface s = {.points = points, .stage = stage, .k = neighbours};
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
-    spl_stage_begin(stage, "normals and radii", points->count);
+    spl_stage_begin(stage, "normals and radii", "points", points->count);
     int rc = allocate(&s, err);
     if (!rc && clip_lines && points->count > 1 && !(s.edge = spl_alloc_raw(points->count, 1, err)))
         rc = SPL_E_NOMEM;

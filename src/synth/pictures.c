@@ -25,6 +25,7 @@ static void report(struct run *r)
     double seconds = (double)(spl_now_ns() - r->start_ns + 1) / 1e9;
     if (r->options->progress)
         r->options->progress(r->options->progress_context, &(struct spl_progress){.stage = r->stage,
+                                                                                  .unit = "pictures",
                                                                                   .done = r->done,
                                                                                   .total = r->total,
                                                                                   .rate = (double)r->done / seconds});

@@ -140,6 +140,7 @@ static void report(struct report *r, uint64_t done, bool last)
     r->last_ns = now;
     r->options->progress(r->options->progress_context,
                          &(struct spl_progress){.stage = r->stage,
+                                                .unit = "points",
                                                 .done = done,
                                                 .total = last || done > r->total ? done : r->total,
                                                 .rate = (double)done / ((double)(now - r->start_ns + 1) / 1e9)});

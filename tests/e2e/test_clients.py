@@ -53,6 +53,11 @@ def test_python_views():
         found = wall.pick(32.5, 24.5, **POSE, **SMALL)
         assert math.dist(found["position"], [0, 0, 1]) < 0.01 and abs(found["distance"] - 3) < 0.01, found
         assert wall.pick(0, 0, **POSE, **SMALL)["position"] is None
+        opengl = {"matrix": matrix, "convention": "opengl", "fov": 60}
+        assert wall.pick(32.5, 24.5, camera=opengl, **SMALL) == found  # every call takes what view() takes
+        assert wall.depth(camera=opengl, **SMALL)[:2] == (65, 49)
+        assert wall.view(camera=opengl, **SMALL, lod=None).bytes == view.bytes  # None is left out, whatever the method
+        assert wall.view(camera=None, **POSE, **SMALL).bytes == view.bytes
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
         assert (
             all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes)

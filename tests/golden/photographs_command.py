@@ -76,7 +76,10 @@ with tempfile.TemporaryDirectory() as folder:
     said = pack()
     assert "2 photographs" in said, said
     assert color_at((0, -2, 0), (0, 0, 0)) == (200, 100, 50), color_at((0, -2, 0), (0, 0, 0))
-    assert "color" in run("info", "wall.spld")
+    told = run("info", "wall.spld")
+    seen = re.search(r"photographs: ([\d,]+) points, with the poses of views.json\n"
+                     r" +constant: the other ([\d,]+) points", told)
+    assert seen and sum(int(n.replace(",", "")) for n in seen.groups()) == 101 * 101, told
 
     # exposures: the darker half is evened out with the brighter one, without a step
     write_png("images/left.png", 64, 48, bytes((160, 80, 40)))

@@ -94,7 +94,7 @@ refuses 2 '--background' courtyard.spld --background '#ff00' -o a.png
 refuses 2 '--background' courtyard.spld --background rad -o a.png
 refuses 2 '--quality' courtyard.spld --quality 0 -o a.png
 refuses 2 '--depth-scale' courtyard.spld --depth-scale 0 -o a.png
-refuses 2 '--memory-limit' courtyard.spld --memory-limit 1G -o a.png
+refuses 2 '--memory-limit' courtyard.spld --memory-limit 1X -o a.png
 refuses 1 'no-such-device' courtyard.spld --device no-such-device -o a.png
 refuses 1 'nowhere' courtyard.spld --size 8x8 -o nowhere/a.png
 refuses 2 'a.png' a.png -o a.png

@@ -48,6 +48,11 @@ with tempfile.TemporaryDirectory() as folder:
     run("tour", "c.spld", "--path", "keys.json", "--size", "64x48", "--frames", 5, "--layer", "depth", "--format", "npy",
         "--ease", "in-out", "--rotations", "slerp", "--positions", "uniform", "--closed", "-o", "depth")
     assert len(os.listdir("depth")) == 5
+    # as 'render' does, a tour says what a depth image could not hold
+    for scale, lost in ((1000, False), (1e6, True)):
+        said = run("tour", "c.spld", "--path", "whole.json", "--size", "64x48", "--layer", "depth", "--format", "png",
+                   "--depth-scale", scale, "-o", "png")
+        assert ("of 3 frames lie beyond 65535 steps" in said) == lost, said
     for arguments, said in [
         (["-o", "x"], "--path"), (["--path", "keys.json"], "-o"), (["--path", "nowhere.json", "-o", "x"], "nowhere.json"),
         (["--path", "keys.json", "-o", "x"], "frames or seconds"), (["--path", "keys.json", "--ease", "up", "-o", "x"], "--ease"),

@@ -79,6 +79,20 @@ def test_put_get_replace_delete():
         assert listed(d) == {}, "a look from before brought it back"
 
 
+def test_what_curl_makes_of_a_file_and_a_slash():
+    """`curl -T hall.spld URL/v1/datasets/` puts the file's name behind the slash, and people put scans."""
+    with serving() as d:
+        for name in ("hall.spld", "hall.SPLD"):
+            reply = put(d, name, WALL_1)
+            assert reply.status == 400 and reply.json()["field"] == "id", reply.body
+            assert "PUT /v1/datasets/hall" in reply.json()["detail"] and reply.json()["detail"].endswith("hall")
+        assert listed(d) == {} and left_over(d) == []
+        assert put(d, "hall.spld.2", WALL_1).status == 201
+        for body in (b"ply\nformat ascii 1.0\n" + 200 * b" ", b"LASF" + 300 * b"\0", b"1 2 3\n" * 99):
+            said = put(d, "scan", body).json()["detail"]
+            assert "'splatd pack SCAN -o NAME.spld'" in said and said.endswith("then PUT that file"), said
+
+
 def pieces(body, size, pause=0.0):
     """`body` for a chunked request, with a pause after some of the chunks, so that both sides wait for each other."""
     for at in range(0, len(body), size):

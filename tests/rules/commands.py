@@ -42,7 +42,19 @@ for words, wanted in {
     "bench": r"one dataset: splatd bench \S+\.spld", "bench --left-out a.spld": "--cameras is missing",
     "bench --textures a.tex": "-o OUT is missing", "compare": r"IMAGE and a TRUTH: splatd compare \S+ \S+",
     "compare a.png": "TRUTH, which is missing", "sign": "URL.*--key FILE.*--help", "render a.spld -o b.png --size 3x": "1280x720",
-    "render a.spld -o b.png --background rad": "white", "render a.spld -o": "requires an argument.*\n.*splatd render --help",
+    "render a.spld -o b.png --background rad": "white",
+    "tour a.spld --path b.json -o c.avi": r"NAME\.mp4 or a folder.*without \.avi",
+    "tour a.spld --path b.json -o -": "NAME\\.mp4",
+    "pack a.xyz -o b.ply": r"-o NAME\.spld, not 'b\.ply'",
+    "pack a.xyz -o b": r"-o NAME\.spld", "pack a.xyz -o -": r"-o NAME\.spld",
+    "info a.spld --dictionary b.spld": r"--dictionary NAME\.png",
+    "compare a.png b.png --error-map c.npy": r"--error-map NAME\.png",
+    "synth courtyard -o b.ply": r"a folder: give 'b\.ply' without \.ply", "bench a.spld -o b.html": "a folder",
+    "bench --textures a.tex -o b.png": "a folder", "bench --left-out a.spld --cameras b -o c.csv": "a folder",
+    "render a.spld --format png -o b.spld": r"ends in \.png", "render a.spld --format png -o b.jpg": r"ends in \.png",
+    "render a.spld --memory-limit 1X -o b.png": "K, M, G or T",
+    "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
+    "render a.spld -o": "requires an argument.*\n.*splatd render --help",
 }.items():
     said = check(words.split(), 2, "stderr")
     if not re.search(wanted, said):
@@ -54,6 +66,25 @@ with tempfile.TemporaryDirectory() as folder:
     same.symlink_to(scan)
     if "-o NAME.spld" not in check(["pack", str(same), "-o", str(scan)], 2, "stderr") or scan.read_bytes() != before:
         wrong.append("splatd pack writes over its scan")
+    # What takes bytes takes suffixes; a bare number counts what it always did. The next thing wrong is what is said.
+    for words in ("render a.spld --memory-limit 100M -o b.png", "tour a.spld --memory-limit 2G --path b -o c",
+                  "bench a.spld --memory-limit 2G", "bench a.spld --memory-limit 100"):
+        if "a.spld" not in (said := check(words.split(), 2, "stderr")):
+            wrong.append(f"splatd {words}: {said!r}")
+    for words in ("--memory 4G", "--memory 4096"):
+        if "--cameras" not in (said := check(["pack", "a.xyz", "-o", "b.spld", *words.split()], 2, "stderr")):
+            wrong.append(f"splatd pack {words}: {said!r}")
+    # A folder's name may hold dots where it exists, where a slash says so, or where a number follows.
+    for name in (folder + "/..", folder + "/run.v2/", folder + "/lod-1.5"):
+        if "folder" in (said := check(["tour", "a.spld", "--path", "b", "-o", name], 2, "stderr")):
+            wrong.append(f"splatd tour -o {name}: {said!r}")
+    # Each stage counts in a unit or not at all, and photographs and their share of the points are told apart.
+    packed = folder + "/packed.spld"
+    said = subprocess.run([SPLATD, "pack", scan, "-o", packed], stderr=subprocess.PIPE, text=True, timeout=60).stderr
+    if "looking at colours: 1 scan in" not in said or re.search(r"^[a-z ,]*: \d+ in ", said, re.MULTILINE):
+        wrong.append(f"pack's stages: {said!r}")
+    if "derived" not in check(["info", packed], 0, "stdout"):
+        wrong.append("info does not say that uncertainty is derived")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")

@@ -279,7 +279,7 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
                                              : SPL_OK;
     uint64_t sample = preset.sample && preset.sample < textures->count ? preset.sample : textures->count;
     reporting.sample = sample;
-    spl_stage_begin(stage, "training", sample * (preset.epochs ? preset.epochs : epochs_expected));
+    spl_stage_begin(stage, "training", NULL, sample * (preset.epochs ? preset.epochs : epochs_expected));
     if (!rc)
         rc = spl_dictionary_train(&source, &train, report_epoch, &reporting, &coded->dictionary, err);
     spl_stage_finish(stage);
@@ -287,7 +287,7 @@ int spl_coded_init(struct spl_coded *coded, const struct spl_textures *textures,
         rc = err && err->code ? err->code : SPL_E_NOMEM;
     uint32_t stride = splats->chunk_count / sampled_chunks + 1;
     uint32_t sampled = weighs ? lambda_trials * ((splats->chunk_count + stride - 1) / stride) : 0;
-    spl_stage_begin(stage, "coding textures", (uint64_t)splats->chunk_count + sampled);
+    spl_stage_begin(stage, "coding textures", NULL, (uint64_t)splats->chunk_count + sampled);
     if (!rc && weighs)
         rc = seek_lambda(&coding, (double)train.lambda, quality, err);
     if (!rc)

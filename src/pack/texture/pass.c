@@ -69,7 +69,7 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
 {
     uint32_t usable = 0;
     int rc = SPL_OK;
-    spl_stage_begin(pass->stage, "photographs", (uint64_t)pass->report->photographs * pass->splats.chunk_count);
+    spl_stage_begin(pass->stage, "photographs", NULL, (uint64_t)pass->report->photographs * pass->splats.chunk_count);
     for (uint32_t i = 0; !rc && i < pass->report->photographs; i++) {
         const struct spl_named_view *view = &pass->list->views[i];
         struct spl_photo photo;
@@ -149,7 +149,7 @@ static int even_out(struct spl_photo_pass *pass, struct spl_error *err)
 /* Points, not splats: coarser levels have their colours from the same photographs. NULL when memory is refused. */
 static json_t *describe_source(const struct spl_photo_pass *pass)
 {
-    const char *cameras = pass->options->cameras, *slash = strrchr(cameras, '/');
+    const char *cameras = pass->options->cameras, *end = cameras + strlen(cameras), *name;
     json_int_t points = 0;
     for (uint32_t chunk = 0; chunk < pass->splats.chunk_count; chunk++) {
         uint64_t first = pass->splats.chunks[chunk].first_id;
@@ -157,7 +157,13 @@ static json_t *describe_source(const struct spl_photo_pass *pass)
         for (uint64_t id = first; leaf && id < first + pass->splats.chunks[chunk].count; id++)
             points += pass->chosen.photo[id] != SPL_NO_PHOTO;
     }
-    return json_pack("{s:o, s:s, s:I}", "source", json_string_nocheck(slash && slash[1] ? slash + 1 : cameras), "from",
+    while (end > cameras + 1 && end[-1] == '/')
+        end--;
+    /* two names of the path: a COLMAP model's folder is mostly called "0" */
+    int slashes = 0;
+    for (name = end; name > cameras && (name[-1] != '/' || ++slashes < 2);)
+        name--;
+    return json_pack("{s:o, s:s, s:I}", "source", json_stringn_nocheck(name, (size_t)(end - name)), "from",
                      "photographs", "points", points);
 }
 
@@ -196,7 +202,7 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
         goto done;
     if ((rc = look(&pass, dataset, err)) || (rc = even_out(&pass, err)))
         goto done;
-    spl_stage_begin(stage, "colours", pass.splats.chunk_count);
+    spl_stage_begin(stage, "colours", NULL, pass.splats.chunk_count);
     rc = spl_chosen_init(&pass.chosen, &pass.splats, &pass.candidates, pass.gains, report->photographs,
                          (const uint8_t(*)[3])pass.own, stage, err);
     if (rc)

@@ -56,7 +56,7 @@ static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *
                          struct spl_error *err)
 {
     int rc = SPL_OK;
-    spl_stage_begin(pass->stage, "resampling", (uint64_t)pass->report->photographs * pass->splats.chunk_count);
+    spl_stage_begin(pass->stage, "resampling", NULL, (uint64_t)pass->report->photographs * pass->splats.chunk_count);
     for (uint32_t i = 0; !rc && i < pass->report->photographs; i++) {
         struct spl_photo photo;
         if (!pass->uses[i]) {

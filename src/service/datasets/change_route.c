@@ -3,6 +3,7 @@
  * it is change.c's. Owned by the loop's thread. */
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/memory.h"
 #include "service/datasets/change.h"
@@ -59,6 +60,14 @@ static struct change *begin(struct request *request, const struct spl_call *call
     if (!spl_catalog_id_is_valid(call->id, strlen(call->id))) {
         spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "id",
                           "an id has at most 127 letters, digits, '.', '_' and '-', the first of them not a '.'");
+        return NULL;
+    }
+    const char *ending = strrchr(call->id, '.');
+    if (make && ending && !strcasecmp(ending, ".spld")) { /* as 'curl -T hall.spld URL/' makes of a folder's URL */
+        char detail[256];
+        snprintf(detail, sizeof detail, "the id is the file's name without .spld: PUT /v1/datasets/%.*s",
+                 (int)(ending - call->id), call->id);
+        spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "id", detail);
         return NULL;
     }
     struct spl_catalog_slot *slot = claim(request, call->id, make);

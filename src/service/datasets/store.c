@@ -158,8 +158,9 @@ int spl_incoming_check(struct spl_incoming *incoming, const char *target, const 
         return 0;
     char message[sizeof why.message];
     spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
+    const char *advice = rc == SPL_E_INPUT && incoming->bytes ? ": pack the scan first, then PUT that file" : "";
     spl_incoming_abort(incoming);
-    return spl_fail(err, rc, "%s", message);
+    return spl_fail(err, rc, "%s%s", message, advice);
 }
 
 int spl_incoming_place(struct spl_incoming *incoming, const char *target, struct spl_file_mark *mark,

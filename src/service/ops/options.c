@@ -4,8 +4,6 @@
  * service reads its options only. */
 #include "service/ops/options.h"
 
-#include <ctype.h>
-#include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,22 +35,8 @@ size_t spl_parameter_find(const char *name)
 /* The number in `text`, all of it; false when it is none or beyond the parameter's range. */
 static bool parse_number(const struct spl_parameter *parameter, const char *text, uint64_t *out)
 {
-    static const char suffixes[] = "KMGT";
-    char *end;
-    errno = 0;
-    uint64_t value = strtoull(text, &end, 10);
-    if (!isdigit((unsigned char)*text) || errno)
-        return false;
-    const char *suffix = parameter->type == SPL_PARAMETER_BYTES && *end ? strchr(suffixes, *end) : NULL;
-    if (suffix) {
-        unsigned shift = 10 * (unsigned)(suffix - suffixes + 1);
-        if (value > UINT64_MAX >> shift)
-            return false;
-        value <<= shift;
-        end++;
-    }
-    *out = value;
-    return !*end && value >= parameter->least && value <= parameter->most;
+    bool plain = parameter->type != SPL_PARAMETER_BYTES && text[strspn(text, "0123456789")];
+    return !plain && spl_bytes_from_text(text, 1, out) && *out >= parameter->least && *out <= parameter->most;
 }
 
 /* Where `text` stands in the names of a CHOICE. */

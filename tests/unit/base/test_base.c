@@ -32,6 +32,21 @@ static void every_code_has_a_row(void **state)
     assert_string_equal(spl_code_get_info(5)->name, "internal");
 }
 
+static void bytes_have_suffixes_and_no_overflow(void **state)
+{
+    (void)state;
+    static const char *const refused[] = {"", "G", "-1", " 1", "+1", "1 ", "1X", "1GB", "1k", "1.5G", "0x10", "16777216T",
+                                          "18446744073709551616"};
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+        assert_false(spl_bytes_from_text(refused[i], 1, &bytes));
+    assert_true(spl_bytes_from_text("18446744073709551615", 1, &bytes) && bytes == UINT64_MAX);
+    assert_false(spl_bytes_from_text("18446744073709551615", 2, &bytes));
+    assert_true(spl_bytes_from_text("16777215T", 1, &bytes) && bytes == UINT64_C(16777215) << 40);
+    assert_true(spl_bytes_from_text("3", 1 << 20, &bytes) && bytes == 3 << 20);
+    assert_true(spl_bytes_from_text("3K", 1 << 20, &bytes) && bytes == 3 << 10); /* a suffix is of bytes */
+}
+
 static void allocation_refuses_overflow_and_injection(void **state)
 {
     (void)state;
@@ -71,6 +86,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(first_error_wins),
         cmocka_unit_test(every_code_has_a_row),
+        cmocka_unit_test(bytes_have_suffixes_and_no_overflow),
         cmocka_unit_test(allocation_refuses_overflow_and_injection),
         cmocka_unit_test(loop_visits_everything_once),
     };

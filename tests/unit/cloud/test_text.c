@@ -188,6 +188,11 @@ static void the_option_is_checked(void **state)
     refused(&b, "x,y", SPL_E_USAGE, "columns", "z is missing");
     refused(&b, "", SPL_E_USAGE, "columns", "x is missing");
     refused(&b, "x,y,z,colour", SPL_E_USAGE, "columns", "\"colour\"");
+    refused(&b, "x,y,z,r,g", SPL_E_USAGE, "columns", "red and green without blue");
+    refused(&b, "x,y,z,b,r", SPL_E_USAGE, "columns", "red and blue without green");
+    refused(&b, "x,y,z,-,g", SPL_E_USAGE, "columns", "green without red");
+    refused(&b, "x,y,z,nx,ny", SPL_E_USAGE, "columns", "nx and ny without nz");
+    refused(&b, "x,y,z,r,g,b,g", SPL_E_USAGE, "columns", "green is named twice");
     refused(&b, "x,y,z,x", SPL_E_USAGE, "columns", "twice");
     refused(&b, "x,y,z,-,class", SPL_E_INPUT, "class", "column 5");
 }

@@ -177,6 +177,10 @@ static void test_kinds_are_said_and_remembered(void **state)
     assert_string_equal(json_string_value(json_object_get(json_array_get(color, 0), "from")), "intensity");
     spl_dataset_close(dataset);
     assert_non_null(strstr(pack_two(b, c, true, NULL), "intensity in 1 (b.ply), none at all in 1 (c.ply)"));
+    const char *asked = pack_two(b, c, true, NULL); /* what was followed is no advice */
+    assert_non_null(strstr(asked, "no intensity, which --intensity asks for, in 1 (c.ply)"));
+    assert_null(strstr(asked, "--intensity takes"));
+    assert_null(strstr(pack_two(b, b, true, NULL), "--intensity"));
 }
 
 /* Stations of one PTX: with colours, without. */

@@ -38,7 +38,7 @@ static void test_the_plan_is_what_is_left_at_first(void **state)
     struct spl_stage stage;
     plan(&stage);
     assert_true(fabs(left(&stage, 0) - 60) < 1e-9);
-    spl_stage_begin(&stage, "reading a.ply", 50);
+    spl_stage_begin(&stage, "reading a.ply", "points", 50);
     set_clock(&stage, 0);
     assert_true(fabs(left(&stage, 0) - 60) < 1e-9);
     spl_stage_plan(&stage, "coding", 300, 0); /* a part that is known better */
@@ -51,14 +51,14 @@ static void test_speed_corrects_the_plan(void **state)
     for (int slow = 1; slow <= 8; slow *= 2) {
         struct spl_stage stage;
         plan(&stage);
-        spl_stage_begin(&stage, "reading a.ply", 50);
+        spl_stage_begin(&stage, "reading a.ply", "points", 50);
         spl_stage_add(&stage, 50, 1);
-        spl_stage_begin(&stage, "reading b.ply", 50); /* the same part goes on */
+        spl_stage_begin(&stage, "reading b.ply", "points", 50); /* the same part goes on */
         spl_stage_add(&stage, 25, 1);
         set_clock(&stage, 0);
         double truth = 52.5 * slow, said = left(&stage, 7.5 * slow);
         assert_true(said > 0.85 * truth && said < 1.01 * truth);
-        spl_stage_begin(&stage, "training", 100);
+        spl_stage_begin(&stage, "training", NULL, 100);
         set_clock(&stage, 10 * slow);
         truth = 50 * slow;
         assert_true(left(&stage, 0) > 0.9 * truth && left(&stage, 0) < 1.01 * truth);
@@ -73,16 +73,37 @@ static void test_speed_corrects_the_plan(void **state)
     }
 }
 
+static void note(void *context, const struct spl_progress *progress)
+{
+    *(struct spl_progress *)context = *progress;
+}
+
+/* 1000 times slower than planned: the plan's guess, which still counts, is less than the stage itself takes. */
+static void test_a_stage_does_not_outlast_the_whole(void **state)
+{
+    (void)state;
+    struct spl_progress said = {0};
+    struct spl_stage stage = {.threads = 1, .callback = note, .context = &said};
+    spl_stage_plan(&stage, "photographs", 1e-3, 0);
+    spl_stage_begin(&stage, "photographs", NULL, 1000);
+    uint64_t before = 100 * SPL_NS_PER_S;
+    stage.begin_ns -= before; /* as if it had gone on for that long; the plan's part has only begun */
+    stage.reported_ns = 0;
+    spl_stage_add(&stage, 10, 0);
+    assert_int_equal(said.done, 10);
+    assert_true(said.rate > 0 && said.left_s >= 990 / said.rate * (1 - 1e-9));
+}
+
 static void test_stages_out_of_plan(void **state)
 {
     (void)state;
     struct spl_stage stage;
     plan(&stage);
-    spl_stage_begin(&stage, "coding", 0); /* training was not needed; this one does not count */
+    spl_stage_begin(&stage, "coding", "points", 0); /* training was not needed; this one does not count */
     set_clock(&stage, 0);
     assert_true(fabs(left(&stage, 0) - 30) < 1e-9 && fabs(left(&stage, 12) - 18) < 1e-9);
     assert_true(left(&stage, 1e6) == 0);
-    spl_stage_begin(&stage, "writing", 0);
+    spl_stage_begin(&stage, "writing", NULL, 0);
     assert_int_equal(stage.part, 2);
     for (int i = 0; i < 2 * SPL_STAGE_PARTS_MAX; i++) {
         static char names[2 * SPL_STAGE_PARTS_MAX][4];
@@ -97,6 +118,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_the_plan_is_what_is_left_at_first),
         cmocka_unit_test(test_speed_corrects_the_plan),
+        cmocka_unit_test(test_a_stage_does_not_outlast_the_whole),
         cmocka_unit_test(test_stages_out_of_plan),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
