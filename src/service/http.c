@@ -89,10 +89,10 @@ static void count_reply(struct request *request)
         spl_count(counters, replies_5xx);
 }
 
-static enum MHD_Result send_reply(struct request *request)
+/* What every reply says and is counted by, once. */
+static void prepare_reply(struct request *request)
 {
-    if (!request->response)
-        return MHD_NO;
+    request->prepared = true;
     if (request->service->draining || request->closes)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);
@@ -102,7 +102,19 @@ static enum MHD_Result send_reply(struct request *request)
     spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
     spl_connection_enter(request->connection, PHASE_WRITING);
-    return MHD_queue_response(request->handle, request->status, request->response);
+}
+
+/* libmicrohttpd 0.9.75 asks too early where "Expect: 100-continue" stands before no body and another request lies behind:
+ * it takes no reply yet, and asks again. */
+static enum MHD_Result send_reply(struct request *request)
+{
+    if (!request->response)
+        return MHD_NO;
+    bool again = request->prepared;
+    if (!again)
+        prepare_reply(request);
+    enum MHD_Result queued = MHD_queue_response(request->handle, request->status, request->response);
+    return again ? queued : MHD_YES;
 }
 
 static bool append_body(struct request *request, const char *data, size_t length)

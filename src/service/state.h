@@ -73,6 +73,7 @@ struct request {
     bool has_host;  /* of HTTP/1.1, which demands it */
     bool head;      /* the method is HEAD */
     bool closes;    /* the connection ends with the reply */
+    bool prepared;  /* the reply has its last headers and is counted */
     bool abandoned; /* the client has left: close without a reply */
     bool suspended; /* libmicrohttpd does not go on with it */
     bool waits;     /* suspended, until a view is ready or deadline_ns */

@@ -207,6 +207,18 @@ def test_requests_that_do_not_fit_are_forgotten_by_nobody():
         eventually(lambda: b"\nsplatd_requests_open 0\n" in d.ops("/metrics").body)
 
 
+def test_a_client_that_waits_to_send_nothing_gets_its_reply():
+    """Expect: 100-continue before an empty body, and the next request right behind."""
+    with with_tours() as d:
+        for method, path in (("POST", VIEW), ("GET", "/v1/status"), ("HEAD", "/v1/status"), ("PUT", "/v1/datasets/a")):
+            for length in ("Content-Length: 0\r\n", ""):
+                with Wire(d) as wire:
+                    wire.send(f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\n{length}\r\n"
+                              "GET /v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                    assert wire.reply(head=method == "HEAD")[0] >= 200
+                    assert wire.reply()[0] == 200 and wire.ended(), (method, length)
+
+
 def test_headers_that_are_not_what_they_seem():
     """Lines that libmicrohttpd takes for the end of the headers, or reads a part of."""
     with with_tours() as d:

@@ -113,8 +113,8 @@ class Victim:
         except (OSError, ValueError, KeyError, AssertionError) as error:
             return [*found, f"it does not answer: {error!r}"]
         self.worst_rss = max(self.worst_rss, rss)
-        # a sanitiser keeps freed memory aside: 256 MiB, and as much again around it
-        if rss > self.rss_at_start + (700 if self.slow else 150) * (1 << 20):
+        # a sanitiser keeps freed memory aside: 256 MiB, and around it what frames of 300 MiB have left in between
+        if rss > self.rss_at_start + (1600 if self.slow else 150) * (1 << 20):
             found.append(f"resident memory went from {self.rss_at_start >> 20} to {rss >> 20} MiB")
         if files > self.files_at_start + 60:
             found.append(f"{files} descriptors, {self.files_at_start} at the start")
