@@ -51,7 +51,7 @@ with tempfile.TemporaryDirectory() as folder:
     assert "1 unit =" in table and sum(line.startswith("a ") for line in table.splitlines()) == 1, table
 
     for wrong in (["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],
-                  ["--views", folder / "no.json"], ["--method", "lines"], ["--lod", "-1"], ["--size", "160"]):
+                  ["--views", folder / "no.json"], ["--method", "lines"], ["--lod", "-1"], ["--size", "160x"]):
         done = run("bench", folder / "a.spld", *wrong)
         assert done.returncode == 2 and done.stderr and not done.stdout, (wrong, done)
     assert run("bench", folder / "a.spld", "--device", "no such device").returncode == 1

@@ -173,7 +173,8 @@ def _field(*lines, expect=ANSWER, **more):
         d.worse(expect)
         for name, value in more.items():
             setattr(d, name, value)
-        if more.get("closes") is False and d.version == "1.0":
+        alive = more.get("closes") is False or b"Connection: keep-alive" in lines
+        if alive and d.version == "1.0" and not any(b"lose" in field for field in d.fields):
             d.closes = False
     return mutate
 
@@ -183,7 +184,7 @@ def _lines_end(mark):
         d.end_of_line = mark
         bare = mark == b"\r"  # where such lines end nobody can say
         d.worse(REST if bare else EITHER)
-        d.rest_behind = d.half = bare
+        d.rest_behind, d.half = d.rest_behind or bare, d.half or bare
     return mutate
 
 
