@@ -221,9 +221,8 @@ void spl_change_end(struct request *request);                                   
 void spl_change_abandon(struct request *request);                               /* its client has left; idempotent */
 void spl_change_refuse_all(struct spl_service *service);
 void spl_change_forget_all(struct spl_service *service); /* once no thread has one, and no request */
-/* `entry` is resident, or refused: if it is a client's, it is taken. */
-bool spl_change_take_resident(struct spl_service *service, struct spl_catalog_entry *entry);
-bool spl_change_take_refused(struct spl_service *service, struct spl_catalog_entry *entry);
+/* `entry` is resident, or refused with entry->err. True: it is a client's, and taken. */
+bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entry *entry);
 
 /* routes.c: fills request->response, or hands a job to the pipeline. */
 void spl_route(struct request *request, const char *method);

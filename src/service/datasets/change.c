@@ -203,39 +203,23 @@ void spl_change_run(struct change *change, enum spl_change_step step)
     spl_request_suspend(change->request);
 }
 
-/* The change whose dataset the gpu thread has answered for; NULL where it is not a client's. */
-static struct change *take_loading(struct spl_service *service, const struct spl_catalog_entry *entry)
+bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entry *entry)
 {
     struct change *change;
     LIST_FOREACH(change, &service->library.changes, link)
     if (change->loading == entry)
         break;
-    if (change)
-        change->loading = NULL;
-    return change;
-}
-
-bool spl_change_take_resident(struct spl_service *service, struct spl_catalog_entry *entry)
-{
-    struct change *change = take_loading(service, entry);
     if (!change)
         return false;
+    change->loading = NULL;
     change->entry = entry;
-    if (service->library.stopped)
+    change->err = entry->err;
+    if (change->err.code)
+        fail(change);
+    else if (service->library.stopped)
         spl_change_finish(change);
     else
         spl_change_run(change, SPL_CHANGE_PLACE);
-    return true;
-}
-
-bool spl_change_take_refused(struct spl_service *service, struct spl_catalog_entry *entry)
-{
-    struct change *change = take_loading(service, entry);
-    if (!change)
-        return false;
-    change->entry = entry;
-    change->err = entry->err;
-    fail(change);
     spl_http_pump(service);
     return true;
 }

@@ -158,7 +158,7 @@ void spl_library_take_changes(struct spl_service *service)
         }
         struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, entry->info->id);
         bool resident = entry->state == SPL_ENTRY_RESIDENT;
-        if (resident ? spl_change_take_resident(service, entry) : spl_change_take_refused(service, entry))
+        if (spl_change_take_answer(service, entry))
             continue;
         if (slot && slot->next == entry && resident) {
             spl_library_serve(slot, entry);
