@@ -150,6 +150,8 @@ AMBIGUOUS = [
     ("Transfer-Encoding:", b""),
     ("Transfer-Encoding : chunked", b"2\r\n{}\r\n0\r\n\r\n"),
     ("Content-Length : 2", b"{}"),
+    ("Content-Length:\r\n 2", b"{}"),
+    ("Transfer-Encoding:\r\n\tchunked", b"2\r\n{}\r\n0\r\n\r\n"),
     ("Content\tLength: 2", b"{}"),
 ]
 # libmicrohttpd 0.9.75 answers these itself, before any of our code sees a header: 400, its head twice, and the end.
