@@ -6,6 +6,9 @@
 #include <string.h>
 #include <sys/socket.h>
 
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/ops/counters.h"
 #include "service/state.h"
 
 enum {
@@ -36,7 +39,7 @@ void spl_refuse_on_socket(struct request *request, unsigned status, const char *
     request->status = status;
     request->abandoned = true;
     if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
-        spl_count(&request->service->counters, replies_4xx);
+        spl_count(request->service->counters, replies_4xx);
     shutdown(request->connection->fd, SHUT_RDWR);
 }
 

@@ -7,6 +7,9 @@
 
 #include "base/memory.h"
 #include "service/datasets/change.h"
+#include "service/exchange.h"
+#include "service/reply.h"
+#include "service/state.h"
 
 enum { step_bytes = 1 << 20, changes_max = 4 };
 
@@ -19,11 +22,11 @@ static void reply_conflict(struct request *request, const char *detail)
 static struct spl_catalog_slot *claim(struct request *request, const char *id, bool make)
 {
     struct spl_service *service = request->service;
-    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, id);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
     struct change *change;
     struct spl_error err = {0};
     size_t changes = 0;
-    LIST_FOREACH(change, &service->library.changes, link)
+    LIST_FOREACH(change, &service->library->changes, link)
     changes++;
     if (service->draining || changes == changes_max || (slot && slot->busy)) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
@@ -34,15 +37,15 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
         return NULL;
     } else if (!slot && !make) {
         spl_fail_field(&err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", id);
-    } else if (!slot && !service->library.directory) {
+    } else if (!slot && !service->library->directory) {
         reply_conflict(request,
                        "the service was started without a directory of datasets, so there is no place for new ones");
         return NULL;
     } else if (!slot) {
         char *path = NULL;
-        if (asprintf(&path, "%s/%s.spld", service->library.directory, id) < 0)
+        if (asprintf(&path, "%s/%s.spld", service->library->directory, id) < 0)
             path = NULL;
-        if (path && (slot = spl_catalog_add_slot(&service->catalog, id, path, &err)))
+        if (path && (slot = spl_catalog_add_slot(&service->library->catalog, id, path, &err)))
             slot->in_directory = true;
         else if (!path)
             spl_fail(&err, SPL_E_NOMEM, "out of memory for a path");

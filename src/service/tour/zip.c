@@ -8,6 +8,9 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
 #include "service/tour/tour.h"
 #include "service/zip.h"
 
