@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 static const struct member {
     const char *name;
@@ -98,11 +98,10 @@ static bool take_index(const json_t *record, const char *key, size_t count, size
 
 static bool take_calibrator(struct spl_sweep *sweep, double ms)
 {
-    double *grown = spl_realloc(sweep->calibrator, sweep->calibrator_count + 1, sizeof *grown, NULL);
-    if (!grown || !(ms > 0))
+    size_t wanted = sweep->calibrator_count + 1;
+    if (!(ms > 0) || spl_array_reserve(sweep->calibrator, sweep->calibrator_capacity, wanted, NULL))
         return false;
-    sweep->calibrator = grown;
-    grown[sweep->calibrator_count++] = ms;
+    sweep->calibrator[sweep->calibrator_count++] = ms;
     return true;
 }
 

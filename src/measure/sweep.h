@@ -53,7 +53,7 @@ struct spl_sweep {
     struct spl_sweep_accuracy *accuracy; /* [setting][view] */
     struct spl_sweep_time *times;        /* [setting][view][size][repeat] */
     double *calibrator;                  /* milliseconds; at least one */
-    size_t calibrator_count;
+    size_t calibrator_count, calibrator_capacity;
     size_t resumed;              /* results that the state had */
     double rendering_s, seconds; /* of this run: inside render calls; altogether */
 };

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/array.h"
 #include "base/clock.h"
 #include "base/memory.h"
 #include "service/access/door.h"
@@ -128,16 +129,8 @@ static bool append_body(struct request *request, const char *data, size_t length
     request->body_seen += length;
     if (request->body_seen > body_max)
         return request->body_seen <= drain_max;
-    if (request->body_seen > request->body_capacity) {
-        size_t capacity = request->body_capacity ? request->body_capacity : 4096;
-        while (capacity < request->body_seen)
-            capacity *= 2;
-        char *grown = spl_realloc(request->body, capacity, 1, NULL);
-        if (!grown)
-            return false;
-        request->body = grown;
-        request->body_capacity = capacity;
-    }
+    if (spl_array_reserve(request->body, request->body_capacity, request->body_seen, NULL))
+        return false;
     memcpy(request->body + request->body_length, data, length);
     request->body_length += length;
     return true;

@@ -5,9 +5,10 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 #include "service/datasets/change.h"
 #include "service/exchange.h"
+#include "service/http.h"
 #include "service/reply.h"
 #include "service/state.h"
 
@@ -124,14 +125,9 @@ bool spl_change_take(struct request *request, const char *data, size_t length)
         spl_change_finish(change);
         return true;
     }
-    if (change->filled + length > change->capacity) {
-        size_t capacity = change->filled + length > step_bytes ? change->filled + length : step_bytes;
-        char *grown = spl_realloc(change->buffer, capacity, 1, NULL);
-        if (!grown)
-            return false;
-        change->buffer = grown;
-        change->capacity = capacity;
-    }
+    size_t wanted = change->filled + length, usual = step_bytes + connection_pool;
+    if (spl_array_reserve(change->buffer, change->capacity, wanted > usual ? wanted : usual, NULL))
+        return false;
     memcpy(change->buffer + change->filled, data, length);
     change->filled += length;
     if (change->filled >= step_bytes)
