@@ -87,7 +87,7 @@ bool spl_check_framing(struct request *request, const char *line, const char *ve
  * target, still encoded; the second is for when the headers are there. */
 void spl_refuse_many_parameters(struct request *request, const char *uri);
 void spl_refuse_many_headers(struct request *request);
-/* Answers past libmicrohttpd and ends the connection; `detail` needs no quoting. */
+/* Answers past libmicrohttpd and ends the connection. */
 void spl_refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail);
 
 #endif

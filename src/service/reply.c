@@ -68,8 +68,8 @@ static json_t *outside_text(const char *text)
     return json_string(plain);
 }
 
-static char *problem_text(const struct request *request, unsigned status, const char *type, const char *field,
-                          const char *detail)
+char *spl_problem_print(const struct request *request, unsigned status, const char *type, const char *field,
+                        const char *detail)
 {
     json_t *json = json_pack("{s:o, s:s, s:i, s:o, s:o}", "type", json_sprintf("urn:splatd:error:%s", type), "title",
                              MHD_get_reason_phrase_for(status), "status", (int)status, "detail", outside_text(detail),
@@ -94,13 +94,14 @@ static unsigned status_of(const struct request *request, const struct spl_error 
 
 char *spl_problem_text(const struct request *request, const struct spl_error *err)
 {
-    return problem_text(request, status_of(request, err), spl_code_get_info(err->code)->name, err->field, err->message);
+    return spl_problem_print(request, status_of(request, err), spl_code_get_info(err->code)->name, err->field,
+                             err->message);
 }
 
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail)
 {
-    set_text(request, status, "application/problem+json", problem_text(request, status, type, field, detail));
+    set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
 }
 
 void spl_reply_error(struct request *request, const struct spl_error *err)

@@ -26,6 +26,8 @@ void spl_reply_add_header(struct request *request, const char *name, const char 
     __attribute__((format(printf, 3, 4)));
 
 /* The body of a problem, malloc'd; NULL without memory. */
+char *spl_problem_print(const struct request *request, unsigned status, const char *type, const char *field,
+                        const char *detail);
 char *spl_problem_text(const struct request *request, const struct spl_error *err);
 
 #endif
