@@ -29,4 +29,10 @@ int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, ui
 /* As over HTTP: "white", "#rrggbb", "#rrggbbaa", "transparent". */
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err);
 
+enum { SPL_CMD_NAMES_MAX = 96 };
+
+/* Which of `names`, closed by NULL, was probably meant by `word`, whose dashes in front and argument behind '=' do not
+ * count: the one with the fewest letters to change, add, leave out or swap, where these are few. NULL: none. */
+const char *spl_cmd_find_nearest(const char *word, const char *const *names);
+
 #endif
