@@ -55,6 +55,7 @@ void spl_reply_rendering(struct request *request, struct spl_rendering *renderin
         spl_reply_add_header(request, "Server-Timing", "%s, total;dur=%.3f", rendering->timing,
                              (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
     spl_reply_add_header(request, "Splatd-Cache", "%s", origin);
+    request->cache = origin;
     if (!rendering->reusable)
         spl_reply_add_header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
     else if (request->validated)

@@ -6,7 +6,7 @@
 
 struct request;
 
-/* `origin` is Splatd-Cache's value. */
+/* `origin`, static, is Splatd-Cache's value, and what the log says of the cache. */
 void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin);
 void spl_reply_not_modified(struct request *request, const struct spl_key *key);
 /* A batch; takes *bundle. `failed` parts of it are problems. */
