@@ -24,12 +24,9 @@ static const struct member {
 #undef MEASURE
 },
   stages[] = {
-#define STAGE(name)                                                                                                    \
-    {                                                                                                                  \
-#name, offsetof(struct spl_sweep_time, name)                                                                   \
-    }
-      STAGE(ms),       STAGE(select_ms), STAGE(upload_ms),  STAGE(clear_ms),
-      STAGE(depth_ms), STAGE(shade_ms),  STAGE(resolve_ms), STAGE(readback_ms),
+    {"ms", offsetof(struct spl_sweep_time, ms)},
+#define STAGE(name) {#name "_ms", offsetof(struct spl_sweep_time, name##_ms)},
+#include "render/stages.def"
 #undef STAGE
 };
 enum { MEASURES = sizeof measures / sizeof *measures, STAGES = sizeof stages / sizeof *stages };

@@ -212,13 +212,9 @@ static int time_frame(struct job *job, size_t setting, size_t v, enum spl_sweep_
     if (rc)
         return rc;
     const struct spl_frame_stats *s = &frame.stats;
-    t->select_ms = s->select_ms;
-    t->upload_ms = s->upload_ms;
-    t->clear_ms = s->clear_ms;
-    t->depth_ms = s->depth_ms;
-    t->shade_ms = s->shade_ms;
-    t->resolve_ms = s->resolve_ms;
-    t->readback_ms = s->readback_ms;
+#define STAGE(name) t->name##_ms = s->name##_ms;
+#include "render/stages.def"
+#undef STAGE
     spl_frame_finish(&frame);
     return SPL_OK;
 }

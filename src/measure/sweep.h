@@ -33,7 +33,9 @@ struct spl_sweep_options {
 
 struct spl_sweep_time { /* one frame, colour only */
     double ms;          /* the whole call on the host's clock, readback included */
-    double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms;
+#define STAGE(name) double name##_ms;
+#include "render/stages.def"
+#undef STAGE
     bool done;
 };
 
