@@ -12,7 +12,6 @@
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "geom/size.h"
-#include "measure/page.h"
 #include "measure/peers.h"
 #include "measure/report.h"
 #include "shared.h"

@@ -13,8 +13,8 @@
 #include "cmd/output.h"
 #include "cmd/table.h"
 #include "image/load.h"
-#include "measure/error_map.h"
 #include "measure/metrics.h"
+#include "measure/pictures.h"
 
 struct arguments {
     const char *image, *truth, *map; /* map may be NULL */
