@@ -148,3 +148,26 @@ const char *spl_cmd_find_nearest(const char *word, const char *const *names)
     }
     return nearest;
 }
+
+void spl_cmd_print_wrapped(FILE *out, size_t used, size_t column, const char *text)
+{
+    enum { line_length = 112 };
+    if (used + 2 > column)
+        fputc('\n', out);
+    fprintf(out, "%*s", (int)(used + 2 > column ? column : column - used), "");
+    size_t at = column;
+    for (bool first = true; *text; first = false) {
+        size_t blanks = strspn(text, " "), word = strcspn(text + blanks, " "), width = 0;
+        for (size_t i = 0; i < word; i++)
+            width += ((unsigned char)text[blanks + i] & 0xc0) != 0x80; // of UTF-8
+        if (!first && at + 1 + width > line_length) {
+            fprintf(out, "\n%*s", (int)column, "");
+            at = column;
+            first = true;
+        }
+        fprintf(out, "%s%.*s", first ? "" : " ", (int)word, text + blanks);
+        at += width + !first;
+        text += blanks + word;
+    }
+    fputc('\n', out);
+}

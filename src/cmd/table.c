@@ -13,7 +13,6 @@
 
 enum {
     first_row = 256,    /* what getopt returns for a row: this and its index */
-    line_length = 112,  /* of --help */
     help_column = 29,   /* of what an option is for, at most */
     names_room = 2 << 8 /* for the names of a choice */
 };
@@ -114,27 +113,6 @@ static void print_limits(const struct spl_cmd_option *o, char *out, size_t room)
                  fallback ? "default: " : "", fallback ? fallback : "");
 }
 
-/* Prints words from column `column` on, where the line is now, and breaks lines. */
-static void print_wrapped(const char *text, size_t column)
-{
-    size_t at = column;
-    for (bool first = true; *text; first = false) {
-        size_t blanks = strspn(text, " "), word = strcspn(text + blanks, " ");
-        size_t width = 0;
-        for (size_t i = 0; i < word; i++)
-            width += ((unsigned char)text[blanks + i] & 0xc0) != 0x80; // of UTF-8
-        if (!first && at + 1 + width > line_length) {
-            printf("\n%*s", (int)column, "");
-            at = column;
-            first = true;
-        }
-        printf("%s%.*s", first ? "" : " ", (int)word, text + blanks);
-        at += width + !first;
-        text += blanks + word;
-    }
-    putchar('\n');
-}
-
 static int print_names(const struct spl_cmd_option *o, char *out, size_t room)
 {
     char letter[] = "    ";
@@ -163,11 +141,7 @@ void spl_cmd_table_print_help(const struct spl_cmd_table *table)
         size_t used = (size_t)snprintf(text, sizeof text, "%s", o->help);
         print_limits(o, text + used, sizeof text - used);
         printf("%s", names);
-        if ((size_t)length + 2 > column)
-            printf("\n%*s", (int)column, "");
-        else
-            printf("%*s", (int)column - length, "");
-        print_wrapped(text, column);
+        spl_cmd_print_wrapped(stdout, (size_t)length, column, text);
     }
     fputs(table->after ? table->after : "", stdout);
 }
