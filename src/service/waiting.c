@@ -17,29 +17,6 @@
 
 enum { sweep_ms = 20, sweep_sockets = 64 };
 
-static void on_timer(uv_timer_t *timer);
-
-void spl_waiting_add(struct request *request, uint64_t deadline_ns)
-{
-    struct spl_service *service = request->service;
-    request->waits = true;
-    request->deadline_ns = deadline_ns;
-    LIST_INSERT_HEAD(&service->http->waiting, request, link);
-    if (!service->http->waiting_count++)
-        uv_timer_start(&service->http->wait_timer, on_timer, sweep_ms, sweep_ms);
-    spl_request_suspend(request);
-}
-
-void spl_waiting_resume(struct request *request)
-{
-    struct spl_service *service = request->service;
-    LIST_REMOVE(request, link);
-    request->waits = false;
-    if (!--service->http->waiting_count)
-        uv_timer_stop(&service->http->wait_timer);
-    spl_request_resume(request);
-}
-
 static void let_go(struct request *request)
 {
     spl_ticket_drop(&request->ticket);
@@ -101,6 +78,27 @@ static void sweep(struct spl_service *service)
 static void on_timer(uv_timer_t *timer)
 {
     sweep(timer->data);
+}
+
+void spl_waiting_add(struct request *request, uint64_t deadline_ns)
+{
+    struct spl_service *service = request->service;
+    request->waits = true;
+    request->deadline_ns = deadline_ns;
+    LIST_INSERT_HEAD(&service->http->waiting, request, link);
+    if (!service->http->waiting_count++)
+        uv_timer_start(&service->http->wait_timer, on_timer, sweep_ms, sweep_ms);
+    spl_request_suspend(request);
+}
+
+void spl_waiting_resume(struct request *request)
+{
+    struct spl_service *service = request->service;
+    LIST_REMOVE(request, link);
+    request->waits = false;
+    if (!--service->http->waiting_count)
+        uv_timer_stop(&service->http->wait_timer);
+    spl_request_resume(request);
 }
 
 void spl_waiting_refuse_all(struct spl_service *service)
