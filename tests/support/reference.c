@@ -19,11 +19,11 @@
 
 struct sample {
     float first;   /* pushed depth, INFINITY = nothing */
-    float nearest; /* method points: depth of the winner */
+    float own;     /* method nearest: depth of the winner, which is not bent */
     uint32_t id;
     uint32_t fragments; /* discs that cover it */
     uint32_t word;    /* method fill: depth, spacing, linear */
-    uint32_t payload; /* methods points and fill: colour */
+    uint32_t payload; /* of the winner, where one wins: colour */
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
@@ -58,6 +58,17 @@ struct disc {
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
 };
+
+/* Are discs drawn, and are they summed up? Else the nearest wins. */
+static bool draws_discs(const struct spl_view *view)
+{
+    return view->method == SPL_METHOD_SPLAT || view->method == SPL_METHOD_NEAREST;
+}
+
+static bool sums(const struct scene *s)
+{
+    return s->view->method == SPL_METHOD_SPLAT;
+}
 
 static void to_view(const struct spl_camera *camera, const float v[3], float out[3])
 {
@@ -170,6 +181,22 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
     }
 }
 
+/* Method nearest: a fragment whose depth is bent to `bent`; each layer's least payload among equals. */
+static void bend(struct sample *at, const struct disc *d, float z, float bent)
+{
+    uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
+    if (bent > at->first)
+        return;
+    bool nearer = bent < at->first;
+    at->first = bent;
+    at->payload = nearer || payload < at->payload ? payload : at->payload;
+    at->own = nearer || z < at->own ? z : at->own;
+    if (nearer || d->id < at->id) {
+        at->id = d->id;
+        memcpy(at->normal_winner, d->n, sizeof d->n);
+    }
+}
+
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 {
     int first[2], last[2];
@@ -187,6 +214,10 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
                 continue;
             struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
             float pushed = z + margin;
+            if (!sums(s)) {
+                bend(at, d, z, z + margin * distance);
+                continue;
+            }
             if (!shade) {
                 at->fragments++;
                 if (pushed < at->first)
@@ -351,7 +382,7 @@ static void for_each_disc(struct scene *s, bool shade)
             uint32_t low_bits;
             if (!load_disc(s, &s->chunks[c], index, &d, &low_bits))
                 continue;
-            if (s->view->method != SPL_METHOD_SPLAT)
+            if (!draws_discs(s->view))
                 point(s, &d, low_bits);
             else
                 depth_disc(s, &d, shade);
@@ -369,8 +400,8 @@ static uint32_t most_fragments(const struct scene *s)
 
 static float depth_of(const struct scene *s, const struct sample *at)
 {
-    if (s->view->method != SPL_METHOD_SPLAT)
-        return at->first;
+    if (!sums(s))
+        return s->view->method == SPL_METHOD_NEAREST ? at->own : at->first;
     return (float)((double)at->first * (1 - (double)at->depth / (double)at->weight / 262144.0));
 }
 
@@ -378,8 +409,7 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
 {
     double length = 0;
     for (int i = 0; i < 3; i++) {
-        out[i] = s->view->method != SPL_METHOD_SPLAT ? at->normal_winner[i]
-                                                     : (double)at->normal[i] / (double)at->weight - 127.5;
+        out[i] = sums(s) ? (double)at->normal[i] / (double)at->weight - 127.5 : at->normal_winner[i];
         length += out[i] * out[i];
     }
     for (int i = 0; i < 3; i++)
@@ -393,7 +423,7 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     const struct sample *own = &s->samples[(size_t)y * s->camera.width + (size_t)x], *around[8], *found = own;
     int covered = 0;
     float sum = 0, closest = INFINITY;
-    if (s->view->method != SPL_METHOD_SPLAT || own->first < INFINITY)
+    if (!sums(s) || own->first < INFINITY)
         return own;
     for (int64_t j = y > 0 ? y - 1 : y; j <= y + 1 && j < s->camera.height; j++)
         for (int64_t i = x > 0 ? x - 1 : x; i <= x + 1 && i < s->camera.width; i++) {
@@ -411,6 +441,28 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
         }
     }
     return found;
+}
+
+/* Channel `c` of what a sample contributes: of method nearest the mean over those around on its surface, 4 : 1 : 1/2. */
+static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
+{
+    if (sums(s))
+        return (at->color[c] + at->weight / 2) / at->weight;
+    if (s->view->method != SPL_METHOD_NEAREST)
+        return at->payload >> 8 * c & 255;
+    int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
+    double sum = 0, weights = 0;
+    for (int64_t j = -1; j <= 1; j++)
+        for (int64_t i = -1; i <= 1; i++) {
+            bool inside = x + i >= 0 && x + i < width && y + j >= 0 && y + j < s->camera.height;
+            const struct sample *beside = inside ? at + j * width + i : at;
+            double weight = i && j ? 0.5 : i || j ? 1 : 4;
+            if (!(fabsf(beside->first - at->first) <= SPL_SMOOTH_SHARE * at->first))
+                continue;
+            sum += weight * (beside->payload >> 8 * c & 255);
+            weights += weight;
+        }
+    return (uint64_t)(sum / weights + 0.5);
 }
 
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
@@ -440,8 +492,7 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
             double n[3];
             normal_of(s, at, n);
             for (int c = 0; c < 3; c++) {
-                color[c] += s->view->method != SPL_METHOD_SPLAT ? (at->payload >> 8 * c & 255)
-                                                                : (at->color[c] + at->weight / 2) / at->weight;
+                color[c] += color_of(s, at, c);
                 normal[c] += n[c];
             }
         }
@@ -520,11 +571,11 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.fy *= view->supersample;
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
-    s.margin = (float)view->margin;
+    s.margin = (float)view->disc.margin;
     const struct naive_options options = {.dataset = dataset,
                                           .camera = &s.camera,
                                           .lod = view->lod,
-                                          .atoms = view->method == SPL_METHOD_SPLAT ? view->atoms : 0};
+                                          .atoms = view->method == SPL_METHOD_SPLAT ? view->disc.atoms : 0};
     const struct spl_wires *wires = NULL;
     struct fill_plan plan = {0};
     int rc = SPL_OK;
@@ -562,7 +613,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for_each_disc(&s, false);
         lines(&s);
         s.weight_max = naive_weight(most_fragments(&s));
-        if (view->method == SPL_METHOD_SPLAT)
+        if (sums(&s))
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
             fill(&s, &plan);

@@ -51,15 +51,17 @@ static float cut(float w, uint32_t bits)
  * pixels where each of its samples is looked at or a pixel has many. Levels double what they look at. */
 struct fill_plan fill_plan_of(const struct spl_view *view, double spacing)
 {
-    bool constant = view->visibility == SPL_VISIBILITY_CONSTANT;
-    double side = view->supersample, around = 64 * (side > 1 ? side : 1), most = constant || around > 128 ? around : 128;
-    struct fill_plan plan = {.kernel = view->kernel > 0 ? view->kernel * side / 2 : 3 * spacing, .rings = 2, .guard = 4};
+    bool constant = view->fill.visibility == SPL_VISIBILITY_CONSTANT;
+    double side = view->supersample, around = 64 * (side > 1 ? side : 1);
+    double most = constant || around > 128 ? around : 128;
+    struct fill_plan plan = {.rings = 2, .guard = 4};
+    plan.kernel = view->fill.kernel > 0 ? view->fill.kernel * side / 2 : 3 * spacing;
     plan.kernel = plan.kernel < 1.5 ? 1.5 : plan.kernel > most ? most : plan.kernel;
     while (plan.rings < SPL_FILL_LEVELS_MAX - 1 && plan.kernel >= pow(2, plan.rings - 0.25))
         plan.rings++;
     while (plan.guard < plan.kernel && plan.guard < around)
         plan.guard *= 2;
-    plan.levels = view->pyramid ? view->pyramid : plan.rings;
+    plan.levels = view->fill.pyramid ? view->fill.pyramid : plan.rings;
     return plan;
 }
 
@@ -132,7 +134,7 @@ static float coarse_reach(const struct filter *f, int x, int y)
 static bool is_visible(const struct filter *f, int x, int y, float z)
 {
     float steep[8] = {0}, open = 0;
-    bool constant = f->view->visibility == SPL_VISIBILITY_CONSTANT;
+    bool constant = f->view->fill.visibility == SPL_VISIBILITY_CONSTANT;
     if (constant) {
         int k = (int)f->plan->kernel;
         for (int cy = y - k; cy <= y + k; cy++)
@@ -268,7 +270,7 @@ void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height
     f.reach = (float)(3 / 1.128379f * focal);
     f.margin = (float)(1 / 1.128379f);
     f.radius = (float)(median / 16);
-    f.threshold = (float)(8 * view->threshold);
+    f.threshold = (float)(8 * view->fill.threshold);
     for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
         f.width[level] = (width + (1u << level) - 1) >> level;
         f.height[level] = (height + (1u << level) - 1) >> level;
@@ -292,7 +294,7 @@ void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height
     for (uint32_t i = 0; i < width * height; i++) {
         const struct cell *own = &f.nearest[0][i];
         f.means[0][i] = *own;
-        bool keeps = own->w > 0 && view->visibility == SPL_VISIBILITY_NONE;
+        bool keeps = own->w > 0 && view->fill.visibility == SPL_VISIBILITY_NONE;
         f.means[0][i].hole =
             !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
     }

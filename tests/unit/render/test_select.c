@@ -49,7 +49,7 @@ static void a_spacing_of_stand_ins_is_not_complete(void **state)
     assert_int_equal(spl_camera_set_fov(&view.camera, 40, 256, 256, NULL), SPL_OK);
     int left = 1000;
     struct spl_select_params params = {
-        .dataset = dataset, .camera = &view.camera, .lod = 1, .resident = take_one, .points = true, .context = &left};
+        .dataset = dataset, .camera = &view.camera, .lod = 1, .resident = take_one, .context = &left};
     double fine, coarse;
     bool complete = true;
     assert_int_equal(spl_select_spacing(&params, &fine, &complete, NULL), SPL_OK);
@@ -203,6 +203,7 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_camer
                                        .camera = camera,
                                        .lod = lod,
                                        .low_pass = (double)SPL_LOW_PASS,
+                                       .discs = true,
                                        .resident = take_one,
                                        .context = &left};
     struct spl_draw_list list = {0};
@@ -278,7 +279,7 @@ static void nodes_are_listed_front_to_back(void **state)
         int left = 1 << 30;
         double last = -INFINITY;
         struct spl_select_params params = {
-            .dataset = dataset, .camera = &camera, .resident = take_one, .points = true, .context = &left};
+            .dataset = dataset, .camera = &camera, .resident = take_one, .context = &left};
         assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
         for (size_t i = 0; i < list.chunk_count; i++) {
             uint32_t n = 0, c = 0;
