@@ -90,7 +90,7 @@ static struct spl_dataset *make_clumps(void)
 static struct spl_camera random_camera(void)
 {
     struct spl_camera camera = {.near = 0.01, .far = uniform() < 0.2 ? 1.5 : 1000};
-    double away = 0.1 + 4 * uniform() * uniform();
+    double away = 0.1 + 10 * uniform() * uniform();
     for (;;) {
         double eye[3], target[3];
         for (int c = 0; c < 3; c++) {
@@ -193,7 +193,8 @@ static uint32_t count_over(const struct spl_camera *camera, const struct ball *b
     return over;
 }
 
-static void check_view(const struct spl_dataset *dataset, const struct spl_camera *camera, double lod)
+/* Whether the root was asked for. */
+static bool check_view(const struct spl_dataset *dataset, const struct spl_camera *camera, double lod)
 {
     uint32_t chunk_count;
     size_t count, seen_balls = 0;
@@ -245,22 +246,26 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_camer
     bool complete = true;
     assert_int_equal(spl_select_spacing(&params, &spacing, &complete, NULL), SPL_OK);
     assert_float_equal(spacing / naive_spacing(naive, count), 1, 1e-9);
+    bool coarse = naive[0].node == 0;
     free(balls);
     free(naive);
     free(listed);
     spl_draw_list_finish(&list);
+    return coarse;
 }
 
 static void every_splat_that_is_seen_is_drawn_at_its_level(void **state)
 {
     (void)state;
-    static const double lods[] = {0, 0.3, 1, 3, 12};
+    static const double lods[] = {0, 0.3, 1, 4, 16};
+    unsigned coarse = 0;
     random_state = 17;
     struct spl_dataset *dataset = make_clumps();
-    for (int view = 0; view < 60; view++) {
+    for (int view = 0; view < 400; view++) {
         struct spl_camera camera = random_camera();
-        check_view(dataset, &camera, lods[view % 5]);
+        coarse += check_view(dataset, &camera, lods[view % 5]);
     }
+    assert_in_range(coarse, 40, 360); /* both levels were asked for */
     spl_dataset_close(dataset);
 }
 
