@@ -25,6 +25,7 @@ struct spl_frame_steps {
     struct spl_frame_job job;
     uint32_t x, y; /* corner of the next tile; y = height: all are there */
     uint32_t row;  /* of `enlarged`, the next */
+    bool prepared; /* its plan is made, for which it may have waited */
 };
 
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
@@ -72,13 +73,19 @@ static int plan_fill(struct spl_frame_job *job, struct spl_error *err)
     spl_tiling_get_camera(job->view, &camera);
     struct spl_select_params params = spl_frame_selection(job, &camera);
     uint64_t clock = spl_now_ns();
-    spl_residency_begin_frame(&job->renderer->residency);
-    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
+    bool complete = true;
+    struct spl_error why = {0};
+    spl_residency_begin_walk(&job->renderer->residency, &job->hold);
+    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &complete, &why);
+    int waits = spl_frame_end_walk(job, err);
     job->frame->stats.select_ms += spl_since_ms(&clock);
-    if (job->page_error.code)
-        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    if (waits)
+        return waits;
+    if (rc)
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
+    job->frame->stats.complete &= complete;
     spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
-    return rc ? rc : check_work(job, &camera, err);
+    return check_work(job, &camera, err);
 }
 
 /* A share of the size, to be enlarged; a pixel's centre stays where it is in the world. */
@@ -101,6 +108,7 @@ static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
     return steps->job.resident ? SPL_OK : spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
 }
 
+/* SPL_SLOT_PENDING where it has pages to wait for; then it is to be called again. */
 static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 {
     struct spl_frame_job *job = &steps->job;
@@ -116,15 +124,18 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
         rc = make_images(&steps->frame, view, err);
     if (!rc && steps->wanted.supersample < 1)
         rc = make_images(&steps->enlarged, &steps->wanted, err);
+    steps->prepared = !rc;
     return rc;
 }
 
-int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                    struct spl_frame_steps **out, struct spl_error *err)
+static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                 bool alone, struct spl_frame_steps **out, struct spl_error *err)
 {
-    uint64_t clock = spl_now_ns(), loaded = renderer->residency.pages_loaded;
+    uint64_t clock = spl_now_ns();
     *out = NULL;
     int rc = spl_view_check(view, err);
+    if (!rc)
+        rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
     bool bare = !spl_dataset_get_info(dataset)->has_surface;
@@ -144,15 +155,21 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     if (view->supersample < 1)
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    steps->job.hold.alone = alone;
     steps->frame.stats.complete = true;
-    if ((rc = prepare(steps, err))) {
+    if ((rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
         return rc;
     }
-    steps->frame.stats.pages_loaded = renderer->residency.pages_loaded - loaded;
     steps->frame.stats.total_ms = spl_since_ms(&clock);
     *out = steps;
     return SPL_OK;
+}
+
+int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                    struct spl_frame_steps **out, struct spl_error *err)
+{
+    return begin(renderer, dataset, view, false, out, err);
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -186,25 +203,42 @@ static void enlarge(struct spl_frame_steps *steps)
     steps->row = end;
 }
 
+/* SPL_SLOT_PENDING: it waits. */
+static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl_error *err)
+{
+    uint64_t clock = spl_now_ns();
+    int rc = spl_residency_upload(&steps->job.renderer->residency, err);
+    if (!rc)
+        rc = spl_hold_poll(&steps->job.hold, err);
+    if (rc >= 0 && clock >= deadline_ns)
+        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered%s",
+                        rc ? ": its pages had not come" : "");
+    if (rc)
+        return rc;
+    spl_hold_release(&steps->job.hold);
+    if (!steps->prepared && (rc = prepare(steps, err)))
+        return rc;
+    if (steps->y < steps->view.camera.height)
+        return make_tile(steps, err);
+    clock = spl_now_ns();
+    enlarge(steps);
+    steps->frame.stats.readback_ms += spl_since_ms(&clock);
+    return SPL_OK;
+}
+
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
-    struct spl_frame_stats *stats = &steps->frame.stats;
-    struct spl_residency *residency = &steps->job.renderer->residency;
-    uint64_t clock = spl_now_ns(), enlarging = clock, loaded = residency->pages_loaded;
-    int rc = SPL_OK;
+    uint64_t clock = spl_now_ns();
     steps->view.deadline_ns = deadline_ns;
-    if (steps->y < steps->view.camera.height) {
-        rc = make_tile(steps, err);
-    } else if (clock >= deadline_ns) {
-        rc = spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
-    } else {
-        enlarge(steps);
-        stats->readback_ms += spl_since_ms(&enlarging);
-    }
-    stats->pages_loaded += residency->pages_loaded - loaded;
-    stats->total_ms += spl_since_ms(&clock);
-    *more = !rc && spl_frame_get_samples_left(steps);
-    return rc;
+    int rc = go_on(steps, deadline_ns, err);
+    steps->frame.stats.total_ms += spl_since_ms(&clock);
+    *more = rc >= 0 && spl_frame_get_samples_left(steps);
+    return rc < 0 ? rc : SPL_OK;
+}
+
+bool spl_frame_is_waiting(struct spl_frame_steps *steps)
+{
+    return spl_hold_poll(&steps->job.hold, NULL) == SPL_SLOT_PENDING;
 }
 
 uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
@@ -228,6 +262,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         *frame = *made;
         *made = (struct spl_frame){0};
     }
+    spl_hold_finish(&steps->job.hold);
     spl_frame_finish(&steps->frame);
     spl_frame_finish(&steps->enlarged);
     free(steps);
@@ -238,9 +273,12 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
 {
     struct spl_frame_steps *steps;
     bool more = true;
-    int rc = spl_frame_begin(renderer, dataset, view, &steps, err);
-    while (!rc && more)
+    int rc = begin(renderer, dataset, view, true, &steps, err);
+    while (!rc && more) {
         rc = spl_frame_step(steps, view->deadline_ns, &more, err);
+        if (!rc && more && spl_frame_is_waiting(steps))
+            spl_renderer_wait(renderer, view->deadline_ns);
+    }
     spl_frame_end(steps, rc ? NULL : frame);
     if (rc)
         memset(frame, 0, sizeof *frame);

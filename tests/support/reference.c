@@ -59,11 +59,11 @@ struct disc {
     const struct spl_splat_code *atoms; /* its own, of `code` */
 };
 
-static bool always(void *context, uint32_t page)
+static enum spl_select_answer always(void *context, uint32_t page)
 {
     (void)context;
     (void)page;
-    return true;
+    return SPL_SELECT_YES;
 }
 
 static void to_view(const struct spl_camera *camera, const float v[3], float out[3])

@@ -11,11 +11,11 @@
 enum { side = 40 };
 
 /* Grants as many nodes as are left. */
-static bool take_one(void *context, uint32_t page)
+static enum spl_select_answer take_one(void *context, uint32_t page)
 {
     int *left = context;
     (void)page;
-    return (*left)-- > 0;
+    return (*left)-- > 0 ? SPL_SELECT_YES : SPL_SELECT_NO;
 }
 
 static void a_spacing_of_stand_ins_is_not_complete(void **state)
