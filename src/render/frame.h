@@ -23,9 +23,9 @@ struct spl_frame_job {
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera);
 
-/* Ends a walk of the job: 0, SPL_SLOT_PENDING where it is to be made again once what it asked for has come, or an error,
- * that of a page among them. */
-int spl_frame_end_walk(struct spl_frame_job *job, struct spl_error *err);
+/* spl_select_spacing() of what `camera` sees. SPL_SLOT_PENDING where it has pages to wait for: it is to be called again. */
+int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *camera, double *spacing,
+                           struct spl_error *err);
 
 /* Renders `tile` into the job's images and adds to its stats. Blocks until it is done; SPL_SLOT_PENDING where it has pages
  * to wait for, and nothing was drawn; SPL_E_TIMEOUT where the view's deadline had passed before. */
