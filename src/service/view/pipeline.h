@@ -120,7 +120,7 @@ const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);
 
 struct spl_pipeline_status {
     struct spl_device_info device; /* of the last renderer that worked; zero before the first */
-    uint64_t device_bytes, device_limit_bytes;
+    uint64_t device_bytes, device_limit_bytes, pages_pending;
     size_t render_length, render_capacity, encode_length, encode_capacity;
     size_t large_length;                                    /* views, from submit() to take() */
     uint64_t large_samples, large_samples_max, large_bytes; /* theirs */
