@@ -5,7 +5,6 @@
 #include "base/clock.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
-#include "render/wires.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -68,8 +67,6 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (job->view->method == SPL_METHOD_FILL && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
-        return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",

@@ -16,8 +16,13 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, uint32_t slot, stru
         if (rc)
             return rc;
         spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
-        if (slot == SPL_KERNEL_FILL_POINTS && (rc = spl_tile_dispatch_lines(tile, 2 * group + pass, err)))
-            return rc;
+        if (slot == SPL_KERNEL_FILL_POINTS) {
+            rc = spl_renderer_get_kernel(r, SPL_KERNEL_FILL_LINES + 2 * group + pass, &kernel, err);
+            if (rc)
+                return rc;
+            spl_tile_dispatch_splats(
+                tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
+        }
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

@@ -9,7 +9,7 @@ static int get_kernels(struct spl_renderer *r, uint32_t slot, struct spl_gpu_ker
 {
     bool any = false;
     for (size_t i = 0; i < r->list.batch_count; i++)
-        any |= r->list.batches[i].apart;
+        any |= r->list.batches[i].key.apart;
     *clipped = NULL;
     int rc = spl_renderer_get_kernel(r, slot, plain, err);
     return rc || !any ? rc : spl_renderer_get_kernel(r, slot + 1, clipped, err);
@@ -49,7 +49,7 @@ static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, str
     const struct spl_draw_list *list = &tile->renderer->list;
     uint64_t seen = 0;
     for (size_t i = 0; i < list->batch_count; i++)
-        seen |= 1ull << (2 * list->batches[i].planes + list->batches[i].smooth);
+        seen |= 1ull << (2 * list->batches[i].key.planes + list->batches[i].key.smooth);
     struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true, .clipped = clipped};
     spl_tile_dispatch_splats(tile, plain, &what);
     int rc = SPL_OK;

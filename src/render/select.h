@@ -24,7 +24,7 @@ struct spl_select_params {
     double lod;                                     /* samples; 0 = leaves in full */
     double low_pass;                                /* samples */
     bool points;                                    /* splats have no extent: chunks are never drawn by windows */
-    bool lines;                                     /* chunks with linear splats are batches of their own */
+    bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
     bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
     bool (*textured)(void *context, uint32_t page); /* may the page's textures be drawn? may load them; may be NULL

@@ -123,7 +123,8 @@ static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bin
     bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
 }
 
-enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
+/* A piece may be as long as the image, so that each has an invocation of its own. */
+enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES, line_entries_per_workgroup = SPL_WORKGROUP / SPL_RUN_SPLATS };
 
 int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
 {
@@ -133,7 +134,8 @@ int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
              summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
         summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
-    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed);
+    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed,
+                                               workgroups * line_entries_per_workgroup);
     if (slots > SPL_PARAMS_SLOTS)
         return too_many(err);
     tile->slots_used = (uint32_t)slots;
@@ -160,16 +162,18 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
+    const uint32_t per_workgroup = what->kind == SPL_CHUNK_LINES ? line_entries_per_workgroup : entries_per_workgroup;
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];
     bind_scratch(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
-            (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
+        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
+            what->kind != batch->key.kind ||
+            (what->by_texture && (what->planes != batch->key.planes || what->smooth != batch->key.smooth)))
             continue;
-        bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->page].buffer;
+        bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->key.page].buffer;
         if (what->planes)
-            bindings[SPL_BIND_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->page)].buffer;
+            bindings[SPL_BIND_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->key.page)].buffer;
         if (what->planes && !what->sum)
             bindings[SPL_BIND_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
         uint32_t slot = batch->first_slot;
@@ -181,8 +185,8 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_BIND_FRAME] = put_params(tile, slot++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
-            spl_gpu_dispatch(tile->renderer->gpu, batch->apart && what->clipped ? what->clipped : kernel, bindings,
-                             (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
+            spl_gpu_dispatch(tile->renderer->gpu, batch->key.apart && what->clipped ? what->clipped : kernel, bindings,
+                             (params.entries + per_workgroup - 1) / per_workgroup);
         }
     }
 }
@@ -194,8 +198,6 @@ int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, co
     struct spl_gpu_binding bindings[SPL_BIND_COUNT];
     bind_scratch(tile, bindings);
     bindings[SPL_BIND_BOUNDS].buffer = tile->renderer->scratch.bounds;
-    if (slot >= SPL_KERNEL_FILL_LINES && slot < SPL_KERNEL_FILL_PULL)
-        bindings[SPL_BIND_LINES].buffer = tile->renderer->scratch.lines;
     int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
     if (!rc)
         rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
@@ -224,16 +226,6 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struc
     int rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
     for (size_t first = first_chunk; first < end && !rc; first += most)
         rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
-    return rc;
-}
-
-int spl_tile_dispatch_lines(struct spl_tile *tile, uint32_t kernel, struct spl_error *err)
-{
-    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
-    size_t end = tile->renderer->list.line_count;
-    int rc = SPL_OK;
-    for (size_t first = 0; first < end && !rc; first += most)
-        rc = dispatch_range(tile, SPL_KERNEL_FILL_LINES + kernel, first, end - first < most ? end - first : most, err);
     return rc;
 }
 

@@ -16,7 +16,6 @@
 #include "render/occupancy.h"
 #include "render/fill.h"
 #include "render/select.h"
-#include "render/wires.h"
 #include "support/reference_fill.h"
 
 struct sample {
@@ -274,14 +273,14 @@ static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
     put(s, place, d->p[2], d, low_bits);
 }
 
-/* From the disc's centre, a sample a column or, where the line is upright, a row. */
-static void line(struct scene *s, const struct disc *d, const float to[3])
+/* From one vertex to the other, a sample a column or, where the line is upright, a row; `middle` as in fill_lines.comp. */
+static void line(struct scene *s, const struct disc ends[2], const float from[3], const float to[3], float middle)
 {
     float a[2], b[2];
-    project(s, d->p, a);
+    project(s, from, a);
     project(s, to, b);
     int main_axis = fabsf(b[1] - a[1]) > fabsf(b[0] - a[0]), other = 1 - main_axis;
-    float inverse = 1 / (b[main_axis] - a[main_axis]), w0 = 1 / d->p[2], w1 = 1 / to[2];
+    float inverse = 1 / (b[main_axis] - a[main_axis]), w0 = 1 / from[2], w1 = 1 / to[2];
     int size = (int)(main_axis ? s->camera.height : s->camera.width);
     for (int k = 0; k < size; k++) {
         float t = ((float)k + 0.5f - a[main_axis]) * inverse, place[2];
@@ -289,8 +288,29 @@ static void line(struct scene *s, const struct disc *d, const float to[3])
             continue;
         place[main_axis] = (float)k;
         place[other] = a[other] + t * (b[other] - a[other]);
-        put(s, place, 1 / (w0 + t * (w1 - w0)), d, SPL_FILL_LINEAR);
+        float z = 1 / (w0 + t * (w1 - w0));
+        put(s, place, z, &ends[!(t * w1 * z < middle)], SPL_FILL_LINEAR);
     }
+}
+
+/* A piece, without what lies beyond the planes near and far. */
+static void piece(struct scene *s, const struct disc ends[2])
+{
+    const float *p = ends[0].p, *q = ends[1].p, near = (float)s->camera.near, far = (float)s->camera.far;
+    float from[3], to[3], skip = 0, rest = 0;
+    if (fmaxf(p[2], q[2]) <= near || fminf(p[2], q[2]) >= far)
+        return;
+    if (p[2] < near || p[2] > far)
+        skip = (fminf(fmaxf(p[2], near), far) - p[2]) / (q[2] - p[2]);
+    if (q[2] < near || q[2] > far)
+        rest = (fminf(fmaxf(q[2], near), far) - q[2]) / (p[2] - q[2]);
+    for (int c = 0; c < 3; c++) {
+        from[c] = p[c] + skip * (q[c] - p[c]);
+        to[c] = q[c] + rest * (p[c] - q[c]);
+    }
+    from[2] = fminf(fmaxf(p[2], near), far);
+    to[2] = fminf(fmaxf(q[2], near), far);
+    line(s, ends, from, to, (0.5f - skip) / (1 - skip - rest));
 }
 
 /* The codes of a chunk into s->code. */
@@ -314,16 +334,45 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
     s->coded = chunk;
 }
 
-/* Where wires.c has joined points; what is linear has no spacing. */
-static void lines(struct scene *s)
+static struct disc vertex(const struct scene *s, const struct spl_draw_chunk *draw, const struct spl_chunk *chunk,
+                          const uint32_t *page, uint32_t index, bool *joined)
 {
-    for (size_t i = 0; i < s->list.line_count; i++) {
-        const struct spl_draw_line *l = &s->list.lines[i];
-        struct disc d = {.p = {l->from_x, l->from_y, l->from_z}, .id = l->id};
-        spl_octahedral_decode((float)(l->normal & 0xffff) / 32767 - 1, (float)(l->normal >> 16) / 32767 - 1, d.n);
-        for (int c = 0; c < 3; c++)
-            d.color[c] = l->color >> 8 * c & 255;
-        line(s, &d, (float[3]){l->to_x, l->to_y, l->to_z});
+    struct spl_chunk local = *chunk;
+    struct spl_splat splat;
+    struct disc d = {.id = draw->first_id + index};
+    local.origin[0] = local.origin[1] = local.origin[2] = 0;
+    spl_chunk_decode(&local, page, index, &splat);
+    to_view(&s->camera, splat.position, d.p);
+    to_view(&s->camera, splat.normal, d.n);
+    d.p[0] += draw->origin_x;
+    d.p[1] += draw->origin_y;
+    d.p[2] += draw->origin_z;
+    memcpy(d.color, splat.color, sizeof d.color);
+    *joined = splat.linear;
+    return d;
+}
+
+static void for_each_piece(struct scene *s)
+{
+    uint32_t chunk_count;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(s->dataset, &chunk_count);
+    for (size_t b = 0; b < s->list.batch_count; b++) {
+        const struct spl_draw_batch *batch = &s->list.batches[b];
+        size_t bytes;
+        const uint32_t *page = spl_dataset_get_page(s->dataset, batch->key.page, &bytes);
+        for (uint32_t e = 0; batch->key.kind == SPL_CHUNK_LINES && e < batch->entries * SPL_RUN_SPLATS; e++) {
+            uint32_t entry = s->list.entries[batch->first_entry + e / SPL_RUN_SPLATS];
+            const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_RUN_BITS];
+            const struct spl_chunk *chunk = find_chunk(chunks, chunk_count, draw->first_id);
+            uint32_t index = (entry & 3) * SPL_RUN_SPLATS + e % SPL_RUN_SPLATS;
+            bool joined, ignored;
+            if (index + 1 >= chunk->count)
+                continue;
+            struct disc ends[2] = {vertex(s, draw, chunk, page, index, &joined),
+                                   vertex(s, draw, chunk, page, index + 1, &ignored)};
+            if (joined)
+                piece(s, ends);
+        }
     }
 }
 
@@ -334,8 +383,8 @@ static void for_each_disc(struct scene *s, bool shade)
     for (size_t b = 0; b < s->list.batch_count; b++) {
         const struct spl_draw_batch *batch = &s->list.batches[b];
         size_t bytes;
-        const uint32_t *page = spl_dataset_get_page(s->dataset, batch->page, &bytes);
-        for (uint32_t e = 0; e < batch->entries * SPL_RUN_SPLATS; e++) {
+        const uint32_t *page = spl_dataset_get_page(s->dataset, batch->key.page, &bytes);
+        for (uint32_t e = 0; batch->key.kind == SPL_CHUNK_DISCS && e < batch->entries * SPL_RUN_SPLATS; e++) {
             uint32_t entry = s->list.entries[batch->first_entry + e / SPL_RUN_SPLATS];
             const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_RUN_BITS];
             uint32_t index = (entry & 3) * SPL_RUN_SPLATS + e % SPL_RUN_SPLATS;
@@ -358,7 +407,7 @@ static void for_each_disc(struct scene *s, bool shade)
             d.planes = spl_texture_planes(draw->texture);
             d.smooth = draw->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1;
             if (d.planes) {
-                load_code(s, batch->page, chunk, (uint32_t)(chunk - chunks));
+                load_code(s, batch->key.page, chunk, (uint32_t)(chunk - chunks));
                 d.code = &s->code;
                 d.atoms = &s->code.splat[index];
             }
@@ -543,7 +592,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                        .points = view->method != SPL_METHOD_SPLAT,
                                        .textured = always,
                                        .atoms = spl_view_is_textured(view) ? view->atoms : 0};
-    const struct spl_wires *wires = NULL;
     struct spl_fill_plan plan;
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
@@ -559,8 +607,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     }
     if (!rc)
         rc = spl_select(&params, &s.list, err);
-    if (!rc && view->method == SPL_METHOD_FILL && !(rc = spl_dataset_get_wires(dataset, &wires, err)))
-        rc = spl_wires_draw(wires, &s.camera, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
     if (!rc && !s.samples)
@@ -581,7 +627,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for (size_t i = 0; i < count; i++)
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
-        lines(&s);
+        for_each_piece(&s);
         if (view->method == SPL_METHOD_SPLAT)
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
