@@ -28,12 +28,8 @@ static const struct {
     enum spl_attribute attribute;
     unsigned shifts[3], shift_count, bits;
 } codes[] = {
-    {"position_axis",
-     "position, an axis",
-     SPL_ATTRIBUTE_POSITION,
-     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z},
-     3,
-     5},
+    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION,
+     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
     {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
     {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
     {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
@@ -57,7 +53,7 @@ struct report {
     uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
     uint64_t linear;                          /* points on wires, poles and cables */
     uint64_t clips;                           /* splats that end at a clip line */
-    uint64_t chunks[SPL_CHUNK_KINDS];
+    uint64_t chunks[SPL_CHUNK_KINDS], items[SPL_CHUNK_KINDS], bytes[SPL_CHUNK_KINDS];
 };
 
 static void usage(FILE *out)
@@ -116,17 +112,19 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
     for (uint32_t i = 0; i < report->level_count; i++)
         report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
     for (uint32_t c = 0; c < chunk_count; c++) {
+        uint32_t kind = spl_chunk_kind(&chunks[c]);
         report->clips += spl_clip_count(&chunks[c]);
-        report->chunks[spl_chunk_kind(&chunks[c])]++;
-    }
-    for (uint32_t c = 0; c < chunk_count; c++)
-        for (int k = 0; k < code_count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS; k++)
+        report->chunks[kind]++;
+        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
+        report->bytes[kind] += sizeof *chunks + 4ull * spl_chunk_words(&chunks[c]);
+        for (int k = 0; k < code_count && kind == SPL_CHUNK_DISCS; k++)
             for (unsigned s = 0; s < codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
                 width &= (1u << codes[k].bits) - 1;
                 report->widths[k][width] +=
                     (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
             }
+    }
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }
@@ -220,7 +218,7 @@ static void print_table(const struct report *report)
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
     printf("  lines         %s pieces between them, %.1f kB\n", grouped(info->pieces, a),
-           (double)info->attribute_bits[SPL_ATTRIBUTE_LINES] / 8e3);
+           (double)report->bytes[SPL_CHUNK_LINES] / 1e3);
     printf("  clip lines    %s splats (%.2f %%)\n", grouped(report->clips, a),
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
@@ -251,9 +249,8 @@ static void print_table(const struct report *report)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
     }
-    if (!info->atoms)
-        return;
-    print_atoms(report);
+    if (info->atoms)
+        print_atoms(report);
 }
 
 static json_t *vector(const double v[3])
@@ -274,23 +271,15 @@ static json_t *textures_to_json(const struct report *report)
                      "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
 }
 
-/* What the chunks of each kind hold, and the bytes of it with their headers. */
+/* Bytes with the chunks' headers. */
 static json_t *kinds_to_json(const struct report *report)
 {
-    const struct spl_dataset_info *info = report->info;
-    uint64_t bits[SPL_CHUNK_KINDS] = {[SPL_CHUNK_LINES] = info->attribute_bits[SPL_ATTRIBUTE_LINES]};
     json_t *kinds = json_object();
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
-        if (a != SPL_ATTRIBUTE_LINES && a != SPL_ATTRIBUTE_TEXTURE && a != SPL_ATTRIBUTE_DICTIONARY)
-            bits[SPL_CHUNK_DISCS] += info->attribute_bits[a];
-    bits[SPL_CHUNK_DISCS] -= 8ull * info->nodes * sizeof(struct spl_node);
     for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
-        json_object_set_new(
-            kinds, spl_chunk_get_codec(kind)->name,
-            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
-                      kind == SPL_CHUNK_LINES ? "pieces" : "splats",
-                      (json_int_t)(kind == SPL_CHUNK_LINES ? info->pieces : info->splats), "bytes",
-                      (json_int_t)(bits[kind] / 8)));
+        json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
+                            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
+                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
+                                      "bytes", (json_int_t)report->bytes[kind]));
     return kinds;
 }
 
@@ -331,9 +320,9 @@ static json_t *to_json(const struct report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds", kinds_to_json(report),
-        "bytes_per_splat", bytes,
-        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
+        kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
+        textures_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"));
 }

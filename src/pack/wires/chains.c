@@ -21,13 +21,14 @@ struct gathered {
     size_t count;
 };
 
-/* Points that lie close together in Morton order, as those of a chunk do: one whose radius is several times the least
- * of them strays, and reaches no farther than the kernels let it. */
+/* Points that lie close together in Morton order: one whose radius is several times the least of the linear ones among
+ * them strays, and reaches no farther than the kernels would let it. Of all of them would be less: ground beside a
+ * pylon's foot is scanned more densely than what hangs from its head. */
 static void gather_run(struct gathered *g, const struct spl_points *p, size_t begin, size_t end)
 {
     float least = INFINITY;
     for (size_t i = begin; i < end; i++)
-        least = fminf(least, p->radius[i]);
+        least = p->linear[i] ? fminf(least, p->radius[i]) : least;
     for (size_t i = begin; i < end; i++) {
         if (!p->linear[i])
             continue;

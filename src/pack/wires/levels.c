@@ -143,7 +143,7 @@ static void add_lines(const struct spl_wires *w, size_t pieces, double spacing, 
         const struct spl_wire_vertex *v = &w->vertices[out->pieces[i]];
         for (end = i + 1; end < pieces && out->pieces[end] == out->pieces[end - 1] + 1;)
             end++;
-        if (spacing > 0 && v->length < 2 * coarse)
+        if (spacing > 0 && v->length < SPL_WIRES_SHORTEST * coarse)
             continue;
         if (spacing > 0) {
             add_simplified(out, v, end - i + 1, spacing, SPL_WIRES_ERROR * coarse);

@@ -355,9 +355,9 @@ static void a_node_has_so_many_vertices_at_most(void **state)
     assert_int_equal(lines.count, wires);
     assert_true(spl_wires_get_node(&c.wires, 0, count / 2, 0.2, &lines));
     assert_int_equal(lines.count, wires);
-    assert_true(spl_wires_get_node(&c.wires, 0, count / 2, 0.6, &lines));
+    assert_true(spl_wires_get_node(&c.wires, 0, count / 2, 1.5 / SPL_WIRES_SHORTEST, &lines));
     assert_int_equal(lines.count, wires / 2);
-    assert_true(spl_wires_get_node(&c.wires, 0, count, 1.1, &lines));
+    assert_true(spl_wires_get_node(&c.wires, 0, count, 2.1 / SPL_WIRES_SHORTEST, &lines));
     assert_int_equal(lines.count, 0);
     spl_node_lines_finish(&lines);
     free_cloud(&c);
