@@ -337,7 +337,7 @@ static void a_host_is_an_address_or_a_name_that_is_listed(void **state)
 {
     (void)state;
     char *items[] = {"Scans.example.", "[2001:db8::1]", "*", "not a name"};
-    const struct spl_text_list none = {0}, some = {items, 2}, any = {items, 4};
+    const struct spl_text_list none = {0}, some = {.items = items, .count = 2}, any = {.items = items, .count = 4};
     static const char *const bad[] = {"", ":80", ".", "..", "a..", "[", "[]", "[::1", "[::1]x", "[::1]:x", "[a]", "::1",
                                       "a b", "a/b", "a@b", "a:1:2", "a:80x", "a,b", "\xc3\xa4.example", "a%2e", "a#b"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
