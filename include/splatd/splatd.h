@@ -8,6 +8,5 @@
 #include <splatd/image.h>
 #include <splatd/pack.h>
 #include <splatd/render.h>
-#include <splatd/synth.h>
 
 #endif

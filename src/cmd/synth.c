@@ -7,13 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <splatd/synth.h>
-
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "synth/exact.h"
 #include "synth/pictures.h"
+#include "synth/synth.h"
 
 static void usage(FILE *out)
 {

@@ -15,10 +15,10 @@
 
 #include <splatd/pack.h>
 #include <splatd/render.h>
-#include <splatd/synth.h>
 
 #include "picture.h"
 #include "support/make_textures.h"
+#include "synth/synth.h"
 #include "views.h"
 
 enum { SKIPPED = 77, REPEATS = 100, POINTS = 60000, SEED = 1 };

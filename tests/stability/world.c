@@ -8,10 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <splatd/synth.h>
-
 #include "support/make_dataset.h"
 #include "synth/exact.h"
+#include "synth/synth.h"
 
 enum { TRUTH_SAMPLES = 4 };
 

@@ -13,13 +13,12 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include <splatd/synth.h>
-
 #include "base/memory.h"
 #include "image/load.h"
 #include "synth/exact.h"
 #include "synth/photos.h"
 #include "synth/pictures.h"
+#include "synth/synth.h"
 #include "synth/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))
