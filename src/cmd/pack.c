@@ -255,8 +255,10 @@ int spl_cmd_pack(int argc, char **argv)
         {0},
     };
     struct spl_cmd_progress progress = {0};
-    struct spl_pack_options o = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress};
-    struct spl_photo_options photos = {.textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
+    struct spl_pack_options o = {
+        .size = sizeof o, .progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress};
+    struct spl_photo_options photos = {
+        .size = sizeof photos, .textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
     uint64_t number = 0;

@@ -19,6 +19,7 @@
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "base/sized.h"
 #include "dataset/open.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
@@ -74,6 +75,15 @@ static int map_file(struct spl_dataset *dataset, struct spl_error *err)
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
     return spl_dataset_open_until(path, verify, NULL, out, err);
+}
+
+int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
+                          struct spl_error *err)
+{
+    struct spl_open_options known = {0};
+    *out = NULL;
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    return rc ? rc : spl_dataset_open_until(path, known.verify, spl_cancel_get_flag(known.cancel), out, err);
 }
 
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,

@@ -24,7 +24,9 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 static bool ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
-    int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, &why);
+    int rc = spl_is_cancelled(job->cancelled)
+                 ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
+                 : spl_residency_ask(&job->renderer->residency, job->resident, slot, &why);
     if (rc && rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
         spl_fail(&job->page_error, rc, "%s", why.message);
     return rc == SPL_OK;

@@ -4,6 +4,7 @@
 #define SPL_RENDER_FRAME_H
 
 #include "base/clock.h"
+#include "base/work.h"
 #include "render/renderer.h"
 #include "render/tiling.h"
 #include "render/wires.h"
@@ -15,8 +16,15 @@ struct spl_frame_job {
     struct spl_frame *frame;
     struct spl_tiling tiling;
     const struct spl_wires *wires; /* method fill */
+    const atomic_bool *cancelled;  // may be NULL
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
 };
+
+/* spl_frame_begin() with options: the caller's images are written by the steps and are not among those that
+ * spl_frame_end() hands out. The images' and the flag's memory is borrowed until the end. */
+int spl_frame_begin_with(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                         const struct spl_render_options *options, struct spl_frame_steps **out,
+                         struct spl_error *err);
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera);

@@ -2,11 +2,17 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/sized.h"
+#include "render/fault.h"
 #include "render/renderer.h"
 
-int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
+int spl_renderer_create(const struct spl_renderer_options *given, struct spl_renderer **out, struct spl_error *err)
 {
+    struct spl_renderer_options known = {0}, *options = &known;
     *out = NULL;
+    int rc = spl_sized_read(given, options, sizeof known, "spl_renderer_options", err);
+    if (rc)
+        return rc;
     struct spl_renderer *renderer = spl_alloc(1, sizeof *renderer, err);
     if (!renderer)
         return SPL_E_NOMEM;
@@ -16,7 +22,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
         .debug = options->debug,
         .memory_limit = options->memory_limit,
     };
-    int rc = spl_gpu_open(&gpu, &renderer->gpu, err);
+    rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
         spl_residency_init(&renderer->residency, renderer->gpu);
         uint64_t samples = options->scratch_samples ? options->scratch_samples : SPL_TILE_SAMPLES;

@@ -9,8 +9,11 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/sized.h"
 #include "image/enlarge.h"
+#include "image/rows.h"
 #include "render/frame.h"
+#include "render/pick.h"
 #include "render/readback.h"
 
 /* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
@@ -25,14 +28,64 @@ struct spl_frame_steps {
     struct spl_frame_job job;
     uint32_t x, y; /* corner of the next tile; y = height: all are there */
     uint32_t row;  /* of `enlarged`, the next */
+    uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
 };
+
+/* The frame that is handed out at the end. */
+static struct spl_frame *get_made(struct spl_frame_steps *steps)
+{
+    return steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+}
+
+static int check_image(const struct spl_image *image, const struct spl_view *view, struct spl_error *err)
+{
+    const uint32_t unit = sizeof(uint32_t); /* pixels are stored as words */
+    if ((unsigned)image->layer >= SPL_LAYER_COUNT || !(view->layers >> image->layer & 1))
+        return spl_fail_field(err, SPL_E_USAGE, "images", "an image is of layer %d, which the view does not have",
+                              (int)image->layer);
+    if (image->type != spl_readback_type(image->layer) || image->width != view->camera.width ||
+        image->height != view->camera.height)
+        return spl_fail_field(err, SPL_E_USAGE, "images", "the image of layer %s has another type or size than the view",
+                              spl_layer_name(image->layer));
+    if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
+        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type))
+        return spl_fail_field(err, SPL_E_USAGE, "images",
+                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, or "
+                              "rows that overlap",
+                              spl_layer_name(image->layer), unit);
+    return SPL_OK;
+}
+
+static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
+                         struct spl_error *err)
+{
+    for (size_t i = 0; i < options->image_count; i++) {
+        const struct spl_image *image = &options->images[i];
+        int rc = check_image(image, &steps->wanted, err);
+        if (rc)
+            return rc;
+        if (steps->borrowed >> image->layer & 1)
+            return spl_fail_field(err, SPL_E_USAGE, "images", "there are two images of layer %s",
+                                  spl_layer_name(image->layer));
+        get_made(steps)->images[image->layer] = *image;
+        steps->borrowed |= 1u << image->layer;
+    }
+    return SPL_OK;
+}
+
+static void give_images_back(struct spl_frame_steps *steps)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (steps->borrowed >> layer & 1)
+            get_made(steps)->images[layer] = (struct spl_image){0};
+}
 
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
 {
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-        if (!(view->layers >> layer & 1))
-            continue;
         struct spl_image *image = &frame->images[layer];
+        if (!(view->layers >> layer & 1) || image->pixels) /* the caller's */
+            continue;
         *image = (struct spl_image){.layer = layer,
                                     .type = spl_readback_type(layer),
                                     .width = view->camera.width,
@@ -101,7 +154,7 @@ static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
     return steps->job.resident ? SPL_OK : spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
 }
 
-static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
+static int prepare(struct spl_frame_steps *steps, const struct spl_render_options *options, struct spl_error *err)
 {
     struct spl_frame_job *job = &steps->job;
     const struct spl_view *view = &steps->view;
@@ -112,6 +165,8 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
         rc = spl_dataset_get_wires(steps->dataset, &job->wires, err);
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
+    if (!rc && options)
+        rc = borrow_images(steps, options, err);
     if (!rc)
         rc = make_images(&steps->frame, view, err);
     if (!rc && steps->wanted.supersample < 1)
@@ -121,6 +176,13 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err)
+{
+    return spl_frame_begin_with(renderer, dataset, view, NULL, out, err);
+}
+
+int spl_frame_begin_with(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                         const struct spl_render_options *options, struct spl_frame_steps **out,
+                         struct spl_error *err)
 {
     uint64_t clock = spl_now_ns(), loaded = renderer->residency.pages_loaded;
     *out = NULL;
@@ -144,8 +206,9 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     if (view->supersample < 1)
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->frame.stats.complete = true;
-    if ((rc = prepare(steps, err))) {
+    if ((rc = prepare(steps, options, err))) {
         spl_frame_end(steps, NULL);
         return rc;
     }
@@ -193,7 +256,9 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     uint64_t clock = spl_now_ns(), enlarging = clock, loaded = residency->pages_loaded;
     int rc = SPL_OK;
     steps->view.deadline_ns = deadline_ns;
-    if (steps->y < steps->view.camera.height) {
+    if (spl_is_cancelled(steps->job.cancelled)) {
+        rc = spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
+    } else if (steps->y < steps->view.camera.height) {
         rc = make_tile(steps, err);
     } else if (clock >= deadline_ns) {
         rc = spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
@@ -222,7 +287,8 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         *frame = (struct spl_frame){0};
     if (!steps)
         return;
-    struct spl_frame *made = steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+    struct spl_frame *made = get_made(steps);
+    give_images_back(steps);
     if (frame && !spl_frame_get_samples_left(steps)) {
         steps->enlarged.stats = steps->frame.stats;
         *frame = *made;
@@ -236,13 +302,55 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err)
 {
-    struct spl_frame_steps *steps;
+    const struct spl_render_options none = {.size = sizeof none};
+    return spl_renderer_render_with(renderer, dataset, view, &none, frame, err);
+}
+
+int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                             const struct spl_view *view, const struct spl_render_options *options,
+                             struct spl_frame *frame, struct spl_error *err)
+{
+    struct spl_frame_steps *steps = NULL;
+    struct spl_render_options known = {0};
     bool more = true;
-    int rc = spl_frame_begin(renderer, dataset, view, &steps, err);
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_render_options", err);
+    if (!rc)
+        rc = spl_frame_begin_with(renderer, dataset, view, &known, &steps, err);
+    if (!rc && !frame && steps->borrowed != view->layers)
+        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
+                            view->layers & ~steps->borrowed);
     while (!rc && more)
         rc = spl_frame_step(steps, view->deadline_ns, &more, err);
     spl_frame_end(steps, rc ? NULL : frame);
-    if (rc)
+    if (rc && frame)
         memset(frame, 0, sizeof *frame);
+    return rc;
+}
+
+int spl_renderer_pick(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                      double x, double y, struct spl_pick *pick, struct spl_error *err)
+{
+    struct spl_frame frame;
+    struct spl_view pixel;
+    struct spl_error why = {0};
+    *pick = (struct spl_pick){0};
+    int rc = spl_view_check(view, err);
+    if (rc)
+        return rc;
+    if (!(x >= 0 && x <= view->camera.width))
+        return spl_fail_field(err, SPL_E_USAGE, "x", "x %g is outside the image, 0 to %u", x, view->camera.width);
+    if (!(y >= 0 && y <= view->camera.height))
+        return spl_fail_field(err, SPL_E_USAGE, "y", "y %g is outside the image, 0 to %u", y, view->camera.height);
+    spl_pick_view(view, x, y, &pixel);
+    rc = spl_renderer_render(renderer, dataset, &pixel, &frame, &why);
+    if (rc == SPL_E_INPUT) { // bare points have no normals where nothing makes them
+        pixel.layers &= ~(1u << SPL_LAYER_NORMAL);
+        rc = spl_renderer_render(renderer, dataset, &pixel, &frame, err);
+    } else if (rc) {
+        spl_fail_field(err, rc, why.field, "%s", why.message);
+    }
+    if (!rc)
+        spl_pick_read(&view->camera, x, y, &frame, dataset, pick);
+    spl_frame_finish(&frame);
     return rc;
 }

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/exit.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/listen.h"
@@ -77,7 +78,7 @@ static void end_now(int number)
 
 static void end_in(const struct spl_service *service, unsigned seconds)
 {
-    end_code = service->failure.code ? spl_code_get_info(service->failure.code)->exit_code : 0;
+    end_code = spl_exit_code(service->failure.code);
     if (seconds)
         signal(SIGALRM, end_now);
     alarm(seconds);
@@ -231,9 +232,9 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
         if (service->catalog.slots[i].current)
             entries[count++] = service->catalog.slots[i].current;
     struct spl_pipeline_options options = {
-        .renderer = {.device = service->options->device,
-                     .require_gpu = service->options->require_gpu,
-                     .memory_limit = service->options->memory_limit},
+        .renderer = SPL_SIZED(spl_renderer_options, .device = service->options->device,
+                              .require_gpu = service->options->require_gpu,
+                              .memory_limit = service->options->memory_limit),
         .entries = entries,
         .entry_count = count,
         .queue = service->options->queue,

@@ -34,6 +34,7 @@ static void pack(struct world *world, const char *folder, const char *scan, cons
     char packed[512];
     snprintf(packed, sizeof packed, "%s/world.spld", folder);
     const struct spl_pack_options options = {
+        .size = sizeof options,
         .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos};
     must(spl_pack(&options, NULL, &err), world->name, &err);
     must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);

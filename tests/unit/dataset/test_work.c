@@ -104,6 +104,15 @@ static void whoever_nobody_waits_for_gives_up(void **state)
         assert_int_equal(spl_dataset_get_wires(dataset, &wires, NULL), SPL_OK);
         spl_dataset_close(dataset);
     }
+    struct spl_cancel cancel = {0};
+    struct spl_open_options options;
+    spl_open_options_init(&options);
+    options.cancel = &cancel;
+    spl_cancel_set(&cancel);
+    assert_int_equal(spl_dataset_open_with(path, &options, &dataset, NULL), SPL_E_CANCELLED);
+    spl_cancel_clear(&cancel);
+    assert_int_equal(spl_dataset_open_with(path, &options, &dataset, NULL), SPL_OK);
+    spl_dataset_close(dataset);
     struct spl_wire_point points[2] = {{.spacing = 1}, {.position = {1}, .spacing = 1}};
     atomic_store(&cancelled, true);
     assert_int_equal(spl_wires_join(points, 2, &(struct spl_work){1000, &cancelled}, NULL), SPL_E_CANCELLED);
