@@ -83,7 +83,7 @@ sanitiser_runs() {
 deploy/install-packages.sh build run quickstart test
 
 if build normal gcc $strict; then
-    suites normal rules unit gpu golden fuzz http deploy e2e fault stability
+    suites normal rules unit gpu golden fuzz library http deploy e2e fault stability
 fi
 if [ "$mode" = --quick ]; then
     finish
