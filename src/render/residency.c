@@ -119,13 +119,11 @@ int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buff
  * loads its word, and a forged mask may use it. */
 static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t slot)
 {
-    size_t bytes;
     if (slot >= spl_dictionary_slot(resident))
         return spl_dataset_get_info(resident->dataset)->dictionary_bytes;
     if (slot >= resident->page_count)
         return spl_dataset_get_texture_bytes(resident->dataset, slot - resident->page_count);
-    spl_dataset_get_page(resident->dataset, slot, &bytes);
-    return bytes + 4;
+    return spl_dataset_get_page_bytes(resident->dataset, slot) + 4;
 }
 
 static int read_slot(const struct spl_resident_dataset *resident, uint32_t slot, void *out, struct spl_error *err)
