@@ -46,7 +46,19 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     struct spl_open_options known = {0};
     *out = NULL;
     int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
-    return rc ? rc : spl_dataset_open_until(path, known.verify, spl_cancel_get_flag(known.cancel), out, err);
+    if (rc)
+        return rc;
+    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    if (!known.reader)
+        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+    struct spl_reader reader = {0};
+    if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
+        return rc;
+    if (!reader.read)
+        return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
+    const struct spl_dataset_source source = {
+        .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
+    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
 }
 
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
