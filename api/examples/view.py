@@ -26,10 +26,9 @@ class Camera(c.Structure):  # struct spl_camera
                 ("width", u32), ("height", u32), ("near", real), ("far", real)]
 
 
-class View(c.Structure):  # struct spl_view
-    _fields_ = [("camera", Camera), ("method", c.c_int), ("layers", u32), ("lod", real), ("supersample", real),
-                ("background", c.c_uint8 * 4), ("atoms", u32), ("visibility", c.c_int), ("kernel", real),
-                ("threshold", real), ("pyramid", u32), ("margin", real), ("deadline_ns", u64)]
+class View(c.Structure):  # struct spl_view, up to what is set here
+    _fields_ = [("size", c.c_size_t), ("camera", Camera), ("method", c.c_int), ("layers", u32), ("lod", real),
+                ("supersample", real), ("background", c.c_uint8 * 4)]
 
 
 class Image(c.Structure):  # struct spl_image
@@ -78,7 +77,7 @@ def load():
         "spl_renderer_render_with": [c.c_void_p, c.c_void_p, c.POINTER(View), c.POINTER(RenderOptions), c.c_void_p,
                                      c.POINTER(Error)],
         "spl_renderer_pick": [c.c_void_p, c.c_void_p, c.POINTER(View), real, real, c.POINTER(Pick), c.POINTER(Error)],
-        "spl_view_init": [c.POINTER(View)],
+        "spl_view_init_sized": [c.POINTER(View), c.c_size_t],
     }.items():
         getattr(lib, name).argtypes = arguments
     return lib
@@ -125,7 +124,7 @@ def write_ppm(path, pixels, width, height):
 
 def show(dataset, renderer, out):
     view = View()
-    LIB.spl_view_init(c.byref(view))
+    LIB.spl_view_init_sized(c.byref(view), c.sizeof(view))  # a view has defaults that are not zero
     view.layers = 1 << COLOR | 1 << DEPTH
     call("spl_dataset_get_default_camera", dataset, 640, 360, c.byref(view.camera))
     width, height = view.camera.width, view.camera.height

@@ -9,6 +9,7 @@
 #include <splatd/error.h>
 #include <splatd/image.h>
 #include <splatd/log.h>
+#include <splatd/method.h>
 #include <splatd/pack.h>
 #include <splatd/render.h>
 

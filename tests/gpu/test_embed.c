@@ -215,6 +215,37 @@ static void picks_agree_with_the_image(void **state)
     spl_frame_finish(&frame);
 }
 
+/* What an older or another language's program has of a view: the rest has its defaults. */
+static void a_view_may_end_early(void **state)
+{
+    (void)state;
+    struct spl_view view = looking(1);
+    struct {
+        struct spl_view view;
+        char after[16];
+    } early;
+    struct spl_frame whole, frame;
+    memset(&early, 0x77, sizeof early);
+    const size_t size = offsetof(struct spl_view, disc);
+    spl_view_init_sized(&early.view, size);
+    for (size_t i = size; i < sizeof early; i++)
+        assert_int_equal(((const uint8_t *)&early)[i], 0x77);
+    assert_int_equal(early.view.size, size);
+    early.view.camera = view.camera;
+    early.view.layers = view.layers;
+    assert_int_equal(spl_view_check(&early.view, NULL), SPL_OK);
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &whole, NULL), SPL_OK);
+    assert_int_equal(spl_renderer_render(renderer, dataset, &early.view, &frame, NULL), SPL_OK);
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        assert_memory_equal(frame.images[layer].pixels, whole.images[layer].pixels,
+                            (size_t)width * height * spl_pixel_bytes(whole.images[layer].type));
+    spl_frame_finish(&whole);
+    spl_frame_finish(&frame);
+    view.size = 0;
+    assert_int_equal(spl_view_check(&view, NULL), SPL_E_USAGE);
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_E_USAGE);
+}
+
 int main(int argc, char **argv)
 {
     device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
@@ -234,6 +265,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(images_that_do_not_fit_are_refused),
         cmocka_unit_test(a_cancelled_frame_is_not_made),
         cmocka_unit_test(picks_agree_with_the_image),
+        cmocka_unit_test(a_view_may_end_early),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     spl_renderer_destroy(renderer);
