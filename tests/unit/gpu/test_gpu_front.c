@@ -286,20 +286,6 @@ static void injected_and_real_losses_stick(void **state)
     }
 }
 
-/* Work that does not end shows itself while the next list is recorded: that one is not submitted any more. */
-static void a_loss_while_recording_keeps_the_list_back(void **state)
-{
-    (void)state;
-    struct spl_gpu gpu = make();
-    uint64_t first = submit(&gpu), ticket = 7;
-    assert_int_equal(spl_gpu_begin(&gpu, NULL), 0);
-    assert_int_equal(spl_gpu_wait(&gpu, first, 0, NULL), SPL_E_TIMEOUT);
-    assert_int_equal(spl_gpu_submit(&gpu, &ticket, NULL), SPL_E_DEVICE_LOST);
-    assert_int_equal(ticket, 7);
-    fake.ended = 1;
-    spl_gpu_close(&gpu);
-}
-
 static void selftest_names_the_wrong_word(void **state)
 {
     (void)state;
@@ -466,7 +452,6 @@ int main(void)
         cmocka_unit_test(past_deadline_is_no_loss_once_it_ended),
         cmocka_unit_test(work_without_end_keeps_its_memory),
         cmocka_unit_test(injected_and_real_losses_stick),
-        cmocka_unit_test(a_loss_while_recording_keeps_the_list_back),
         cmocka_unit_test(selftest_names_the_wrong_word),
         cmocka_unit_test(kernels_bind_what_they_declare),
         cmocka_unit_test(every_kernel_is_as_declared),
