@@ -4,8 +4,8 @@
  * compiled with. The library reads no further than that, and what a smaller struct lacks has its default, so members
  * are added at the end. Zero is the default of every member, but where spl_X_init() says otherwise. A size of 0 is
  * SPL_E_USAGE; a larger struct than the library knows is read as far as it knows, if the rest is zero, else
- * SPL_E_UNSUPPORTED. Structs that the library lends may grow at their end; all others stay what they are for as long as
- * the soname does. */
+ * SPL_E_UNSUPPORTED. Structs that the library lends may grow at their end; all others, those inside another among them,
+ * stay what they are for as long as the soname does. */
 #ifndef SPLATD_API_H
 #define SPLATD_API_H
 

@@ -48,7 +48,7 @@ SPL_API void spl_view_set_param(struct spl_view *view, enum spl_method_param par
 /* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is the
  * pixels, which are enlarged, encoded and sent all the same. */
 SPL_API uint64_t spl_view_get_samples(const struct spl_view *view);
-/* what the images of its layers take in memory */
+/* What the images of its layers take in memory. */
 SPL_API uint64_t spl_view_get_frame_bytes(const struct spl_view *view);
 
 /* Checks ranges; the field at fault is named as in the HTTP interface. */
@@ -104,7 +104,7 @@ static inline void spl_renderer_options_init(struct spl_renderer_options *option
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
 SPL_API int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out,
                                 struct spl_error *err);
-/* NULL-safe; datasets that were not removed are let go */
+/* NULL-safe; datasets that were not removed are let go. */
 SPL_API void spl_renderer_destroy(struct spl_renderer *renderer);
 SPL_API const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
 
