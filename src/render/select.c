@@ -109,7 +109,7 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
     double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
     if (!texture || samples < least)
         return 0;
-    if (!params->textured(params->context, page)) {
+    if (params->textured(params->context, page) != SPL_SELECT_YES) {
         w->list->complete = false;
         return 0;
     }
@@ -219,12 +219,15 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint32_t 
 {
     uint32_t order[8], count = 0;
     double depths[8];
+    bool all = true;
     for (uint32_t child = node->first_child; child < node->first_child + node->child_count; child++) {
         struct spl_view_box box = node_box(w, &w->nodes[child]);
         if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
             continue;
-        if (!w->params->resident(w->params->context, w->nodes[child].page))
+        enum spl_select_answer answer = w->params->resident(w->params->context, w->nodes[child].page);
+        if (answer == SPL_SELECT_NO)
             return false;
+        all &= answer == SPL_SELECT_YES;
         uint32_t at = count++;
         for (; at > 0 && depths[at - 1] < box.center[2]; at--) {
             depths[at] = depths[at - 1];
@@ -233,6 +236,8 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint32_t 
         depths[at] = box.center[2];
         order[at] = child;
     }
+    if (!all)
+        return false;
     memcpy(stack + *depth, order, count * sizeof *order);
     *depth += count;
     return true;
@@ -243,7 +248,7 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     const struct spl_camera *camera = w->params->camera;
     uint32_t stack[stack_max];
     size_t depth = 0;
-    if (!w->params->resident(w->params->context, w->nodes[0].page))
+    if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
         return spl_fail(err, SPL_E_LIMIT, "not even the coarsest level fits the device memory limit");
     stack[depth++] = 0;
     while (depth > 0) {
