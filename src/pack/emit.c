@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/chunks.h"
@@ -185,14 +186,8 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     }
     if (out->splats > UINT32_MAX - 1)
         return spl_fail(err, SPL_E_LIMIT, "more than %u splats; pack the scans as several datasets", UINT32_MAX - 1);
-    if (out->chunk_count + encoded->chunk_count > *chunk_capacity) {
-        size_t wanted = *chunk_capacity * 2 + encoded->chunk_count;
-        void *bigger = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
-        if (!bigger)
-            return SPL_E_NOMEM;
-        out->chunks = bigger;
-        *chunk_capacity = wanted;
-    }
+    if (spl_array_reserve(out->chunks, *chunk_capacity, out->chunk_count + encoded->chunk_count, err))
+        return SPL_E_NOMEM;
     int rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
                                          encoded->chunk_count, &node->page, err);
     if (rc)
