@@ -7,7 +7,6 @@
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/slot.h"
-#include "render/wires.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -102,8 +101,6 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
         return waits;
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (method->lines && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
-        return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!tile->params.weight_max && method->sums)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",

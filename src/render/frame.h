@@ -7,7 +7,6 @@
 #include "render/hold.h"
 #include "render/renderer.h"
 #include "render/tiling.h"
-#include "render/wires.h"
 
 struct spl_frame_job {
     struct spl_renderer *renderer;
@@ -15,7 +14,6 @@ struct spl_frame_job {
     const struct spl_view *view;           /* at least one sample a pixel */
     struct spl_frame *frame;
     struct spl_tiling tiling;
-    const struct spl_wires *wires; /* method fill */
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
 };

@@ -28,7 +28,7 @@ struct spl_select_params {
     double lod;                                     /* samples; 0 = leaves in full */
     double low_pass;                                /* samples */
     bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
-    bool lines;                                     /* chunks with linear splats are batches of their own */
+    bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
     enum spl_select_answer (*resident)(void *context, uint32_t page); /* may the page be drawn? may ask for it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
     enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them; may

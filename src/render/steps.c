@@ -72,8 +72,6 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
-    if (!rc && method->lines)
-        rc = spl_dataset_get_wires(steps->dataset, &job->wires, err);
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
     if (!rc)
