@@ -16,7 +16,7 @@ enum spl_layer {
     SPL_LAYER_DEPTH,    /* F32, linear depth along the viewing axis, dataset's unit; NaN = nothing there */
     SPL_LAYER_RANGE,    /* F32, length of the ray to the surface; NaN = nothing */
     SPL_LAYER_NORMAL,   /* F32X3, unit, world axes; (0,0,0) = nothing */
-    SPL_LAYER_ID,       /* U32, index of the nearest splat in the dataset; UINT32_MAX = nothing */
+    SPL_LAYER_ID,       /* U32, index of the nearest splat or vertex of a line in the dataset; UINT32_MAX = nothing */
     SPL_LAYER_COVERAGE, /* F32, share of the pixel's samples that hit a surface, 0..1 */
     SPL_LAYER_COUNT
 };
