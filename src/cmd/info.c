@@ -4,6 +4,7 @@
 
 #include <getopt.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +16,7 @@
 #include "cmd/output.h"
 #include "cmd/table.h"
 #include "dataset/chunk_clip.h"
+#include "dataset/codec.h"
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
 
@@ -27,12 +29,8 @@ static const struct {
     enum spl_attribute attribute;
     unsigned shifts[3], shift_count, bits;
 } codes[] = {
-    {"position_axis",
-     "position, an axis",
-     SPL_ATTRIBUTE_POSITION,
-     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z},
-     3,
-     5},
+    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION,
+     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
     {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
     {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
     {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
@@ -48,7 +46,7 @@ struct report {
     const struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
     struct level {
-        uint64_t nodes, chunks, splats;
+        uint64_t nodes, chunks, splats, pieces;
         double spacing;   /* mean over the splats */
     } levels[levels_max]; /* deeper ones are counted with the last */
     uint32_t level_count;
@@ -56,6 +54,7 @@ struct report {
     uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
     uint64_t linear;                          /* points on wires, poles and cables */
     uint64_t clips;                           /* splats that end at a clip line */
+    uint64_t chunks[SPL_CHUNK_KINDS], items[SPL_CHUNK_KINDS], bytes[SPL_CHUNK_KINDS];
 };
 
 struct arguments {
@@ -122,23 +121,29 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
         level->nodes++;
         level->chunks += nodes[n].chunk_count;
         for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
-            uint32_t splats = chunks[nodes[n].first_chunk + c].count;
+            const struct spl_chunk *chunk = &chunks[nodes[n].first_chunk + c];
+            uint32_t splats = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
             level->splats += splats;
+            level->pieces += spl_chunk_count_pieces(chunk);
             level->spacing += (double)nodes[n].spacing * splats;
         }
     }
     for (uint32_t i = 0; i < report->level_count; i++)
-        report->levels[i].spacing /= (double)report->levels[i].splats;
-    for (uint32_t c = 0; c < chunk_count; c++)
+        report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
+    for (uint32_t c = 0; c < chunk_count; c++) {
+        uint32_t kind = spl_chunk_kind(&chunks[c]);
         report->clips += spl_clip_count(&chunks[c]);
-    for (uint32_t c = 0; c < chunk_count; c++)
-        for (int k = 0; k < code_count; k++)
+        report->chunks[kind]++;
+        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
+        report->bytes[kind] += sizeof *chunks + 4ull * spl_chunk_words(&chunks[c]);
+        for (int k = 0; k < code_count && kind == SPL_CHUNK_DISCS; k++)
             for (unsigned s = 0; s < codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
                 width &= (1u << codes[k].bits) - 1;
                 report->widths[k][width] +=
                     (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
             }
+    }
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }
@@ -231,6 +236,8 @@ static void print_table(const struct report *report)
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
+    printf("  lines         %s pieces between them, %.1f kB\n", grouped(info->pieces, a),
+           (double)report->bytes[SPL_CHUNK_LINES] / 1e3);
     printf("  clip lines    %s splats (%.2f %%)\n", grouped(report->clips, a),
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
@@ -242,11 +249,11 @@ static void print_table(const struct report *report)
     printf("  splat radius  %.4g (median)\n", info->splat_radius);
     printf("  pages         %s, %.1f MB resident\n\n", grouped(info->pages, a), (double)info->page_bytes / 1e6);
 
-    printf("  %-6s%12s%14s%16s%12s\n", "level", "nodes", "chunks", "splats", "spacing");
+    printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
         const struct level *l = &report->levels[level];
-        printf("  %-6u%12s%14s%16s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b), grouped(l->splats, d),
-               l->spacing);
+        printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b),
+               grouped(l->splats, c), grouped(l->pieces, d), l->spacing);
     }
     printf("\n  bytes a splat\n");
     for (int attribute = 0; attribute < SPL_ATTRIBUTE_COUNT; attribute++)
@@ -261,9 +268,8 @@ static void print_table(const struct report *report)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
     }
-    if (!info->atoms)
-        return;
-    print_atoms(report);
+    if (info->atoms)
+        print_atoms(report);
 }
 
 static json_t *vector(const double v[3])
@@ -284,6 +290,18 @@ static json_t *textures_to_json(const struct report *report)
                      "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
 }
 
+/* Bytes with the chunks' headers. */
+static json_t *kinds_to_json(const struct report *report)
+{
+    json_t *kinds = json_object();
+    for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
+        json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
+                            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
+                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
+                                      "bytes", (json_int_t)report->bytes[kind]));
+    return kinds;
+}
+
 /* NULL when memory is refused: json_pack passes it on. */
 static json_t *to_json(const struct report *report)
 {
@@ -295,8 +313,9 @@ static json_t *to_json(const struct report *report)
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct level *l = &report->levels[i];
         json_array_append_new(levels,
-                              json_pack("{s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing", l->spacing));
+                              json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
+                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
+                                        (json_int_t)l->pieces, "spacing", l->spacing));
     }
     json_t *widths = json_object();
     for (int k = 0; k < code_count; k++) {
@@ -311,7 +330,7 @@ static json_t *to_json(const struct report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -320,8 +339,9 @@ static json_t *to_json(const struct report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
-        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
+        kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
+        textures_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"));
 }

@@ -90,9 +90,7 @@ int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *can
     if (!dataset->path)
         goto done;
     strcpy(dataset->path, path);
-    rc = spl_late_wires_create(&dataset->wires, err);
-    if (!rc)
-        rc = map_file(dataset, err);
+    rc = map_file(dataset, err);
     if (!rc)
         rc = spl_dataset_read_sections(dataset, verify, err);
     if (!rc)
@@ -122,7 +120,6 @@ void spl_dataset_close(struct spl_dataset *dataset)
     if (dataset->fd >= 0)
         close(dataset->fd);
     json_decref(dataset->meta);
-    spl_late_wires_destroy(dataset->wires);
     free(dataset->meta_text);
     free(dataset->nodes);
     free(dataset->chunks);
@@ -258,8 +255,8 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_NORMAL] = "normal",         [SPL_ATTRIBUTE_COLOR] = "color",
         [SPL_ATTRIBUTE_CLASS] = "class",           [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
         [SPL_ATTRIBUTE_LINEAR] = "linear",         [SPL_ATTRIBUTE_CLIP] = "clip",
-        [SPL_ATTRIBUTE_CHUNK] = "chunk",           [SPL_ATTRIBUTE_TEXTURE] = "texture",
-        [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
+        [SPL_ATTRIBUTE_LINES] = "lines",           [SPL_ATTRIBUTE_CHUNK] = "chunk",
+        [SPL_ATTRIBUTE_TEXTURE] = "texture",       [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return names[attribute];
 }

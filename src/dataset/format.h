@@ -59,17 +59,27 @@ struct spl_node {
 };
 
 /* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number
- * of splats with a clip line 16..23. */
+ * of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31. */
 #define SPL_EXTRA_CLASS 0
 #define SPL_EXTRA_UNCERTAINTY 4
 #define SPL_EXTRA_CLASS_BASE 8
 #define SPL_EXTRA_CLIP 16
+#define SPL_EXTRA_LINES 16
+#define SPL_EXTRA_KIND 24
 #define SPL_UNCERTAINTY_BITS_MAX 5
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
 #define SPL_PAGE_TAIL_WORDS 2
 
-/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream
+/* What a chunk holds; codec.h has a row for each. */
+enum spl_chunk_kind {
+    SPL_CHUNK_DISCS, /* splats */
+    SPL_CHUNK_LINES, /* vertices of wires, poles and cables; pieces go from one to the next */
+    SPL_CHUNK_KINDS
+};
+
+/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order
+ * of their lines, with the same fields but for class, uncertainty and clip lines. Streams of fixed-width codes, each stream
  * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
  * the other from the low bits up. */
 struct spl_chunk {
@@ -84,9 +94,15 @@ struct spl_chunk {
     uint32_t color_base;
     uint32_t extra_bits;   /* SPL_EXTRA_* */
     float uncertainty_max; /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
-    uint32_t first_id;     /* dataset-wide index of its first splat */
+    uint32_t first_id;     /* dataset-wide index of its first splat or vertex */
     uint32_t count;
 };
+
+/* enum spl_chunk_kind, or SPL_CHUNK_KINDS and more in a file that opening refuses. */
+static inline uint32_t spl_chunk_kind(const struct spl_chunk *chunk)
+{
+    return chunk->extra_bits >> SPL_EXTRA_KIND;
+}
 
 /* ATOM: this header, then the stream of atoms.h. */
 struct spl_atoms_header {

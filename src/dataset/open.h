@@ -1,9 +1,8 @@
-/* A mapped dataset from the inside, and the stages of opening one. Only the files that open one, textures.c and
- * wires.c include this. Each stage trusts what the ones before it have checked. */
+/* A mapped dataset from the inside, and the stages of opening one. Only the files that open one, lookup.c and
+ * textures.c include this. Each stage trusts what the ones before it have checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
 
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stddef.h>
 
@@ -12,7 +11,6 @@
 #include "base/error.h"
 #include "base/work.h"
 #include "dataset/dataset.h"
-#include "dataset/wires.h"
 #include "sparse/dictionary.h"
 
 struct spl_dataset {
@@ -38,18 +36,7 @@ struct spl_dataset {
     struct spl_dictionary dictionary;    /* count 0 = no textures */
     uint32_t *chunk_textures;            /* by chunk; NULL = no textures */
     json_t *meta;
-    struct spl_late_wires *wires;
 };
-
-/* Wires are found when they are first asked for. */
-struct spl_late_wires {
-    pthread_mutex_t mutex;
-    bool made;
-    struct spl_wires wires; /* once made for good */
-};
-
-int spl_late_wires_create(struct spl_late_wires **out, struct spl_error *err);
-void spl_late_wires_destroy(struct spl_late_wires *late);
 
 /* Reads bytes of the file; SPL_E_CORRUPT when it has become shorter. Any thread. */
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,

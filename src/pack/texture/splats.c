@@ -8,7 +8,7 @@
 
 int spl_splats_init(struct spl_splats *splats, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    *splats = (struct spl_splats){.dataset = dataset, .count = spl_dataset_get_info(dataset)->splats};
+    *splats = (struct spl_splats){.dataset = dataset, .count = spl_dataset_get_info(dataset)->ids};
     splats->nodes = spl_dataset_get_nodes(dataset, &splats->node_count);
     splats->chunks = spl_dataset_get_chunks(dataset, &splats->chunk_count);
     if (splats->count > UINT32_MAX)

@@ -138,7 +138,8 @@ FORGE(wide_class, p->chunks[0].extra_bits |= 15)
 FORGE(many_lines, p->chunks[0].extra_bits |= 255u << SPL_EXTRA_CLIP)
 FORGE(lines_past_page,
       p->chunks[p->chunk_count - 1].extra_bits |= p->chunks[p->chunk_count - 1].count << SPL_EXTRA_CLIP)
-FORGE(unknown_extra, p->chunks[0].extra_bits |= 1u << 24)
+FORGE(unknown_kind, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_KINDS << SPL_EXTRA_KIND)
+FORGE(discs_as_lines, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND)
 FORGE(uncertainty_nan, p->chunks[0].uncertainty_max = NAN)
 FORGE(past_page, p->chunks[p->chunk_count - 1].geometry_word += 1 + 16)
 FORGE(word_wraps, p->chunks[0].geometry_word = UINT32_MAX)
@@ -213,7 +214,8 @@ static const struct {
     {wide_class, "section CHNK: chunk 0 has classes"},
     {many_lines, "section CHNK: chunk 0 has more clip lines than splats"},
     {lines_past_page, "reaches beyond the end of its page"},
-    {unknown_extra, "section CHNK: chunk 0 has classes or uncertainties"},
+    {unknown_kind, "section CHNK: chunk 0 is of a kind"},
+    {discs_as_lines, "section CHNK: chunk 0 has fields that lines"},
     {uncertainty_nan, "section CHNK: chunk 0 has classes or uncertainties"},
     {past_page, "reaches beyond the end of its page"},
     {word_wraps, "section CHNK: chunk 0 reaches beyond"},
