@@ -1,24 +1,20 @@
-/* Opening a packed dataset: what describes it is read into memory and checked from the outside in (sections.c, meta.c,
- * structure.c) before anyone else sees it. After that nothing changes, so every accessor runs on any thread. What is
- * trusted without a look is only the pages' codes, and any code decodes to finite numbers.
+/* Opening a packed dataset from wherever its bytes come (source.h): what describes it is read into memory and checked
+ * from the outside in (sections.c, meta.c, structure.c, textures.c) before anyone else sees it. After that nothing
+ * changes, so every accessor runs on any thread. What is trusted without a look is only the pages' codes, and any code
+ * decodes to finite numbers.
  *
- * Pages are read from the file when they are wanted, with their checksum, so that a file which is cut or overwritten in
- * place while it is served is an error of that page and never a SIGBUS; only spl_dataset_get_page() looks through a
- * map. */
+ * Pages are read from the source when they are wanted, with their checksum, so that a file which is cut or overwritten
+ * in place while it is served is an error of that page; only spl_dataset_get_page() looks through a map. */
 #include "dataset/dataset.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "base/sized.h"
 #include "dataset/open.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
@@ -26,7 +22,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as i
 /* The id is the file's name without folder and extension; it becomes part of URLs, so it is kept plain. */
 static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const char *slash = strrchr(dataset->path, '/'), *stem = slash ? slash + 1 : dataset->path;
+    const char *slash = strrchr(dataset->name, '/'), *stem = slash ? slash + 1 : dataset->name;
     const char *dot = strrchr(stem, '.');
     size_t length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
     static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
@@ -34,41 +30,9 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
         return spl_fail(err, SPL_E_INPUT,
                         "%s: '%.*s' cannot be a dataset's id; rename the file to at most %zu letters, digits, '.', '_' "
                         "and '-', the first of them not a '.'",
-                        dataset->path, (int)length, stem, sizeof dataset->info.id - 1);
+                        dataset->name, (int)length, stem, sizeof dataset->info.id - 1);
     memcpy(dataset->info.id, stem, length);
     return SPL_OK;
-}
-
-static int map_file(struct spl_dataset *dataset, struct spl_error *err)
-{
-    struct stat status;
-    int fd, rc = SPL_OK;
-    if (!stat(dataset->path, &status) &&
-        !S_ISREG(status.st_mode)) /* opening a device or a FIFO is seen at its other end */
-        return spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
-    fd = open(dataset->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0 && errno == ENOENT)
-        return spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", dataset->path);
-    if (fd < 0)
-        return spl_fail_errno(err, errno, "cannot open %s", dataset->path);
-    if (fstat(fd, &status))
-        rc = spl_fail_errno(err, errno, "cannot examine %s", dataset->path);
-    else if (!S_ISREG(status.st_mode))
-        rc = spl_fail(err, SPL_E_INPUT, "%s is not a regular file", dataset->path);
-    else if (status.st_size == 0)
-        rc = spl_fail(err, SPL_E_INPUT, "%s is empty", dataset->path);
-    if (!rc) {
-        void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, fd, 0);
-        if (map == MAP_FAILED) {
-            rc = spl_fail_errno(err, errno, "cannot map %s", dataset->path);
-        } else {
-            dataset->map = map;
-            dataset->map_bytes = (size_t)status.st_size;
-            dataset->info.file_bytes = dataset->map_bytes;
-        }
-    }
-    dataset->fd = fd;
-    return rc;
 }
 
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
@@ -76,38 +40,65 @@ int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, st
     return spl_dataset_open_until(path, verify, NULL, out, err);
 }
 
+int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
+                          struct spl_error *err)
+{
+    struct spl_open_options known = {0};
+    *out = NULL;
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    if (rc)
+        return rc;
+    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    if (!known.reader)
+        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+    struct spl_reader reader = {0};
+    if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
+        return rc;
+    if (!reader.read)
+        return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
+    const struct spl_dataset_source source = {
+        .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
+    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
+}
+
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err)
+{
+    struct spl_dataset_source source;
+    *out = NULL;
+    int rc = spl_dataset_source_open_file(path, &source, err);
+    if (!rc && (rc = spl_dataset_open_source(&source, path, verify, cancelled, out, err)))
+        spl_dataset_source_close(&source);
+    return rc;
+}
+
+int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
+                            const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
 {
     *out = NULL;
     struct spl_dataset *dataset = spl_alloc(1, sizeof *dataset, err);
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
-    dataset->fd = -1;
     dataset->cancelled = cancelled;
-    dataset->path = spl_alloc_raw(strlen(path) + 1, 1, err);
-    if (!dataset->path)
+    dataset->source = *source;
+    dataset->info.file_bytes = source->size;
+    dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
+    if (!dataset->name)
         goto done;
-    strcpy(dataset->path, path);
-    rc = map_file(dataset, err);
+    strcpy(dataset->name, name);
+    rc = spl_dataset_read_sections(dataset, verify, err);
     if (!rc)
-        rc = spl_dataset_read_sections(dataset, verify, err);
-    if (!rc)
-        rc = spl_dataset_read_dictionary(dataset, err);
-    if (!rc)
-        rc = spl_dataset_read_meta(dataset, err);
-    if (!rc)
-        rc = spl_dataset_check_structure(dataset, err);
-    if (!rc && verify)
-        rc = spl_dataset_check_textures(dataset, err);
+        rc = spl_dataset_check_sections(dataset, err);
     if (!rc)
         rc = set_id(dataset, err);
 done:
-    if (rc)
+    if (rc) {
+        dataset->source = (struct spl_dataset_source){0}; /* stays the caller's */
         spl_dataset_close(dataset);
-    else
+    } else {
         *out = dataset;
+    }
     return rc;
 }
 
@@ -115,23 +106,17 @@ void spl_dataset_close(struct spl_dataset *dataset)
 {
     if (!dataset)
         return;
-    if (dataset->map)
-        munmap((void *)dataset->map, dataset->map_bytes);
-    if (dataset->fd >= 0)
-        close(dataset->fd);
+    spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
-    free(dataset->meta_text);
-    free(dataset->nodes);
-    free(dataset->chunks);
-    free(dataset->textures);
+    for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
+        free(dataset->copies[i]);
+    free(dataset->copies);
+    free(dataset->found_all);
     free(dataset->page_nodes);
     free(dataset->page_first);
-    free(dataset->atoms);
     spl_dictionary_finish(&dataset->dictionary);
-    free(dataset->chunk_textures);
     free(dataset->sections);
-    free(dataset->pages);
-    free(dataset->path);
+    free(dataset->name);
     free(dataset);
 }
 
@@ -160,26 +145,12 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
 /* Errors of pages reach clients, whom the path is no business of. */
 static const char *name_of(const struct spl_dataset *dataset)
 {
-    return dataset->info.id[0] ? dataset->info.id : dataset->path;
+    return dataset->info.id[0] ? dataset->info.id : dataset->name;
 }
 
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
 {
-    for (char *to = out; bytes;) {
-        ssize_t got = pread(dataset->fd, to, bytes, (off_t)offset);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            return spl_fail_errno(err, errno, "cannot read %s", name_of(dataset));
-        if (!got)
-            return spl_fail(err, SPL_E_CORRUPT,
-                            "%s was cut short while in use; put the dataset back under another name and rename it",
-                            name_of(dataset));
-        to += got;
-        offset += (uint64_t)got;
-        bytes -= (size_t)got;
-    }
-    return SPL_OK;
+    return spl_dataset_source_read(&dataset->source, name_of(dataset), offset, out, bytes, err);
 }
 
 int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err)
@@ -226,11 +197,17 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
     return rc;
 }
 
-const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes)
+size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
 {
     spl_assert(index < dataset->info.pages);
-    *bytes = dataset->pages[index]->bytes;
-    return (const uint32_t *)(const void *)(dataset->map + dataset->pages[index]->offset);
+    return dataset->pages[index]->bytes;
+}
+
+const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes)
+{
+    *bytes = spl_dataset_get_page_bytes(dataset, index);
+    spl_assert(dataset->source.map);
+    return (const uint32_t *)(const void *)((const char *)dataset->source.map + dataset->pages[index]->offset);
 }
 
 int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,

@@ -1,4 +1,4 @@
-/* What the renderer sees of a mapped dataset beyond the public header. Everything is borrowed until close. */
+/* What the renderer sees of an open dataset beyond the public header. Everything is borrowed until close. */
 #ifndef SPL_DATASET_DATASET_H
 #define SPL_DATASET_DATASET_H
 
@@ -9,6 +9,7 @@
 #include <jansson.h>
 
 #include "dataset/format.h"
+#include "dataset/source.h"
 #include "sparse/dictionary.h"
 
 /* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL)
@@ -16,12 +17,19 @@
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err);
 
+/* The same from any source, which is `name` in errors and, without folder and extension, the dataset's id. On success
+ * the dataset has taken *source and closes it last; on failure it stays the caller's, open. */
+int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
+                            const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
+
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 
-/* Reads page `index` (< info.pages) to `out`, which has room for the bytes that spl_dataset_get_page() states, and
- * holds it against its checksum where the dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or
+/* Bytes of page `index` (< info.pages). */
+size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index);
+
+/* Reads page `index` (< info.pages) to `out`, which has room for its bytes, and holds it against its checksum where the dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or
  * overwritten in place since. Any thread; blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
@@ -44,8 +52,8 @@ int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogr
  * place. Any thread; blocks on disk. */
 int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear, struct spl_error *err);
 
-/* The bytes of page `index` (< info.pages) in a map of the file, for tools: touching them raises SIGBUS when the file
- * was cut short in place. */
+/* The bytes of page `index` (< info.pages) in the map that files and blocks of memory have, for tools: touching them
+ * raises SIGBUS when the file was cut short in place. */
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
 
 /* Reads and decodes splat `id` of any level, or the vertex of a line that has this id; false (*splat untouched) when

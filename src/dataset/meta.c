@@ -8,7 +8,7 @@
 
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *key, const char *what)
 {
-    return spl_fail_field(err, SPL_E_CORRUPT, key, "%s: section META: \"%s\" %s; pack the dataset again", dataset->path,
+    return spl_fail_field(err, SPL_E_CORRUPT, key, "%s: section META: \"%s\" %s; pack the dataset again", dataset->name,
                           key, what);
 }
 
@@ -128,19 +128,19 @@ static int check_color(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_dataset_read_meta(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
-    const struct spl_section *section = dataset->meta_section;
+    uint64_t bytes;
+    const char *text = spl_dataset_get_copy(dataset, SPL_KIND_META, 0, &bytes);
     json_error_t where;
-    dataset->meta =
-        json_loadb(dataset->meta_text, section->bytes, JSON_REJECT_DUPLICATES, &where);
+    dataset->meta = json_loadb(text, bytes, JSON_REJECT_DUPLICATES, &where);
     if (!dataset->meta)
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object: %s at byte %d; pack the dataset again",
-                        dataset->path, where.text, where.position);
+                        dataset->name, where.text, where.position);
     if (!json_is_object(dataset->meta))
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again",
-                        dataset->path);
+                        dataset->name);
     const json_t *bounds = json_object_get(dataset->meta, "bounds");
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     uint64_t levels = 0;

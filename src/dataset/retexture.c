@@ -23,11 +23,9 @@ struct pass {
 
 static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
 {
-    size_t bytes;
     if (index == p->page_index)
         return SPL_OK;
-    spl_dataset_get_page(p->what->from, index, &bytes);
-    uint32_t *page = spl_realloc(p->page, bytes, 1, err);
+    uint32_t *page = spl_realloc(p->page, spl_dataset_get_page_bytes(p->what->from, index), 1, err);
     if (!page)
         return SPL_E_NOMEM;
     p->page = page;

@@ -1,7 +1,8 @@
-/* Opening, first stage: header, section table, where sections lie, and their checksums. Every size and offset is
- * compared with the file's real length before it is used; sums cannot wrap because each term is bounded by it. The
- * small sections' checksums are always checked, the pages' when asked for, on all cores. What is checked is the copy in
- * memory that is used afterwards; pages are read in passing. The opener's thread. */
+/* Opening, first stage: header, section table, where sections lie, and their checksums; and the table that says of each
+ * kind of section how many there may be, how large they are, whether they are kept in memory and what checks their
+ * content. Every size and offset is compared with the source's real length before it is used; sums cannot wrap because
+ * each term is bounded by it. Checksums of what is kept are always checked, the pages' when asked for, on all cores.
+ * What is checked is the copy in memory that is used afterwards; pages are read in passing. The opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,82 +14,138 @@
 #include "base/parallel.h"
 #include "dataset/open.h"
 
-enum { section_alignment = 64, table_alignment = 8 };
+enum { table_alignment = 8 };
+
+/* A kind of section: a row to add, not code. */
+static const struct kind {
+    uint32_t type;
+    bool by_page;  /* one a page, in their order; else once in a file */
+    bool required;
+    bool kept;     /* in memory, from open to close */
+    bool texture;  /* a file has all of these kinds or none */
+    uint32_t alignment, item_bytes;
+    uint64_t bytes_min, bytes_max;
+    const char *wrong_size;
+    int (*check)(struct spl_dataset *dataset, struct spl_error *err); // may be NULL: nothing more than the checksum
+} kinds[SPL_KIND_COUNT] = {
+    [SPL_KIND_META] = {SPL_SECTION_META, .required = true, .kept = true, .alignment = 64, .item_bytes = 1,
+                       .bytes_max = SPL_META_BYTES_MAX, .wrong_size = "is larger than 8 MiB",
+                       .check = spl_dataset_check_meta},
+    [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .kept = true, .texture = true, .alignment = 64, .item_bytes = 1,
+                        .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = UINT64_MAX,
+                        .wrong_size = "is shorter than its header", .check = spl_dataset_check_dictionary},
+    [SPL_KIND_CHUNK_TEXTURES] = {SPL_SECTION_CHUNK_TEXTURES, .kept = true, .texture = true, .alignment = 64,
+                                 .item_bytes = sizeof(uint32_t), .bytes_max = UINT64_MAX,
+                                 .wrong_size = "has not one word for each chunk"},
+    [SPL_KIND_CHUNKS] = {SPL_SECTION_CHUNKS, .required = true, .kept = true, .alignment = 64,
+                         .item_bytes = sizeof(struct spl_chunk), .bytes_min = sizeof(struct spl_chunk),
+                         .bytes_max = UINT32_MAX * sizeof(struct spl_chunk),
+                         .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_chunks},
+    [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
+                        .item_bytes = sizeof(struct spl_node), .bytes_min = sizeof(struct spl_node),
+                        .bytes_max = UINT32_MAX * sizeof(struct spl_node),
+                        .wrong_size = "is not a whole number of nodes", .check = spl_dataset_check_nodes},
+    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .by_page = true, .required = true, .alignment = SPL_FILE_ALIGNMENT,
+                        .item_bytes = sizeof(uint32_t), .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t),
+                        .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have"},
+    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .by_page = true, .texture = true, .alignment = 64,
+                           .item_bytes = sizeof(uint32_t), .bytes_min = SPL_TEXTURE_TAIL_WORDS * sizeof(uint32_t),
+                           .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have",
+                           .check = spl_dataset_check_textures},
+};
+
+/* NULL for a type that a later version has added. */
+static const struct kind *kind_of(const struct spl_section *section)
+{
+    for (int k = 0; k < SPL_KIND_COUNT; k++)
+        if (kinds[k].type == section->type)
+            return &kinds[k];
+    return NULL;
+}
 
 static int corrupt(const struct spl_dataset *dataset, struct spl_error *err, const char *what, const char *why)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: %s %s; copy or pack the dataset again", dataset->path, what, why);
+    return spl_fail(err, SPL_E_CORRUPT, "%s: %s %s; copy or pack the dataset again", dataset->name, what, why);
+}
+
+static void letters_of(uint32_t type, char letters[5])
+{
+    for (int i = 0; i < 4; i++) {
+        char c = (char)(type >> 8 * i);
+        letters[i] = c > ' ' && c < 127 ? c : '?';
+    }
+    letters[4] = 0;
 }
 
 /* "section PAGE 3", "section META"; unknown types keep their four letters. */
 static const char *section_name(const struct spl_section *section, char text[40])
 {
-    char letters[5] = {0};
-    for (int i = 0; i < 4; i++) {
-        char c = (char)(section->type >> 8 * i);
-        letters[i] = c > ' ' && c < 127 ? c : '?';
-    }
-    if (section->type == SPL_SECTION_PAGE || section->type == SPL_SECTION_TEXTURES)
+    const struct kind *kind = kind_of(section);
+    char letters[5];
+    letters_of(section->type, letters);
+    if (kind && kind->by_page)
         snprintf(text, 40, "section %s %u", letters, section->index);
     else
         snprintf(text, 40, "section %s", letters);
     return text;
 }
 
-/* Files of other kinds are common mistakes; name the kind where the first bytes tell it. */
+/* Files of other others are common mistakes; name the kind where the first bytes tell it. */
 static int not_a_dataset(const struct spl_dataset *dataset, const char first[8], struct spl_error *err)
 {
     static const struct {
         const char *start, *kind;
-    } kinds[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        if (dataset->map_bytes > strlen(kinds[i].start) && !memcmp(first, kinds[i].start, strlen(kinds[i].start)))
+    } others[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (dataset->source.size > strlen(others[i].start) && !memcmp(first, others[i].start, strlen(others[i].start)))
             return spl_fail(err, SPL_E_INPUT,
                             "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one",
-                            dataset->path, kinds[i].kind);
-    size_t letters = dataset->map_bytes < 4 ? dataset->map_bytes : 4;
-    if (dataset->map_bytes >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
+                            dataset->name, others[i].kind);
+    size_t letters = dataset->source.size < 4 ? (size_t)dataset->source.size : 4;
+    if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
     return spl_fail(err, SPL_E_INPUT,
-                    "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->path);
+                    "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->name);
 }
 
 static int read_header(struct spl_dataset *dataset, struct spl_file_header *header, struct spl_error *err)
 {
-    size_t bytes = dataset->map_bytes < sizeof *header ? dataset->map_bytes : sizeof *header;
+    size_t bytes = dataset->source.size < sizeof *header ? (size_t)dataset->source.size : sizeof *header;
     size_t shown = bytes < sizeof header->magic ? bytes : sizeof header->magic;
+    if (!bytes)
+        return spl_fail(err, SPL_E_INPUT, "%s is empty", dataset->name);
     memset(header, 0, sizeof *header);
     int rc = spl_dataset_read(dataset, 0, header, bytes, err);
     if (rc)
         return rc;
     if (memcmp(header, SPL_FILE_MAGIC, shown))
         return not_a_dataset(dataset, (const char *)header, err);
-    if (dataset->map_bytes < sizeof *header)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %zu of the header's %zu bytes are missing", dataset->path,
-                        sizeof *header - dataset->map_bytes, sizeof *header);
+    if (dataset->source.size < sizeof *header)
+        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %zu of the header's %zu bytes are missing", dataset->name,
+                        sizeof *header - bytes, sizeof *header);
     if (header->version != SPL_FILE_VERSION)
         return spl_fail(err, SPL_E_UNSUPPORTED,
                         "%s: header says format version %u, this splatd reads version %u; pack the scan again with it",
-                        dataset->path, header->version, SPL_FILE_VERSION);
+                        dataset->name, header->version, SPL_FILE_VERSION);
     if (header->header_hash != XXH3_64bits(header, offsetof(struct spl_file_header, header_hash)))
         return corrupt(dataset, err, "header", "fails its checksum");
     if (header->header_bytes != sizeof *header || header->reserved)
         return corrupt(dataset, err, "header", "has a size or a reserved field that version 1 does not have");
-    if (header->file_bytes > dataset->map_bytes)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %llu of its %llu bytes are missing", dataset->path,
-                        (unsigned long long)(header->file_bytes - dataset->map_bytes),
+    if (header->file_bytes > dataset->source.size)
+        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %llu of its %llu bytes are missing", dataset->name,
+                        (unsigned long long)(header->file_bytes - dataset->source.size),
                         (unsigned long long)header->file_bytes);
-    if (header->file_bytes < dataset->map_bytes)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: %llu bytes follow the end of the dataset", dataset->path,
-                        (unsigned long long)(dataset->map_bytes - header->file_bytes));
+    if (header->file_bytes < dataset->source.size)
+        return spl_fail(err, SPL_E_CORRUPT, "%s: %llu bytes follow the end of the dataset", dataset->name,
+                        (unsigned long long)(dataset->source.size - header->file_bytes));
     return SPL_OK;
 }
 
 static int read_table(struct spl_dataset *dataset, const struct spl_file_header *header, struct spl_error *err)
 {
     uint64_t offset = header->table_offset, bytes = (uint64_t)header->section_count * sizeof(struct spl_section);
-    if (offset < sizeof *header || offset % table_alignment || offset > dataset->map_bytes ||
-        bytes > dataset->map_bytes - offset)
+    if (offset < sizeof *header || offset % table_alignment || offset > dataset->source.size ||
+        bytes > dataset->source.size - offset)
         return corrupt(dataset, err, "section table", "lies outside the file");
     if (!(dataset->sections = spl_alloc_raw(header->section_count, sizeof *dataset->sections, err)))
         return SPL_E_NOMEM;
@@ -110,8 +167,9 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
     char name[40];
     for (uint32_t i = 0; i < dataset->section_count; i++) {
         const struct spl_section *s = &dataset->sections[i];
-        uint64_t alignment = s->type == SPL_SECTION_PAGE ? SPL_FILE_ALIGNMENT : section_alignment;
-        if (s->offset < end || s->offset > dataset->map_bytes || s->bytes > dataset->map_bytes - s->offset ||
+        const struct kind *kind = kind_of(s);
+        uint64_t alignment = kind ? kind->alignment : 64;
+        if (s->offset < end || s->offset > dataset->source.size || s->bytes > dataset->source.size - s->offset ||
             (s->offset < table_end && s->offset + s->bytes > header->table_offset))
             return corrupt(dataset, err, section_name(s, name), "overlaps its neighbour or the file's end");
         if (s->offset % alignment)
@@ -137,77 +195,90 @@ static void *copy_section(const struct spl_dataset *dataset, const struct spl_se
     return copy;
 }
 
-/* Notes where each section lies; unknown types are left for later versions. */
+/* A file that lists a kind has as many as it should, and none of the kinds that it needs is missing. */
+static int check_numbers(const struct spl_dataset *dataset, struct spl_error *err)
+{
+    static const char *const some = "lists some of ATOM, CTEX and a TEXP for each page, but not all";
+    bool textures = false;
+    for (int k = 0; k < SPL_KIND_COUNT; k++)
+        textures |= kinds[k].texture && dataset->found[k].count;
+    for (int k = 0; k < SPL_KIND_COUNT; k++) {
+        uint32_t count = dataset->found[k].count;
+        char what[32], letters[5];
+        letters_of(kinds[k].type, letters);
+        snprintf(what, sizeof what, "lists no section %s", letters);
+        if (kinds[k].required && !count)
+            return corrupt(dataset, err, "section table", what);
+        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].by_page ? dataset->info.pages : 1))
+            return corrupt(dataset, err, "section table", some);
+    }
+    return SPL_OK;
+}
+
+/* Notes where each section lies and adds up sizes; unknown types are left for later versions. */
 static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const struct spl_section *nodes, *chunks;
-    uint32_t textures = 0;
+    uint32_t first[SPL_KIND_COUNT + 1] = {0};
     char name[40];
-    dataset->pages = spl_alloc(dataset->section_count, sizeof *dataset->pages, err);
-    dataset->textures = spl_alloc(dataset->section_count, sizeof *dataset->textures, err);
-    if (!dataset->pages || !dataset->textures)
+    if (!(dataset->found_all = spl_alloc(dataset->section_count, sizeof *dataset->found_all, err)))
         return SPL_E_NOMEM;
     for (uint32_t i = 0; i < dataset->section_count; i++) {
-        const struct spl_section *s = &dataset->sections[i], **place;
-        if (s->type == SPL_SECTION_PAGE || s->type == SPL_SECTION_TEXTURES) {
-            bool page = s->type == SPL_SECTION_PAGE;
-            uint32_t *count = page ? &dataset->info.pages : &textures;
-            if (s->index != *count)
-                return corrupt(dataset, err, section_name(s, name), "is out of order");
-            if (s->bytes < (page ? SPL_PAGE_TAIL_WORDS : SPL_TEXTURE_TAIL_WORDS) * sizeof(uint32_t) ||
-                s->bytes > SPL_PAGE_BYTES_MAX || s->bytes % 4)
-                return corrupt(dataset, err, section_name(s, name), "has a size that no page can have");
-            dataset->info.page_bytes += s->bytes;
-            (page ? dataset->pages : dataset->textures)[(*count)++] = s;
-            continue;
-        }
-        place = s->type == SPL_SECTION_META             ? &dataset->meta_section
-                : s->type == SPL_SECTION_NODES          ? &dataset->node_section
-                : s->type == SPL_SECTION_CHUNKS         ? &dataset->chunk_section
-                : s->type == SPL_SECTION_ATOMS          ? &dataset->atoms_section
-                : s->type == SPL_SECTION_CHUNK_TEXTURES ? &dataset->chunk_textures_section
-                                                        : NULL;
-        if (!place)
-            continue;
-        if (*place || s->index)
-            return corrupt(dataset, err, section_name(s, name), "occurs twice");
-        *place = s;
+        const struct kind *kind = kind_of(&dataset->sections[i]);
+        if (kind)
+            first[kind - kinds + 1]++;
     }
-    nodes = dataset->node_section;
-    chunks = dataset->chunk_section;
-    if (!dataset->meta_section || !nodes || !chunks || !dataset->info.pages)
-        return corrupt(dataset, err, "section table",
-                       !dataset->meta_section ? "lists no section META"
-                       : !nodes               ? "lists no section NODE"
-                       : !chunks              ? "lists no section CHNK"
-                                              : "lists no section PAGE");
-    if (dataset->meta_section->bytes > SPL_META_BYTES_MAX)
-        return corrupt(dataset, err, "section META", "is larger than 8 MiB");
-    if (!nodes->bytes || nodes->bytes % sizeof(struct spl_node) || nodes->bytes / sizeof(struct spl_node) > UINT32_MAX)
-        return corrupt(dataset, err, "section NODE", "is not a whole number of nodes");
-    if (!chunks->bytes || chunks->bytes % sizeof(struct spl_chunk) ||
-        chunks->bytes / sizeof(struct spl_chunk) > UINT32_MAX)
-        return corrupt(dataset, err, "section CHNK", "is not a whole number of chunks");
-    if (!dataset->atoms_section != !textures || !dataset->chunk_textures_section != !textures ||
-        (textures && textures != dataset->info.pages))
-        return corrupt(dataset, err, "section table", "lists some of ATOM, CTEX and a TEXP for each page, but not all");
-    dataset->info.nodes = (uint32_t)(nodes->bytes / sizeof(struct spl_node));
-    dataset->info.chunks = (uint32_t)(chunks->bytes / sizeof(struct spl_chunk));
+    for (int k = 0; k < SPL_KIND_COUNT; k++) {
+        first[k + 1] += first[k];
+        dataset->found[k].at = dataset->found_all + first[k];
+    }
+    for (uint32_t i = 0; i < dataset->section_count; i++) {
+        const struct spl_section *s = &dataset->sections[i];
+        const struct kind *kind = kind_of(s);
+        struct spl_section_list *list = kind ? &dataset->found[kind - kinds] : NULL;
+        if (!kind)
+            continue;
+        if (kind->by_page ? s->index != list->count : s->index || list->count)
+            return corrupt(dataset, err, section_name(s, name), kind->by_page ? "is out of order" : "occurs twice");
+        if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
+            return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
+        list->at[list->count++] = s;
+        dataset->info.page_bytes += kind->by_page ? s->bytes : 0;
+    }
+    dataset->info.pages = dataset->found[SPL_KIND_PAGES].count;
+    int rc = check_numbers(dataset, err);
+    if (rc)
+        return rc;
+    dataset->info.nodes = (uint32_t)(dataset->found[SPL_KIND_NODES].at[0]->bytes / sizeof(struct spl_node));
+    dataset->info.chunks = (uint32_t)(dataset->found[SPL_KIND_CHUNKS].at[0]->bytes / sizeof(struct spl_chunk));
     return SPL_OK;
+}
+
+const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
+                                 uint64_t *bytes)
+{
+    const struct spl_section_list *list = &dataset->found[kind];
+    *bytes = index < list->count ? list->at[index]->bytes : 0;
+    return index < list->count ? dataset->copies[list->at[index] - dataset->sections] : NULL;
 }
 
 /* Everything but the pages into memory. */
 static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *err)
 {
-    struct spl_error why = {0};
-    if ((dataset->meta_text = copy_section(dataset, dataset->meta_section, &why)) &&
-        (dataset->nodes = copy_section(dataset, dataset->node_section, &why)) &&
-        (dataset->chunks = copy_section(dataset, dataset->chunk_section, &why)) &&
-        (!dataset->atoms_section || (dataset->atoms = copy_section(dataset, dataset->atoms_section, &why))) &&
-        (!dataset->chunk_textures_section ||
-         (dataset->chunk_textures = copy_section(dataset, dataset->chunk_textures_section, &why))))
-        return SPL_OK;
-    return spl_fail(err, why.code, "%s", why.message);
+    uint64_t bytes;
+    if (!(dataset->copies = spl_alloc(dataset->section_count, sizeof *dataset->copies, err)))
+        return SPL_E_NOMEM;
+    for (uint32_t i = 0; i < dataset->section_count; i++) {
+        const struct kind *kind = kind_of(&dataset->sections[i]);
+        struct spl_error why = {0};
+        if (kind && kind->kept && !(dataset->copies[i] = copy_section(dataset, &dataset->sections[i], &why)))
+            return spl_fail(err, why.code, "%s", why.message);
+    }
+    dataset->pages = dataset->found[SPL_KIND_PAGES].at;
+    dataset->textures = dataset->found[SPL_KIND_TEXTURES].count ? dataset->found[SPL_KIND_TEXTURES].at : NULL;
+    dataset->nodes = (void *)spl_dataset_get_copy(dataset, SPL_KIND_NODES, 0, &bytes);
+    dataset->chunks = (void *)spl_dataset_get_copy(dataset, SPL_KIND_CHUNKS, 0, &bytes);
+    dataset->chunk_textures = (void *)spl_dataset_get_copy(dataset, SPL_KIND_CHUNK_TEXTURES, 0, &bytes);
+    return SPL_OK;
 }
 
 struct hashing {
@@ -217,18 +288,13 @@ struct hashing {
     _Atomic int code;        /* of a section that cannot be read for another reason */
 };
 
-static int check_section(const struct spl_dataset *dataset, const struct spl_section *section, bool verify)
+static int check_section(const struct spl_dataset *dataset, uint32_t index, bool verify)
 {
-    const void *copy = section == dataset->meta_section             ? (const void *)dataset->meta_text
-                       : section == dataset->node_section           ? (const void *)dataset->nodes
-                       : section == dataset->chunk_section          ? (const void *)dataset->chunks
-                       : section == dataset->atoms_section          ? dataset->atoms
-                       : section == dataset->chunk_textures_section ? (const void *)dataset->chunk_textures
-                                                                    : NULL;
+    const struct spl_section *section = &dataset->sections[index];
     uint64_t hash = section->hash;
     int rc = SPL_OK;
-    if (copy)
-        hash = XXH3_64bits(copy, section->bytes);
+    if (dataset->copies[index])
+        hash = XXH3_64bits(dataset->copies[index], section->bytes);
     else if (verify)
         rc = spl_dataset_hash_section(dataset, section, &hash, NULL);
     return rc ? rc : hash == section->hash ? SPL_OK : SPL_E_CORRUPT;
@@ -239,8 +305,7 @@ static void hash_sections(void *context, size_t begin, size_t end, unsigned work
     (void)worker;
     struct hashing *hashing = context;
     for (size_t i = begin; i < end; i++) {
-        const struct spl_section *s = &hashing->dataset->sections[i];
-        int rc = check_section(hashing->dataset, s, hashing->verify);
+        int rc = check_section(hashing->dataset, (uint32_t)i, hashing->verify);
         if (!rc)
             continue;
         if (rc != SPL_E_CORRUPT)
@@ -271,10 +336,19 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
     if ((rc = spl_dataset_check_cancelled(dataset, err)))
         return rc;
     if (hashing.code)
-        return spl_fail(err, hashing.code, "%s cannot be read for its checksums: %s", dataset->path,
+        return spl_fail(err, hashing.code, "%s cannot be read for its checksums: %s", dataset->name,
                         spl_code_get_info(hashing.code)->name);
     if (hashing.failed != UINT32_MAX)
         return corrupt(dataset, err, section_name(&dataset->sections[hashing.failed], name), "fails its checksum");
     dataset->verified = verify;
     return SPL_OK;
+}
+
+int spl_dataset_check_sections(struct spl_dataset *dataset, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (int k = 0; k < SPL_KIND_COUNT && !rc; k++)
+        if (kinds[k].check && dataset->found[k].count)
+            rc = kinds[k].check(dataset, err);
+    return rc;
 }

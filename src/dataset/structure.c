@@ -11,7 +11,7 @@
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *item,
                  size_t index, const char *what)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s: %s %zu %s; pack the dataset again", dataset->path, section,
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s: %s %zu %s; pack the dataset again", dataset->name, section,
                     item, index, what);
 }
 
@@ -63,7 +63,7 @@ static const char *judge_child(const struct spl_node *parent, const struct spl_n
     return NULL;
 }
 
-static int check_chunks(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     for (uint32_t i = 0; i < info->chunks; i++) {
@@ -110,7 +110,7 @@ static int claim_chunks(struct spl_dataset *dataset, uint32_t index, uint8_t *cl
 }
 
 /* Nodes lie breadth first: the children of each follow those of the node before it. So each is reached exactly once. */
-static int check_nodes(struct spl_dataset *dataset, uint8_t *claimed, struct spl_error *err)
+static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     uint64_t next = 1, leaf_splats = 0, chunks = 0;
@@ -167,15 +167,12 @@ static int sort_nodes_by_page(struct spl_dataset *dataset, struct spl_error *err
     return SPL_OK;
 }
 
-int spl_dataset_check_structure(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_check_nodes(struct spl_dataset *dataset, struct spl_error *err)
 {
-    int rc = check_chunks(dataset, err);
-    if (rc)
-        return rc;
     uint8_t *claimed = spl_alloc(dataset->info.chunks, 1, err);
     if (!claimed)
         return SPL_E_NOMEM;
-    rc = check_nodes(dataset, claimed, err);
+    int rc = check_tree(dataset, claimed, err);
     free(claimed);
     return rc || !dataset->chunk_textures ? rc : sort_nodes_by_page(dataset, err);
 }

@@ -16,19 +16,16 @@
 
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *what)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s %s; copy or pack the dataset again", dataset->path, section,
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s %s; copy or pack the dataset again", dataset->name, section,
                     what);
 }
 
-int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const struct spl_atoms_header *header = dataset->atoms;
+    uint64_t bytes, chunk_bytes;
+    const struct spl_atoms_header *header = spl_dataset_get_copy(dataset, SPL_KIND_ATOMS, 0, &bytes);
     struct spl_dataset_info *info = &dataset->info;
-    if (!header)
-        return SPL_OK;
-    uint64_t bytes = dataset->atoms_section->bytes;
-    if (bytes < sizeof *header)
-        return wrong(dataset, err, "ATOM", "is shorter than its header");
+    spl_dataset_get_copy(dataset, SPL_KIND_CHUNK_TEXTURES, 0, &chunk_bytes);
     if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
         header->reserved[1])
         return wrong(dataset, err, "ATOM", "has a size of textures or a reserved field that version 1 does not have");
@@ -37,13 +34,13 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
         return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
     if (8 * (bytes - sizeof *header) < 12 * (uint64_t)header->count)
         return wrong(dataset, err, "ATOM", "ends before its atoms do");
-    if (dataset->chunk_textures_section->bytes != info->chunks * sizeof(uint32_t))
+    if (chunk_bytes != info->chunks * sizeof(uint32_t))
         return wrong(dataset, err, "CTEX", "has not one word for each chunk");
     int rc = spl_dictionary_init(&dataset->dictionary, header->count, header->size, err);
     if (rc)
         return rc;
     const char *what =
-        spl_atoms_read((const uint8_t *)dataset->atoms + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
+        spl_atoms_read((const uint8_t *)header + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
     if (what)
         return wrong(dataset, err, "ATOM", what);
     info->atoms = header->count;
@@ -51,7 +48,7 @@ int spl_dataset_read_dictionary(struct spl_dataset *dataset, struct spl_error *e
     info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);
     info->page_bytes += info->dictionary_bytes;
     info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY] = 8 * bytes;
-    info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * dataset->chunk_textures_section->bytes;
+    info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * chunk_bytes;
     for (uint32_t page = 0; page < info->pages; page++)
         info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] += 8 * dataset->textures[page]->bytes;
     return SPL_OK;
@@ -73,7 +70,7 @@ static int judge_page(const struct spl_dataset *dataset, uint32_t index, const u
                                    : "starts beyond the end of the section";
             if (what)
                 return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %u %s; pack the dataset again",
-                                dataset->info.id[0] ? dataset->info.id : dataset->path, index, c, what);
+                                dataset->info.id[0] ? dataset->info.id : dataset->name, index, c, what);
         }
     }
     return SPL_OK;
@@ -92,12 +89,12 @@ const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset
 size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t index)
 {
     spl_assert(index < dataset->info.pages);
-    return dataset->textures[index] ? dataset->textures[index]->bytes : 0;
+    return dataset->textures ? dataset->textures[index]->bytes : 0;
 }
 
 int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err)
 {
-    const struct spl_section *section = dataset->textures[index];
+    const struct spl_section *section = dataset->textures ? dataset->textures[index] : NULL;
     int rc = section ? spl_dataset_read(dataset, section->offset, out, section->bytes, err) : SPL_OK;
     if (rc || !section)
         return rc;
@@ -142,7 +139,7 @@ static int judge(const struct spl_dataset *dataset, uint32_t index, const uint32
 
 int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *err)
 {
-    return dataset->dictionary.count ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
+    return dataset->verified ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
 }
 
 static int count_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,

@@ -1,6 +1,6 @@
 /* The container behind its checksums: the input says what the sections hold, this file lays them out as the writer
- * does, computes every hash, patches header and table, and opens the result. What opens is decoded to the last splat,
- * from pages copied to blocks of their exact size.
+ * does in a block of memory, computes every hash, patches header and table, and opens the result. What opens is decoded
+ * to the last splat, from pages copied to blocks of their exact size.
  *
  * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures), one byte n, n patches of three
  * bytes (offset low, high; xor) into header and table, four little-endian 32 bit sizes, with textures seven, then META,
@@ -11,8 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <xxhash.h>
 
@@ -37,14 +35,10 @@ static void rehash(struct head *head, size_t table_bytes)
     head->header.header_hash = XXH3_64bits(&head->header, offsetof(struct spl_file_header, header_hash));
 }
 
-static void put(int fd, const void *bytes, size_t size, uint64_t offset)
-{
-    spl_assert(pwrite(fd, bytes, size, (off_t)offset) == (ssize_t)size);
-}
-
-/* The page first, as the writer has it; then META, NODE, CHNK, textures, the table. */
-static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches,
-                    unsigned patch_count)
+/* The page first, as the writer has it; then META, NODE, CHNK, textures, the table. The block, of *length bytes, is the
+ * caller's. */
+static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches, unsigned patch_count,
+                        size_t *length)
 {
     static const uint32_t types[section_count] = {SPL_SECTION_PAGE,    SPL_SECTION_META,  SPL_SECTION_NODES,
                                                   SPL_SECTION_CHUNKS,  SPL_SECTION_ATOMS, SPL_SECTION_CHUNK_TEXTURES,
@@ -78,11 +72,16 @@ static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, co
         int from = i < plain_sections ? (i + 3) % plain_sections : i; /* the input has the page behind CHNK */
         head.table[i] = (struct spl_section){
             .type = types[i], .offset = offset, .bytes = wanted[from], .hash = XXH3_64bits(part[from], wanted[from])};
-        put(fd, part[from], wanted[from], offset);
         offset = (offset + wanted[from] + 63) / 64 * 64;
     }
     head.header.table_offset = offset;
-    head.header.file_bytes = offset + table_bytes;
+    head.header.file_bytes = *length = offset + table_bytes;
+    uint8_t *file = calloc(1, *length); /* of its exact size, so that a sanitiser sees one byte too many */
+    spl_assert(file);
+    for (int i = 0; i < count; i++) {
+        int from = i < plain_sections ? (i + 3) % plain_sections : i;
+        memcpy(file + head.table[i].offset, part[from], wanted[from]);
+    }
     rehash(&head, table_bytes);
     for (unsigned i = 0; i < patch_count; i++) {
         size_t at = patches[3 * i] | (size_t)patches[3 * i + 1] << 8;
@@ -90,8 +89,9 @@ static void lay_out(int fd, const uint8_t *data, size_t size, unsigned flags, co
     }
     if (flags & flag_rehash)
         rehash(&head, table_bytes);
-    put(fd, head.table, table_bytes, offset);
-    put(fd, &head.header, sizeof head.header, 0);
+    memcpy(file + offset, head.table, table_bytes);
+    memcpy(file, &head.header, sizeof head.header);
+    return file;
 }
 
 /* Of every page that may be read: codes within the dictionary, whose expansion fits its place. */
@@ -156,20 +156,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     if (size < 2 || size < 2u + 3u * data[1])
         return 0;
-    int fd = memfd_create("container", MFD_CLOEXEC);
-    spl_assert(fd >= 0);
-    size_t skip = 2u + 3u * data[1];
-    lay_out(fd, data + skip, size - skip, data[0], data + 2, data[1]);
-    char path[64];
-    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    size_t skip = 2u + 3u * data[1], length;
+    uint8_t *file = lay_out(data + skip, size - skip, data[0], data + 2, data[1], &length);
+    struct spl_dataset_source source = spl_dataset_source_of_memory(file, length);
     struct spl_dataset *dataset;
     struct spl_error err = {0};
-    int rc = spl_dataset_open(path, data[0] & flag_verify, &dataset, &err);
+    int rc = spl_dataset_open_source(&source, "container", data[0] & flag_verify, NULL, &dataset, &err);
     spl_assert((rc == SPL_OK) == (dataset != NULL) && (rc == SPL_OK) == (err.message[0] == 0));
     spl_assert(rc == SPL_OK || rc == SPL_E_CORRUPT || rc == SPL_E_UNSUPPORTED || rc == SPL_E_INPUT);
     if (dataset)
         decode_all(dataset);
     spl_dataset_close(dataset);
-    close(fd);
+    free(file);
     return 0;
 }

@@ -16,6 +16,7 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "gpu/gpu.h"
+#include "render/fault.h"
 #include "support/make_dataset.h"
 #include "support/reference.h"
 
@@ -266,7 +267,7 @@ static void clip_lines_match(void **state)
         int levels;
         double distance, lod;
     } rows[] = {
-        {"lines", 1, 3, 0}, {"lines, pruned", 1, 3, 12}, {"lines, coarse", 2, 8, 60}, {"among lines", 1, 0.4, 1}};
+        {"lines", 1, 3, 0}, {"lines, pruned", 1, 3, 12}, {"lines, coarse", 2, 8, 12}, {"among lines", 1, 0.4, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_dataset *dataset = make_dataset_levels(splats, 6000, rows[i].levels);
         assert_true(spl_dataset_get_info(dataset)->attribute_bits[SPL_ATTRIBUTE_CLIP] > 0);
@@ -543,7 +544,7 @@ static void wires_are_lines_along_themselves(void **state)
 /* A pixel of method fill is the same in whatever tile it lies, to the bit. */
 static void tiles_of_method_fill_leave_no_seams(void **state)
 {
-    struct spl_renderer_options options = {.device = *state, .scratch_samples = 160 * 160};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     struct make_splat *splats = random_splats(20000, origin, 0.02);
@@ -584,7 +585,7 @@ static void tiles_of_method_fill_leave_no_seams(void **state)
 
 static void small_tiles_give_the_same_image(void **state)
 {
-    struct spl_renderer_options options = {.device = *state, .scratch_samples = 5000};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state, .scratch_samples = 5000};
     struct spl_renderer *small, *large = renderer;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
@@ -711,7 +712,7 @@ static void the_order_of_splats_changes_nothing(void **state)
 
 static void a_lost_device_is_reported_and_replaced(void **state)
 {
-    struct spl_renderer_options options = {.device = *state};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state};
     struct spl_dataset *dataset = random_cube(500, origin, 0.05);
     struct spl_view view = looking(origin, 3, 64, 48);
     struct spl_frame frame;
@@ -765,7 +766,7 @@ static void views_out_of_range_name_their_field(void **state)
 int main(int argc, char **argv)
 {
     char *device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
-    struct spl_renderer_options options = {.device = device, .debug = true};
+    struct spl_renderer_options options = {.size = sizeof options, .device = device, .debug = true};
     struct spl_error err = {0};
     if (spl_renderer_create(&options, &renderer, &err)) {
         fprintf(stderr, "skipped: %s\n", err.message);

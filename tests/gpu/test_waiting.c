@@ -18,6 +18,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/fault.h"
 #include "support/make_dataset.h"
 
 enum { few = 6000, many = 4000000, width = 96, height = 64, open_gate = 1 << 30 };
@@ -92,7 +93,8 @@ static struct spl_view looking(void)
 static struct spl_renderer *open_renderer(uint64_t memory_limit)
 {
     struct spl_renderer *renderer = NULL;
-    struct spl_renderer_options options = {.device = device,
+    struct spl_renderer_options options = {.size = sizeof options,
+                                           .device = device,
                                            .memory_limit = memory_limit,
                                            .scratch_samples = 1 << 16,
                                            .first_page_chunks = 100000, // draw lists need not grow

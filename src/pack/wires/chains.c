@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pack/median.h"
 #include "pack/stage.h"
 #include "pack/wires/join.h"
 #include "pack/wires/wires.h"
@@ -21,19 +22,22 @@ struct gathered {
     size_t count;
 };
 
-/* Points that lie close together in Morton order: one whose radius is several times the least of the linear ones among
- * them strays, and reaches no farther than the kernels would let it. Of all of them would be less: ground beside a
+/* Points that lie close together in Morton order: one whose radius is several times that of most linear ones among them
+ * strays, and reaches no farther. The least of all, which the kernels go by, would be too little: ground beside a
  * pylon's foot is scanned more densely than what hangs from its head. */
 static void gather_run(struct gathered *g, const struct spl_points *p, size_t begin, size_t end)
 {
-    float least = INFINITY;
+    float radii[SPL_CHUNK_SPLATS];
+    size_t linear = 0;
     for (size_t i = begin; i < end; i++)
-        least = p->linear[i] ? fminf(least, p->radius[i]) : least;
+        if (p->linear[i])
+            radii[linear++] = p->radius[i];
+    double most = linear ? SPL_FILL_STRAY * (double)spl_median(radii, linear) : 0;
     for (size_t i = begin; i < end; i++) {
         if (!p->linear[i])
             continue;
         struct spl_wire_point *point = &g->points[g->count];
-        point->spacing = fminf(p->radius[i], SPL_FILL_STRAY * least);
+        point->spacing = fmin(p->radius[i], most);
         for (int c = 0; c < 3; c++)
             point->position[c] = p->axis[c][i];
         g->index[g->count++] = (uint32_t)i;

@@ -136,8 +136,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     options.wake_context = pipeline;
     TAILQ_FOREACH(entry, &gpu->entries, resident)
     {
-        size_t bytes = 0;
-        spl_dataset_get_page(entry->dataset, 0, &bytes);
+        size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
         uint32_t chunks = count_first_page_chunks(entry->dataset);

@@ -1,0 +1,34 @@
+/* Where the bytes of a dataset come from: a file, a block of memory, or whatever a caller reads from. */
+#ifndef SPL_DATASET_SOURCE_H
+#define SPL_DATASET_SOURCE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/error.h"
+
+struct spl_dataset_source {
+    uint64_t size; /* bytes; what is read always lies within */
+    /* Puts up to `bytes` (> 0) bytes from `offset` on into `out`. Returns how many, at least one; 0 where the source has
+     * become shorter; -errno. From any thread, from several at once; may block. */
+    int64_t (*read)(void *context, uint64_t offset, void *out, size_t bytes);
+    void (*close)(void *context); // may be NULL
+    void *context;
+    const void *map; /* all bytes at once, for tools; may be NULL, so that nobody who serves looks through it */
+};
+
+/* A regular file by its descriptor, and a map of it. On failure there is nothing to close; errors name `path`. */
+int spl_dataset_source_open_file(const char *path, struct spl_dataset_source *out, struct spl_error *err);
+
+/* `bytes` are borrowed until close and must not change. */
+struct spl_dataset_source spl_dataset_source_of_memory(const void *bytes, size_t size);
+
+/* Reads all of `bytes`, in as many calls as it takes; `name` is the source's in errors: SPL_E_CORRUPT when it has become
+ * shorter, SPL_E_IO. Any thread. */
+int spl_dataset_source_read(const struct spl_dataset_source *source, const char *name, uint64_t offset, void *out, size_t bytes,
+                    struct spl_error *err);
+
+/* Leaves it zeroed; a zeroed source is nothing to close. */
+void spl_dataset_source_close(struct spl_dataset_source *source);
+
+#endif
