@@ -51,4 +51,6 @@ const struct spl_method_row spl_method_nearest = {
     .apron = 1, /* smoothing looks at the samples beside it */
     .record = record,
     .resolve = SPL_RESOLVED_BENT,
+    .guesses = {{2, 0.25, 4, 19, 20.95}, {1, 0.25, 4, 27, 21.83}, {2, 0.5, 4, 50, 22.53}, {1, 0.5, 4, 52, 23.19},
+                {2, 1, 4, 90, 23.59}, {1, 1, 5, 120, 24.23}},
 };

@@ -233,8 +233,8 @@ static void test_without_a_profile_nothing_is_promised(void **state)
         double supersample;
     } more[] = {{60, SPL_METHOD_FILL, 0.25},
                 {110, SPL_METHOD_FILL, 0.5},
-                {230, SPL_METHOD_FILL, 1},
-                {400, SPL_METHOD_SPLAT, 1}}; // fill lies between points and splat
+                {230, SPL_METHOD_NEAREST, 1},
+                {400, SPL_METHOD_SPLAT, 1}}; // fill and nearest lie between points and splat
     for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
         wanted = demand(more[i].budget_ms, NAN);
         assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
