@@ -1,4 +1,4 @@
-/* A packed dataset (NAME.spld), mapped read-only. api/format.md documents the file byte by byte.
+/* A packed dataset (NAME.spld), read-only. api/format.md documents the file byte by byte.
  *
  * Threads: open and close on any one thread; between them every call below may run on any thread at once.
  * A file that is renamed over or removed goes on being what it was. One that is cut or overwritten in place makes
@@ -39,7 +39,8 @@ struct spl_dataset_info {
     uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
     uint64_t splats;           /* leaf splats plus those of the inner levels */
     uint32_t levels;           /* depth of the octree, 1 = a single node */
-    uint32_t nodes, chunks, pages;
+    uint64_t nodes, chunks;
+    uint32_t pages;
     double bounds_min[3], bounds_max[3]; /* of the leaf positions, world */
     double default_eye[3], default_target[3], default_up[3], default_fov; /* a view that shows the dataset */
     double splat_radius;       /* median radius of the leaf splats */
@@ -50,7 +51,7 @@ struct spl_dataset_info {
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
 };
 
-/* Maps `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
+/* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 

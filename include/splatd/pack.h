@@ -84,7 +84,8 @@ struct spl_pack_options {
 struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
     uint64_t linear; /* leaf splats on wires, poles and cables */
-    uint32_t levels, nodes, chunks, pages;
+    uint32_t levels, pages;
+    uint64_t nodes, chunks;
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT];
     double position_error;     /* measured mean, share of the radius */
     double normal_error;       /* measured mean, degrees */

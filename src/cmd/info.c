@@ -92,11 +92,11 @@ static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attr
 
 static int gather(struct report *report, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     *report = (struct report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
-    for (uint32_t n = 0; n < node_count; n++) {
+    for (uint64_t n = 0; n < node_count; n++) {
         uint32_t depth = nodes[n].depth < levels_max ? nodes[n].depth : levels_max - 1;
         struct level *level = &report->levels[depth];
         report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
@@ -110,9 +110,9 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
     }
     for (uint32_t i = 0; i < report->level_count; i++)
         report->levels[i].spacing /= (double)report->levels[i].splats;
-    for (uint32_t c = 0; c < chunk_count; c++)
+    for (uint64_t c = 0; c < chunk_count; c++)
         report->clips += spl_clip_count(&chunks[c]);
-    for (uint32_t c = 0; c < chunk_count; c++)
+    for (uint64_t c = 0; c < chunk_count; c++)
         for (int k = 0; k < code_count; k++)
             for (unsigned s = 0; s < codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];

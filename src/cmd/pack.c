@@ -114,9 +114,10 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     uint64_t total = 0;
     double splats = (double)r->splats;
     fprintf(stderr,
-            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %u nodes, %u pages\n",
+            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %llu nodes, %u pages\n",
             output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
-            (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels, r->nodes, r->pages);
+            (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels,
+            (unsigned long long)r->nodes, r->pages);
     fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
             (unsigned long long)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");

@@ -105,7 +105,7 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
     bits[SPL_ATTRIBUTE_LINEAR] += linear;
     bits[SPL_ATTRIBUTE_CLIP] += clip;
-    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_chunk_words(chunk) + 8 * sizeof *chunk - position - normal - radius -
+    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_chunk_words(chunk) + 8 * SPL_CHUNK_BYTES - position - normal - radius -
                                  color - classification - uncertainty - linear - clip;
 }
 

@@ -106,13 +106,13 @@ const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *da
     return &dataset->info;
 }
 
-const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count)
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count)
 {
     *count = dataset->info.nodes;
     return dataset->nodes;
 }
 
-const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count)
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count)
 {
     *count = dataset->info.chunks;
     return dataset->chunks;

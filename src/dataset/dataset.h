@@ -22,8 +22,8 @@ int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *can
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
 
-const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
-const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count);
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 
 /* Bytes of page `index` (< info.pages). */
@@ -59,7 +59,7 @@ const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t
 /* Reads and decodes splat `id` of any level; false (*splat untouched) when there is none, or the file was cut short in
  * place. Its position is relative to its node. Any thread; blocks on disk. */
 struct spl_splat;
-bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, struct spl_splat *splat);
+bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat);
 
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},

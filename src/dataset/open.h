@@ -49,8 +49,8 @@ struct spl_dataset {
     uint32_t *chunk_textures; /* by chunk */
 
     struct spl_dictionary dictionary; /* count 0 = no textures */
-    uint32_t *page_nodes;             /* with textures: nodes by page, those of page p from page_first[p] on */
-    uint32_t *page_first;             /* pages + 1 of them */
+    uint64_t *page_nodes;             /* with textures: nodes by page, those of page p from page_first[p] on */
+    uint64_t *page_first;             /* pages + 1 of them */
     json_t *meta;
     struct spl_late_wires *wires;
 };
@@ -76,7 +76,8 @@ int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_er
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err);
 
-/* Section `index` of a kind in memory, and its length; NULL and 0 where there is none. */
+/* Section `index` of a kind in memory, behind the room that the kind asks for, and its length; NULL and 0 where there is
+ * none. */
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
                                  uint64_t *bytes);
 
@@ -94,7 +95,7 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err);
 /* ATOM and CTEX in themselves; fills `dictionary` and info. Without them it does nothing. */
 int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err);
 
-/* Chunks in themselves; fills info's sums. */
+/* Chunks in themselves, which it lays out as `chunks` are, with their ids; fills info's sums. */
 int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err);
 
 /* Nodes against chunks, pages and META; with textures, sorts nodes by page. */

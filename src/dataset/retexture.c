@@ -85,10 +85,10 @@ static json_t *make_meta(const struct spl_retexture *what)
     return meta;
 }
 
-static int allocate(struct pass *p, uint32_t node_count, uint32_t chunk_count, struct spl_error *err)
+static int allocate(struct pass *p, uint64_t node_count, uint64_t chunk_count, struct spl_error *err)
 {
     size_t most = 0;
-    for (uint32_t i = 0; i < node_count; i++)
+    for (uint64_t i = 0; i < node_count; i++)
         most = p->nodes[i].chunk_count > most ? p->nodes[i].chunk_count : most;
     size_t texture_words = p->what->dictionary ? most * SPL_TEXTURE_WORDS_MAX : 1;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(p->what->from, &chunk_count);
@@ -108,7 +108,7 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
     if (what.dictionary && !what.dictionary->count)
         what.dictionary = NULL;
     struct pass p = {.what = &what, .page_index = UINT32_MAX};
-    uint32_t node_count, chunk_count = spl_dataset_get_info(what.from)->chunks;
+    uint64_t node_count, chunk_count = spl_dataset_get_info(what.from)->chunks;
     const struct spl_node *nodes = spl_dataset_get_nodes(what.from, &node_count);
     json_t *meta = make_meta(&what);
     p.nodes = spl_alloc_raw(node_count, sizeof *nodes, err);
@@ -122,7 +122,7 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
         goto done;
     if (what.dictionary)
         rc = spl_dataset_writer_set_dictionary(p.writer, what.dictionary, err);
-    for (uint32_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
+    for (uint64_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
         rc = p.nodes[i].first_chunk == next
                  ? write_node(&p, &p.nodes[i], err)
                  : spl_fail(err, SPL_E_UNSUPPORTED, "the chunks of %s are not in the order of its nodes; pack it again",

@@ -17,7 +17,7 @@ struct spl_retexture {
     /* Sets the codes of chunk `chunk`, whose splats are chunks[chunk].first_id on: called once for each, in rising
      * order, from the calling thread. A return below 0 ends the writing with it. Not called where there is no
      * dictionary. */
-    int (*code_chunk)(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err);
+    int (*code_chunk)(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err);
     void *context;
     const json_t *color_source; /* put before what META's "color" has; NULL = nothing */
     const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */

@@ -3,6 +3,7 @@
  * nodes and chunks, and never more memory than a byte a chunk. The opener's thread. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "dataset/chunk.h"
@@ -90,14 +91,14 @@ static const char *judge_chunk(const struct spl_chunk *c)
         c->normal_v + c->normal_step * (float)((1u << v) - 1) > 4)
         return "has normals off the octahedron";
     if ((g >> SPL_GEOMETRY_AXIS & 3) == 3 || g >> SPL_GEOMETRY_LINEAR > SPL_LINEAR_SOME)
-        return "has geometry bits that version 1 does not know";
+        return "has geometry bits that version 2 does not know";
     int base_u = (int16_t)(c->color_base & 0xffff), base_v = (int16_t)(c->color_base >> 16);
     if ((color >> SPL_COLOR_Y & 15) > 8 || (color >> SPL_COLOR_U & 15) > 9 || (color >> SPL_COLOR_V & 15) > 9 ||
         color & 0xff00f000u || abs(base_u) > 255 || abs(base_v) > 255)
         return "has colours wider than 8 bits";
     if ((extra >> SPL_EXTRA_CLASS & 15) > 8 || (extra >> SPL_EXTRA_UNCERTAINTY & 15) > SPL_UNCERTAINTY_BITS_MAX ||
         extra >> (SPL_EXTRA_CLIP + 8) || !(c->uncertainty_max >= 0 && isfinite(c->uncertainty_max)))
-        return "has classes or uncertainties that no file of version 1 has";
+        return "has classes or uncertainties that no file of version 2 has";
     if (extra >> SPL_EXTRA_CLIP > c->count)
         return "has more clip lines than splats";
     return NULL;
@@ -106,16 +107,15 @@ static const char *judge_chunk(const struct spl_chunk *c)
 int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
-    for (uint32_t i = 0; i < info->chunks; i++) {
-        const struct spl_chunk *chunk = &dataset->chunks[i];
+    const char *from = (const char *)dataset->chunks + info->chunks * (sizeof(struct spl_chunk) - SPL_CHUNK_BYTES);
+    for (uint64_t i = 0; i < info->chunks; i++, from += SPL_CHUNK_BYTES) {
+        struct spl_chunk *chunk = &dataset->chunks[i];
+        memmove(chunk, from, SPL_CHUNK_BYTES); /* never beyond it: the rest lies behind */
+        chunk->first_id = info->splats;
         const char *what = judge_chunk(chunk);
-        if (!what && chunk->first_id != info->splats)
-            what = "does not continue the splats of the chunk before it";
         if (what)
             return wrong(dataset, err, "CHNK", "chunk", i, what);
         info->splats += chunk->count;
-        if (info->splats >= UINT32_MAX)
-            return wrong(dataset, err, "CHNK", "chunk", i, "ends beyond the largest id");
         spl_chunk_add_bits(chunk, info->attribute_bits);
         info->has_linear |= chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
     }
@@ -124,7 +124,7 @@ int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 }
 
 /* The chunks of one node: in its page, and in no other node. Adds up their splats. */
-static int claim_chunks(struct spl_dataset *dataset, uint32_t index, uint8_t *claimed, uint64_t *splats,
+static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *claimed, uint64_t *splats,
                         struct spl_error *err)
 {
     const struct spl_node *node = &dataset->nodes[index];
@@ -133,7 +133,7 @@ static int claim_chunks(struct spl_dataset *dataset, uint32_t index, uint8_t *cl
     if (node->first_chunk > dataset->info.chunks || node->chunk_count > dataset->info.chunks - node->first_chunk)
         return wrong(dataset, err, "NODE", "node", index, "names chunks that do not exist");
     uint64_t page_words = dataset->pages[node->page]->bytes / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS;
-    for (uint32_t i = node->first_chunk; i < node->first_chunk + node->chunk_count; i++) {
+    for (uint64_t i = node->first_chunk; i < node->first_chunk + node->chunk_count; i++) {
         const struct spl_chunk *chunk = &dataset->chunks[i];
         if (claimed[i])
             return wrong(dataset, err, "NODE", "node", index, "shares a chunk with another node");
@@ -153,7 +153,7 @@ static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_
     uint32_t depth = 0;
     if (dataset->nodes[0].depth != 0)
         return wrong(dataset, err, "NODE", "node", 0, "is the root, but its depth is not 0");
-    for (uint32_t i = 0; i < info->nodes; i++) {
+    for (uint64_t i = 0; i < info->nodes; i++) {
         const struct spl_node *node = &dataset->nodes[i];
         const char *what = judge_node(node);
         if (!what && i >= next)
@@ -190,15 +190,15 @@ static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_
 static int sort_nodes_by_page(struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_dataset_info *info = &dataset->info;
-    uint32_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
+    uint64_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
     dataset->page_nodes = first ? spl_alloc_raw(info->nodes, sizeof *dataset->page_nodes, err) : NULL;
     if (!dataset->page_nodes)
         return SPL_E_NOMEM;
-    for (uint32_t n = 0; n < info->nodes; n++)
+    for (uint64_t n = 0; n < info->nodes; n++)
         first[dataset->nodes[n].page + 2]++;
     for (uint32_t p = 2; p <= info->pages; p++)
         first[p] += first[p - 1];
-    for (uint32_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
+    for (uint64_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
         dataset->page_nodes[first[dataset->nodes[n].page + 1]++] = n;
     return SPL_OK;
 }

@@ -299,6 +299,19 @@ static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count,
                             chunk_count * sizeof(uint32_t), err);
 }
 
+static int write_chunks(struct spl_dataset_writer *writer, const struct spl_chunk *chunks, size_t chunk_count,
+                        struct spl_error *err)
+{
+    char *bytes = spl_alloc_raw(chunk_count, SPL_CHUNK_BYTES, err);
+    if (!bytes)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < chunk_count; i++)
+        memcpy(bytes + i * SPL_CHUNK_BYTES, &chunks[i], SPL_CHUNK_BYTES);
+    int rc = add_section(writer, SPL_SECTION_CHUNKS, 0, bytes, chunk_count * SPL_CHUNK_BYTES, err);
+    free(bytes);
+    return rc;
+}
+
 static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                       const struct spl_chunk *chunks, size_t chunk_count, const char *meta, struct spl_error *err)
 {
@@ -308,7 +321,7 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
     if (!rc)
         rc = add_section(writer, SPL_SECTION_NODES, 0, nodes, node_count * sizeof *nodes, err);
     if (!rc)
-        rc = add_section(writer, SPL_SECTION_CHUNKS, 0, chunks, chunk_count * sizeof *chunks, err);
+        rc = write_chunks(writer, chunks, chunk_count, err);
     if (!rc && writer->dictionary)
         rc = write_textures(writer, chunk_count, err);
     if (rc)

@@ -179,12 +179,13 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     const struct spl_tree_node *from = &e->tree->nodes[index];
     struct spl_node *node = &e->nodes[index];
     for (uint32_t c = 0; c < encoded->chunk_count; c++) {
-        encoded->chunks[c].first_id = (uint32_t)out->splats;
+        encoded->chunks[c].first_id = out->splats;
         out->splats += encoded->chunks[c].count;
         spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
-    if (out->splats > UINT32_MAX - 1)
-        return spl_fail(err, SPL_E_LIMIT, "more than %u splats; pack the scans as several datasets", UINT32_MAX - 1);
+    if (from->depth > UINT8_MAX)
+        return spl_fail(err, SPL_E_LIMIT, "more than %d levels; points lie closer together than the scan is wide by more"
+                        " than floats can say", UINT8_MAX + 1);
     if (out->chunk_count + encoded->chunk_count > *chunk_capacity) {
         size_t wanted = *chunk_capacity * 2 + encoded->chunk_count;
         void *bigger = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
@@ -202,10 +203,10 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
         node->origin[c] = from->origin[c];
     node->size = (float)from->size;
     node->first_child = from->first_child;
-    node->child_count = from->child_count;
-    node->depth = from->depth;
+    node->child_count = (uint8_t)from->child_count;
+    node->depth = (uint8_t)from->depth;
     node->first_chunk = out->chunk_count;
-    node->chunk_count = encoded->chunk_count;
+    node->chunk_count = (uint16_t)encoded->chunk_count;
     out->chunk_count += encoded->chunk_count;
     out->pages = node->page + 1;
     out->error.position_over_radius += encoded->error.position_over_radius;

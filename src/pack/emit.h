@@ -9,7 +9,7 @@
 struct spl_emitted {
     struct spl_node *nodes; /* as many as the tree has */
     struct spl_chunk *chunks;
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     uint32_t pages;
     uint64_t splats;
     uint64_t bits[SPL_ATTRIBUTE_COUNT];

@@ -124,15 +124,13 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
 {
     uint64_t clock = spl_now_ns(), loaded = renderer->residency.pages_loaded;
     *out = NULL;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     int rc = spl_view_check(view, err);
+    if (!rc)
+        rc = spl_view_check_layers(view, info, err);
     if (rc)
         return rc;
-    bool bare = !spl_dataset_get_info(dataset)->has_surface;
-    if (bare && view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
-        return spl_fail_field(err, SPL_E_INPUT, "layer",
-                              "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
-                              "fill, which takes them from depth, or pack it without",
-                              spl_dataset_get_info(dataset)->id);
+    bool bare = !info->has_surface;
     struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;

@@ -120,6 +120,21 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     return SPL_OK;
 }
 
+int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    if (!info->has_surface && view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
+        return spl_fail_field(err, SPL_E_INPUT, "layer",
+                              "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
+                              "fill, which takes them from depth, or pack it without",
+                              info->id);
+    if (info->splats > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
+        return spl_fail_field(err, SPL_E_INPUT, "layer",
+                              "dataset '%s' has %llu splats, more than the 32 bits of layer id number (%u): ask for "
+                              "other layers, or pack the scans as several datasets",
+                              info->id, (unsigned long long)info->splats, SPL_NOTHING);
+    return SPL_OK;
+}
+
 void spl_frame_finish(struct spl_frame *frame)
 {
     for (int i = 0; i < SPL_LAYER_COUNT; i++)

@@ -97,7 +97,7 @@ static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const 
 /* Of every page that may be read: codes within the dictionary, whose expansion fits its place. */
 static void decode_textures(const struct spl_dataset *dataset)
 {
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(dataset);
@@ -106,10 +106,10 @@ static void decode_textures(const struct spl_dataset *dataset)
     uint32_t *atoms = malloc(spl_dataset_get_info(dataset)->dictionary_bytes);
     spl_dictionary_expand(dictionary, atoms);
     free(atoms);
-    for (uint32_t n = 0; n < node_count; n++) {
+    for (uint64_t n = 0; n < node_count; n++) {
         uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, nodes[n].page));
         bool readable = !spl_dataset_read_textures(dataset, nodes[n].page, words, NULL);
-        for (uint32_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+        for (uint64_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
             struct spl_chunk_code code;
             uint32_t texture = spl_dataset_get_chunk_textures(dataset)[c];
             spl_texture_decode(words + spl_texture_word(texture), spl_texture_planes(texture), chunks[c].count, &code);
@@ -124,15 +124,15 @@ static void decode_textures(const struct spl_dataset *dataset)
 static void decode_all(const struct spl_dataset *dataset)
 {
     uint64_t linear = 0, decoded = 0;
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    for (uint32_t n = 0; n < node_count; n++) {
+    for (uint64_t n = 0; n < node_count; n++) {
         size_t bytes;
         const uint32_t *mapped = spl_dataset_get_page(dataset, nodes[n].page, &bytes);
         uint32_t *page = malloc(bytes);
         memcpy(page, mapped, bytes);
-        for (uint32_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
+        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
             for (uint32_t i = 0; i < chunks[c].count; i++) {
                 struct spl_splat s;
                 spl_chunk_decode(&chunks[c], page, i, &s);

@@ -98,10 +98,10 @@ struct making {
     uint32_t planes, seed;
 };
 
-static int code_chunk(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err)
+static int code_chunk(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
     const struct making *m = context;
-    uint32_t count;
+    uint64_t count;
     (void)err;
     make_code(m->dictionary, m->planes, m->seed, chunk, spl_dataset_get_chunks(m->from, &count)[chunk].count, code);
     return SPL_OK;

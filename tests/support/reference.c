@@ -75,9 +75,9 @@ static void to_view(const struct spl_camera *camera, const float v[3], float out
 }
 
 /* The container's chunk behind a draw chunk, found by its first splat's id. */
-static const struct spl_chunk *find_chunk(const struct spl_chunk *chunks, uint32_t count, uint32_t first_id)
+static const struct spl_chunk *find_chunk(const struct spl_chunk *chunks, uint64_t count, uint32_t first_id)
 {
-    uint32_t low = 0, high = count;
+    uint64_t low = 0, high = count;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
         if (chunks[middle].first_id <= first_id)
@@ -329,7 +329,7 @@ static void lines(struct scene *s)
 
 static void for_each_disc(struct scene *s, bool shade)
 {
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(s->dataset, &chunk_count);
     for (size_t b = 0; b < s->list.batch_count; b++) {
         const struct spl_draw_batch *batch = &s->list.batches[b];

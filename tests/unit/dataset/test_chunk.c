@@ -144,7 +144,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     spl_chunk_add_bits(&chunk, bits);
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         all += bits[a];
-    assert_int_equal(all, 32 * words + 8 * sizeof chunk);
+    assert_int_equal(all, 32 * words + 8 * SPL_CHUNK_BYTES);
     return (double)(bits[SPL_ATTRIBUTE_POSITION] + bits[SPL_ATTRIBUTE_NORMAL] + bits[SPL_ATTRIBUTE_RADIUS] +
                     bits[SPL_ATTRIBUTE_COLOR]) /
            s->count;

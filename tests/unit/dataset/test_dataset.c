@@ -56,7 +56,7 @@ static void test_round_trip(void **state)
         assert_int_equal(info->pages, 1);
         assert_true(info->has_color && info->has_class && info->has_uncertainty);
         assert_true(info->bounds_min[0] == 500000.25 && info->default_fov == 50);
-        uint32_t nodes, chunks;
+        uint64_t nodes, chunks;
         const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
         const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
         assert_true(nodes == info->nodes && chunks == info->chunks);
@@ -66,7 +66,7 @@ static void test_round_trip(void **state)
         uint64_t bits = 0;
         for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
             bits += info->attribute_bits[a];
-        uint64_t structs = 8 * (nodes * sizeof *node + chunks * sizeof *chunk);
+        uint64_t structs = 8 * (nodes * sizeof *node + chunks * SPL_CHUNK_BYTES);
         assert_true(bits > structs && bits <= 8 * bytes + structs);
         for (uint32_t i = 0; levels == 1 && i < count; i++) {
             struct spl_splat splat;
@@ -203,7 +203,7 @@ static void test_every_flipped_bit(void **state)
         }
         assert_int_equal(pwrite(fd, &b.data[offset], 1, (off_t)offset), 1);
     }
-    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + sizeof(struct spl_chunk)));
+    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + SPL_CHUNK_BYTES));
     close(fd);
     unlink(path);
     free(b.data);
@@ -337,7 +337,7 @@ static void test_files_that_change_in_place(void **state)
         make_dataset_file(path, splats, count, 1);
         assert_int_equal(spl_dataset_open(path, true, &verified, NULL), 0);
         assert_int_equal(spl_dataset_open(path, false, &trusted, NULL), 0);
-        uint32_t nodes;
+        uint64_t nodes;
         struct spl_node before = spl_dataset_get_nodes(verified, &nodes)[0];
         size_t bytes;
         const uint32_t *mapped = spl_dataset_get_page(verified, 0, &bytes);
@@ -387,6 +387,8 @@ static void test_splats_by_id(void **state)
     splat.classification = 77;
     assert_false(spl_dataset_find_splat(dataset, count, &splat));
     assert_false(spl_dataset_find_splat(dataset, UINT32_MAX, &splat));
+    assert_false(spl_dataset_find_splat(dataset, 1ull << 32, &splat)); // not the first one
+    assert_false(spl_dataset_find_splat(dataset, UINT64_MAX, &splat));
     assert_int_equal(splat.classification, 77);
     spl_dataset_close(dataset);
 

@@ -22,7 +22,7 @@ static char folder[256], path[300];
 struct parts {
     struct spl_node *nodes;
     struct spl_chunk *chunks;
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     json_t *meta;
     uint32_t *words;
     size_t word_count;
@@ -105,11 +105,12 @@ FORGE(grandchild, (p->nodes[4].child_count = 1, p->nodes[4].first_child = 5))
 FORGE(stray_first_child, p->nodes[2].first_child = 3)
 FORGE(page_number, p->nodes[2].page = 1)
 FORGE(shared_chunk, p->nodes[2].first_chunk = p->nodes[1].first_chunk)
-FORGE(chunk_beyond, p->nodes[4].first_chunk = UINT32_MAX)
+FORGE(chunk_beyond, p->nodes[4].first_chunk = UINT64_MAX)
+FORGE(chunk_wraps, p->nodes[4].first_chunk += 1ull << 32)
+FORGE(child_wraps, p->nodes[0].first_child += 1ull << 32)
 FORGE(chunks_beyond, p->nodes[4].chunk_count = 4096)
 FORGE(no_chunks, p->nodes[1].chunk_count = 0)
-FORGE(orphan_chunk, (p->chunks[p->chunk_count] = p->chunks[p->chunk_count - 1],
-                     p->chunks[p->chunk_count].first_id += p->chunks[p->chunk_count].count, p->chunk_count++))
+FORGE(orphan_chunk, (p->chunks[p->chunk_count] = p->chunks[p->chunk_count - 1], p->chunk_count++))
 FORGE(origin_nan, p->nodes[1].origin[1] = NAN)
 FORGE(size_zero, p->nodes[0].size = 0)
 FORGE(size_huge, p->nodes[2].size *= 2)
@@ -120,7 +121,6 @@ FORGE(box_turned, p->nodes[0].box_min[2] = p->nodes[0].box_max[2] + 1)
 FORGE(box_infinite, p->nodes[0].box_max[0] = INFINITY)
 FORGE(count_zero, p->chunks[1].count = 0)
 FORGE(count_large, p->chunks[1].count = 129)
-FORGE(id_gap, p->chunks[2].first_id += 1)
 FORGE(step_zero, p->chunks[0].step = 0)
 FORGE(step_nan, p->chunks[0].step = NAN)
 FORGE(step_overflows, (p->chunks[0].step = 1e35f, p->chunks[0].geometry_bits |= 24))
@@ -184,6 +184,8 @@ static const struct {
     {shared_chunk, "section NODE: node 2 shares a chunk"},
     {chunk_beyond, "section NODE: node 4 names chunks"},
     {chunks_beyond, "section NODE: node 4 names chunks"},
+    {chunk_wraps, "section NODE: node 4 names chunks"},
+    {child_wraps, "section NODE: node 0 has children that do not follow"},
     {no_chunks, "section NODE: node 1 has no chunks"},
     {orphan_chunk, "section CHNK: number of chunks"},
     {origin_nan, "section NODE: node 1 has no finite origin"},
@@ -196,7 +198,6 @@ static const struct {
     {box_infinite, "section NODE: node 0 has no finite box"},
     {count_zero, "section CHNK: chunk 1 has no splats"},
     {count_large, "section CHNK: chunk 1 has no splats, or more"},
-    {id_gap, "section CHNK: chunk 2 does not continue"},
     {step_zero, "section CHNK: chunk 0 has a step"},
     {step_nan, "section CHNK: chunk 0 has a step"},
     {step_overflows, "section CHNK: chunk 0 has positions"},
@@ -295,7 +296,8 @@ FORGE_RAW(raw_no_sections, r->header->section_count = 0)
 FORGE_RAW(raw_table_offset, r->header->table_offset = UINT64_MAX - 7)
 FORGE_RAW(raw_table_at_header, r->header->table_offset = 0)
 FORGE_RAW(raw_header_size, r->header->header_bytes = 64)
-FORGE_RAW(raw_version, r->header->version = 2)
+FORGE_RAW(raw_version, r->header->version = 1)
+FORGE_RAW(raw_later_version, r->header->version = 3)
 FORGE_RAW(raw_long, r->header->file_bytes += 1000)
 FORGE_RAW(raw_page_beyond, r->table[0].bytes = UINT64_MAX)
 FORGE_RAW(raw_offset_wraps, (r->table[0].offset = UINT64_MAX - 65535, r->table[0].bytes = 65536))
@@ -328,7 +330,8 @@ static const struct {
     {raw_table_offset, SPL_E_CORRUPT, "section table lies outside the file"},
     {raw_table_at_header, SPL_E_CORRUPT, "section table lies outside the file"},
     {raw_header_size, SPL_E_CORRUPT, "header has a size"},
-    {raw_version, SPL_E_UNSUPPORTED, "format version 2, this splatd reads version 1"},
+    {raw_version, SPL_E_UNSUPPORTED, "format version 1, this splatd reads version 2; pack it again"},
+    {raw_later_version, SPL_E_UNSUPPORTED, "format version 3, this splatd reads version 2"},
     {raw_long, SPL_E_CORRUPT, "truncated: 1000 of"},
     {raw_page_beyond, SPL_E_CORRUPT, "section PAGE 0 overlaps"},
     {raw_offset_wraps, SPL_E_CORRUPT, "section PAGE 0 overlaps"},

@@ -316,10 +316,10 @@ struct coding {
     uint32_t next, fail_at;
 };
 
-static int code_chunk(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err)
+static int code_chunk(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
     struct coding *c = context;
-    uint32_t count;
+    uint64_t count;
     assert_int_equal(chunk, c->next++);
     if (chunk == c->fail_at)
         return spl_fail(err, SPL_E_CANCELLED, "enough");
@@ -352,7 +352,7 @@ static void test_retexture(void **state)
     coding = (struct coding){.from = from, .dictionary = &dictionary, .fail_at = UINT32_MAX};
     assert_int_equal(spl_dataset_retexture(&what, path, NULL), SPL_OK);
     const struct spl_dataset_info *info = spl_dataset_get_info(from);
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(from, &chunk_count);
     assert_int_equal(coding.next, chunk_count);
     for (int verify = 0; verify < 2; verify++) {

@@ -117,7 +117,7 @@ static void test_replaced_while_mapped(void **state)
     size_t bytes;
     assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
     make_target(4);
-    uint32_t count;
+    uint64_t count;
     assert_int_equal(spl_dataset_get_chunks(dataset, &count)->color_base >> 16, 3);
     assert_non_null(spl_dataset_get_page(dataset, 0, &bytes));
     spl_dataset_close(dataset);

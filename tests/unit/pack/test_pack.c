@@ -71,7 +71,7 @@ static double check_dataset(const char *path, const double (*position)[3], size_
     if (spl_dataset_open(path, true, &dataset, &err))
         fail_msg("%s", err.message);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    uint32_t node_count, chunk_count, next_id = 0;
+    uint64_t node_count, chunk_count, next_id = 0;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     uint8_t *seen = calloc(count, 1);
@@ -289,9 +289,10 @@ static void test_linear_and_bare_points(void **state)
             assert_true(!info->has_uncertainty && info->attribute_bits[SPL_ATTRIBUTE_RADIUS] == 0 &&
                         info->attribute_bits[SPL_ATTRIBUTE_UNCERTAINTY] == 0);
         assert_true(info->splat_radius > 0.05 && info->splat_radius < 0.2);
-        uint32_t chunk_count, inner = 0;
+        uint64_t chunk_count;
+        uint32_t inner = 0;
         const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-        for (uint32_t c = 0; c < spl_dataset_get_nodes(dataset, &(uint32_t){0})[0].chunk_count; c++)
+        for (uint32_t c = 0; c < spl_dataset_get_nodes(dataset, &(uint64_t){0})[0].chunk_count; c++)
             inner += chunks[c].geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
         assert_true(options.no_linear == (inner == 0));
         spl_dataset_close(dataset);
