@@ -19,14 +19,21 @@ enum spl_attribute {
     SPL_ATTRIBUTE_RADIUS,
     SPL_ATTRIBUTE_NORMAL,
     SPL_ATTRIBUTE_COLOR,
-    SPL_ATTRIBUTE_CLASS,
-    SPL_ATTRIBUTE_UNCERTAINTY,
     SPL_ATTRIBUTE_LINEAR,
     SPL_ATTRIBUTE_CLIP,    /* clip lines and the mask that says which splats have one */
-    SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
+    SPL_ATTRIBUTE_CHUNK,   /* chunk, node and stream headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,
     SPL_ATTRIBUTE_COUNT
+};
+
+/* An optional attribute, as the file names it. */
+enum { SPL_STREAMS_MAX = 16, SPL_STREAM_TEXT_MAX = 32 };
+struct spl_stream_info {
+    char name[SPL_STREAM_TEXT_MAX]; /* "class", "uncertainty", … */
+    char type[SPL_STREAM_TEXT_MAX]; /* how codes become values; one that this library does not know is skipped */
+    char unit[SPL_STREAM_TEXT_MAX]; /* "" = none */
+    uint64_t bits;                  /* of its codes, over all splats */
 };
 
 struct spl_dataset_info {
@@ -49,6 +56,9 @@ struct spl_dataset_info {
     bool has_linear;  /* some splats lie on wires, poles or cables, and are marked */
     uint32_t atoms, texture_size; /* of the dictionary: atoms of texture_size x texture_size texels; 0 = no textures */
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
+    uint32_t stream_count; /* attributes beyond these, up to SPL_STREAMS_MAX */
+    struct spl_stream_info streams[SPL_STREAMS_MAX];
+    char unit[SPL_STREAM_TEXT_MAX]; /* of coordinates: "m", "ft", "us-ft", "unknown" */
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are

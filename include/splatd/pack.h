@@ -87,6 +87,8 @@ struct spl_pack_report {
     uint32_t levels, pages;
     uint64_t nodes, chunks;
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT];
+    uint32_t stream_count; /* attributes beyond these: name and bits */
+    struct spl_stream_info streams[SPL_STREAMS_MAX];
     double position_error;     /* measured mean, share of the radius */
     double normal_error;       /* measured mean, degrees */
     double seconds;

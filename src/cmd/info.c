@@ -17,7 +17,7 @@
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
 
-enum { width_max = 24, levels_max = 64 };
+enum { width_max = 32, levels_max = 64 };
 
 /* Fixed-width codes whose widths each chunk chose. */
 static const struct {
@@ -35,8 +35,6 @@ static const struct {
     {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
     {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
     {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
-    {"class", "class", SPL_ATTRIBUTE_CLASS, {SPL_EXTRA_CLASS}, 1, 4},
-    {"uncertainty", "uncertainty", SPL_ATTRIBUTE_UNCERTAINTY, {SPL_EXTRA_UNCERTAINTY}, 1, 4},
 };
 enum { code_count = sizeof codes / sizeof *codes };
 
@@ -51,7 +49,7 @@ struct report {
         double spacing;   /* mean over the splats */
     } levels[levels_max]; /* deeper ones are counted with the last */
     uint32_t level_count;
-    double widths[code_count][width_max + 1]; /* shares of the codes */
+    double widths[code_count + SPL_STREAMS_MAX][width_max + 1]; /* shares of the codes; streams last */
     uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
     uint64_t linear;                          /* points on wires, poles and cables */
     uint64_t clips;                           /* splats that end at a clip line */
@@ -79,14 +77,24 @@ static void usage(FILE *out)
 
 static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attribute)
 {
-    switch (attribute) {
-    case SPL_ATTRIBUTE_COLOR:
-        return chunk->color_bits;
-    case SPL_ATTRIBUTE_CLASS:
-    case SPL_ATTRIBUTE_UNCERTAINTY:
-        return chunk->extra_bits;
-    default:
-        return chunk->geometry_bits;
+    return attribute == SPL_ATTRIBUTE_COLOR ? chunk->color_bits : chunk->geometry_bits;
+}
+
+static void gather_widths(struct report *report)
+{
+    uint64_t chunk_count;
+    uint32_t stream_count;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(report->dataset, &chunk_count);
+    const struct spl_stream *streams = spl_dataset_get_streams(report->dataset, &stream_count);
+    for (uint64_t c = 0; c < chunk_count; c++) {
+        double share = chunks[c].count / (double)report->info->splats;
+        for (int k = 0; k < code_count; k++)
+            for (unsigned s = 0; s < codes[k].shift_count; s++) {
+                uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
+                report->widths[k][width & ((1u << codes[k].bits) - 1)] += share / codes[k].shift_count;
+            }
+        for (uint32_t s = 0; s < stream_count; s++)
+            report->widths[code_count + s][streams[s].width[c]] += share;
     }
 }
 
@@ -112,27 +120,34 @@ static int gather(struct report *report, const struct spl_dataset *dataset, stru
         report->levels[i].spacing /= (double)report->levels[i].splats;
     for (uint64_t c = 0; c < chunk_count; c++)
         report->clips += spl_clip_count(&chunks[c]);
-    for (uint64_t c = 0; c < chunk_count; c++)
-        for (int k = 0; k < code_count; k++)
-            for (unsigned s = 0; s < codes[k].shift_count; s++) {
-                uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
-                width &= (1u << codes[k].bits) - 1;
-                report->widths[k][width] +=
-                    (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
-            }
+    gather_widths(report);
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }
 
-static double bytes_per_splat(const struct spl_dataset_info *info, enum spl_attribute attribute)
+/* What is counted, by name: the attributes that every dataset has, then its own. */
+static const char *name_of(const struct spl_dataset_info *info, int attribute)
 {
-    return (double)info->attribute_bits[attribute] / 8 / (double)info->splats;
+    return attribute < SPL_ATTRIBUTE_COUNT ? spl_attribute_name((enum spl_attribute)attribute)
+                                           : info->streams[attribute - SPL_ATTRIBUTE_COUNT].name;
+}
+
+static int count_of(const struct spl_dataset_info *info)
+{
+    return SPL_ATTRIBUTE_COUNT + (int)info->stream_count;
+}
+
+static double bytes_per_splat(const struct spl_dataset_info *info, int attribute)
+{
+    uint64_t bits = attribute < SPL_ATTRIBUTE_COUNT ? info->attribute_bits[attribute]
+                                                    : info->streams[attribute - SPL_ATTRIBUTE_COUNT].bits;
+    return (double)bits / 8 / (double)info->splats;
 }
 
 static double total_bytes_per_splat(const struct spl_dataset_info *info)
 {
     double total = 0;
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
+    for (int a = 0; a < count_of(info); a++)
         total += bytes_per_splat(info, a);
     return total;
 }
@@ -198,6 +213,7 @@ static void print_table(const struct report *report)
 {
     const struct spl_dataset_info *info = report->info;
     const json_t *sources = json_object_get(spl_dataset_get_meta(report->dataset), "sources"), *source;
+    const json_t *crs = json_object_get(spl_dataset_get_meta(report->dataset), "crs");
     char a[32], b[32], c[32], d[32];
     size_t i;
     printf("%s  version %016" PRIx64 ", %.1f MB\n", info->id, info->version, (double)info->file_bytes / 1e6);
@@ -206,8 +222,11 @@ static void print_table(const struct report *report)
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
-    printf("  attributes    %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
-           info->has_uncertainty ? ", uncertainty (derived from the points)" : "");
+    printf("  attributes    %s", info->has_color ? "color" : "no color");
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        printf(", %s%s%s%s", info->streams[s].name, *info->streams[s].unit ? " (" : "", info->streams[s].unit,
+               *info->streams[s].unit ? ")" : "");
+    printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
@@ -216,6 +235,9 @@ static void print_table(const struct report *report)
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
+    printf("  unit          %s\n", info->unit);
+    if (json_is_string(crs))
+        printf("  crs           %s\n", json_string_value(crs));
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
@@ -230,13 +252,13 @@ static void print_table(const struct report *report)
                l->spacing);
     }
     printf("\n  bytes a splat\n");
-    for (int attribute = 0; attribute < SPL_ATTRIBUTE_COUNT; attribute++)
+    for (int attribute = 0; attribute < count_of(info); attribute++)
         if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
-            printf("  %-14s%6.2f\n", spl_attribute_name(attribute), bytes_per_splat(info, attribute));
+            printf("  %-14s%6.2f\n", name_of(info, attribute), bytes_per_splat(info, attribute));
     printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
            total_bytes_per_splat(info));
-    for (int k = 0; k < code_count; k++) {
-        printf("  %-22s", codes[k].label);
+    for (int k = 0; k < code_count + (int)info->stream_count; k++) {
+        printf("  %-22s", k < code_count ? codes[k].label : info->streams[k - code_count].name);
         for (int width = 0; width <= width_max; width++)
             if (report->widths[k][width] > 0)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
@@ -270,8 +292,8 @@ static json_t *to_json(const struct report *report)
 {
     const struct spl_dataset_info *info = report->info;
     json_t *bytes = json_pack("{s:f}", "total", total_bytes_per_splat(info));
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
-        json_object_set_new(bytes, spl_attribute_name(a), json_real(bytes_per_splat(info, a)));
+    for (int a = 0; a < count_of(info); a++)
+        json_object_set_new(bytes, name_of(info, a), json_real(bytes_per_splat(info, a)));
     json_t *levels = json_array();
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct level *l = &report->levels[i];
@@ -280,7 +302,7 @@ static json_t *to_json(const struct report *report)
                                         (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing", l->spacing));
     }
     json_t *widths = json_object();
-    for (int k = 0; k < code_count; k++) {
+    for (int k = 0; k < code_count + (int)info->stream_count; k++) {
         json_t *histogram = json_object();
         for (int width = 0; width <= width_max; width++) {
             char key[16];
@@ -288,11 +310,11 @@ static json_t *to_json(const struct report *report)
             if (report->widths[k][width] > 0)
                 json_object_set_new(histogram, key, json_real(report->widths[k][width]));
         }
-        json_object_set_new(widths, codes[k].name, histogram);
+        json_object_set_new(widths, k < code_count ? codes[k].name : info->streams[k - code_count].name, histogram);
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -304,7 +326,9 @@ static json_t *to_json(const struct report *report)
         "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
         "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
-        json_object_get(spl_dataset_get_meta(report->dataset), "color"));
+        json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
+        json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
+        json_object_get(spl_dataset_get_meta(report->dataset), "crs"));
 }
 
 static int print_json(const struct report *report, struct spl_error *err)

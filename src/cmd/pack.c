@@ -126,6 +126,10 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
         if (r->attribute_bits[a])
             fprintf(stderr, " %s %.2f,", spl_attribute_name(a), (double)r->attribute_bits[a] / 8 / splats);
     }
+    for (uint32_t s = 0; s < r->stream_count; s++) {
+        total += r->streams[s].bits;
+        fprintf(stderr, " %s %.2f,", r->streams[s].name, (double)r->streams[s].bits / 8 / splats);
+    }
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
             r->normal_error);

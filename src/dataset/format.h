@@ -32,6 +32,7 @@ struct spl_file_header { /* at offset 0 */
 #define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')   /* JSON: sources, counts, statistics, default view */
 #define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E')  /* struct spl_node[], breadth first, node 0 is the root */
 #define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* the first SPL_CHUNK_BYTES of each struct spl_chunk */
+#define SPL_SECTION_STREAM SPL_FOURCC('S', 'T', 'R', 'M') /* bases and widths of an attribute; `index` as in META */
 #define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
 #define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, cosine coefficients */
@@ -60,20 +61,16 @@ struct spl_node {
     uint8_t depth;        /* root = 0 */
 };
 
-/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number
- * of splats with a clip line 16..23. */
-#define SPL_EXTRA_CLASS 0
-#define SPL_EXTRA_UNCERTAINTY 4
-#define SPL_EXTRA_CLASS_BASE 8
+/* extra_bits: number of splats with a clip line 16..23; on disk, the number of splats 0..7. */
+#define SPL_EXTRA_COUNT 0
 #define SPL_EXTRA_CLIP 16
-#define SPL_UNCERTAINTY_BITS_MAX 5
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
 #define SPL_PAGE_TAIL_WORDS 2
 
 /* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream
- * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
- * the other from the low bits up. */
+ * starting on a word: geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional
+ * attributes (streams.h). A splat's fields lie one after the other from the low bits up. */
 struct spl_chunk {
     float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;
@@ -84,15 +81,14 @@ struct spl_chunk {
     uint32_t geometry_bits; /* as in shared.h */
     uint32_t color_bits;    /* as in shared.h */
     uint32_t color_base;
-    uint32_t extra_bits;   /* SPL_EXTRA_* */
-    float uncertainty_max; /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
-    uint32_t count;
+    uint32_t extra_bits; /* SPL_EXTRA_* */
 
-    /* Not on disk: the sum of the counts before it. */
-    uint64_t first_id; /* dataset-wide index of its first splat */
+    /* Not on disk. */
+    uint32_t count;    /* there in extra_bits, here taken out of them */
+    uint64_t first_id; /* dataset-wide index of its first splat: the sum of the counts before it */
 };
 
-#define SPL_CHUNK_BYTES 68u /* of a chunk on disk */
+#define SPL_CHUNK_BYTES 60u /* of a chunk on disk */
 
 /* ATOM: this header, then the stream of atoms.h. */
 struct spl_atoms_header {
@@ -109,7 +105,7 @@ struct spl_atoms_header {
 _Static_assert(sizeof(struct spl_file_header) == 56, "on disk");
 _Static_assert(sizeof(struct spl_section) == 32, "on disk");
 _Static_assert(sizeof(struct spl_node) == 80, "on disk");
-_Static_assert(offsetof(struct spl_chunk, count) + sizeof(uint32_t) == SPL_CHUNK_BYTES, "on disk");
+_Static_assert(offsetof(struct spl_chunk, count) == SPL_CHUNK_BYTES, "on disk");
 _Static_assert(sizeof(struct spl_atoms_header) == 16, "on disk");
 
 #endif

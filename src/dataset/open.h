@@ -22,6 +22,7 @@ enum spl_section_kind {
     SPL_KIND_ATOMS,
     SPL_KIND_CHUNK_TEXTURES,
     SPL_KIND_CHUNKS,
+    SPL_KIND_STREAMS,
     SPL_KIND_NODES,
     SPL_KIND_PAGES,
     SPL_KIND_TEXTURES,
@@ -48,6 +49,8 @@ struct spl_dataset {
     struct spl_chunk *chunks;
     uint32_t *chunk_textures; /* by chunk */
 
+    struct spl_stream streams[SPL_STREAMS_MAX]; /* info.stream_count of them */
+    enum spl_stream_type stream_types[SPL_STREAMS_MAX];
     struct spl_dictionary dictionary; /* count 0 = no textures */
     uint64_t *page_nodes;             /* with textures: nodes by page, those of page p from page_first[p] on */
     uint64_t *page_first;             /* pages + 1 of them */
@@ -68,6 +71,9 @@ void spl_late_wires_destroy(struct spl_late_wires *late);
 /* Reads bytes of the source; SPL_E_CORRUPT when it has become shorter. Any thread. */
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,
                      struct spl_error *err);
+
+/* The chunk that has splat `id`, and its node; NULL where there is none. */
+const struct spl_node *spl_dataset_find_chunk(const struct spl_dataset *dataset, uint64_t id, uint64_t *chunk);
 
 /* SPL_E_CANCELLED once nobody waits for the dataset any more: for each step that may take some milliseconds. */
 int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err);
@@ -98,7 +104,13 @@ int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *
 /* Chunks in themselves, which it lays out as `chunks` are, with their ids; fills info's sums. */
 int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err);
 
-/* Nodes against chunks, pages and META; with textures, sorts nodes by page. */
+/* META's list of streams, against the number of their sections: fills info and `streams`. check_meta calls it. */
+int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err);
+
+/* Bases and widths of each stream, for each chunk; adds up info's bits. */
+int spl_dataset_check_streams(struct spl_dataset *dataset, struct spl_error *err);
+
+/* Nodes against chunks, streams, pages and META; with textures, sorts nodes by page. */
 int spl_dataset_check_nodes(struct spl_dataset *dataset, struct spl_error *err);
 
 /* Of a verified dataset, reads every TEXP and holds each code against dictionary and chunks. Blocks on disk. */

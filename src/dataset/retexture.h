@@ -23,7 +23,7 @@ struct spl_retexture {
     const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */
 };
 
-/* Writes `path` (temporary file, sync, rename): geometry, classes and uncertainties are copied bit for bit. Blocks on
+/* Writes `path` (temporary file, sync, rename): geometry and optional attributes are copied bit for bit. Blocks on
  * disk; holds two pages in memory. Errors of the disk, of pages that were overwritten, SPL_E_NOMEM, SPL_E_LIMIT where a
  * node's codes are larger than a page, and those of code_chunk. */
 int spl_dataset_retexture(const struct spl_retexture *retexture, const char *path, struct spl_error *err);

@@ -19,7 +19,7 @@ enum { table_alignment = 8 };
 /* A kind of section: a row to add, not code. */
 static const struct kind {
     uint32_t type;
-    bool by_page;  /* one a page, in their order; else once in a file */
+    enum { ONCE, BY_PAGE, BY_STREAM } number; /* in a file, or one for each page or stream, in their order */
     bool required;
     bool kept;     /* in memory, from open to close */
     bool texture;  /* a file has all of these kinds or none */
@@ -43,14 +43,17 @@ static const struct kind {
                          .item_bytes = SPL_CHUNK_BYTES, .room_bytes = sizeof(struct spl_chunk),
                          .bytes_min = SPL_CHUNK_BYTES, .bytes_max = UINT64_MAX,
                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_chunks},
+    [SPL_KIND_STREAMS] = {SPL_SECTION_STREAM, .number = BY_STREAM, .kept = true, .alignment = 64,
+                          .item_bytes = SPL_STREAM_CHUNK_BYTES, .bytes_max = UINT64_MAX,
+                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_streams},
     [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
                         .item_bytes = sizeof(struct spl_node), .bytes_min = sizeof(struct spl_node),
                         .bytes_max = UINT64_MAX,
                         .wrong_size = "is not a whole number of nodes", .check = spl_dataset_check_nodes},
-    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .by_page = true, .required = true, .alignment = SPL_FILE_ALIGNMENT,
+    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .alignment = SPL_FILE_ALIGNMENT,
                         .item_bytes = sizeof(uint32_t), .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t),
                         .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have"},
-    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .by_page = true, .texture = true, .alignment = 64,
+    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .number = BY_PAGE, .texture = true, .alignment = 64,
                            .item_bytes = sizeof(uint32_t), .bytes_min = SPL_TEXTURE_TAIL_WORDS * sizeof(uint32_t),
                            .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have",
                            .check = spl_dataset_check_textures},
@@ -85,7 +88,7 @@ static const char *section_name(const struct spl_section *section, char text[40]
     const struct kind *kind = kind_of(section);
     char letters[5];
     letters_of(section->type, letters);
-    if (kind && kind->by_page)
+    if (kind && kind->number)
         snprintf(text, 40, "section %s %u", letters, section->index);
     else
         snprintf(text, 40, "section %s", letters);
@@ -218,7 +221,7 @@ static int check_numbers(const struct spl_dataset *dataset, struct spl_error *er
         snprintf(what, sizeof what, "lists no section %s", letters);
         if (kinds[k].required && !count)
             return corrupt(dataset, err, "section table", what);
-        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].by_page ? dataset->info.pages : 1))
+        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].number == BY_PAGE ? dataset->info.pages : 1))
             return corrupt(dataset, err, "section table", some);
     }
     return SPL_OK;
@@ -246,12 +249,12 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
         struct spl_section_list *list = kind ? &dataset->found[kind - kinds] : NULL;
         if (!kind)
             continue;
-        if (kind->by_page ? s->index != list->count : s->index || list->count)
-            return corrupt(dataset, err, section_name(s, name), kind->by_page ? "is out of order" : "occurs twice");
+        if (kind->number ? s->index != list->count : s->index || list->count)
+            return corrupt(dataset, err, section_name(s, name), kind->number ? "is out of order" : "occurs twice");
         if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
             return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
         list->at[list->count++] = s;
-        dataset->info.page_bytes += kind->by_page ? s->bytes : 0;
+        dataset->info.page_bytes += kind->number == BY_PAGE ? s->bytes : 0;
     }
     dataset->info.pages = dataset->found[SPL_KIND_PAGES].count;
     int rc = check_numbers(dataset, err);

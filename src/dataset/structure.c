@@ -96,9 +96,8 @@ static const char *judge_chunk(const struct spl_chunk *c)
     if ((color >> SPL_COLOR_Y & 15) > 8 || (color >> SPL_COLOR_U & 15) > 9 || (color >> SPL_COLOR_V & 15) > 9 ||
         color & 0xff00f000u || abs(base_u) > 255 || abs(base_v) > 255)
         return "has colours wider than 8 bits";
-    if ((extra >> SPL_EXTRA_CLASS & 15) > 8 || (extra >> SPL_EXTRA_UNCERTAINTY & 15) > SPL_UNCERTAINTY_BITS_MAX ||
-        extra >> (SPL_EXTRA_CLIP + 8) || !(c->uncertainty_max >= 0 && isfinite(c->uncertainty_max)))
-        return "has classes or uncertainties that no file of version 2 has";
+    if (extra & ~(255u << SPL_EXTRA_CLIP))
+        return "has extra bits that version 2 does not know";
     if (extra >> SPL_EXTRA_CLIP > c->count)
         return "has more clip lines than splats";
     return NULL;
@@ -111,6 +110,8 @@ int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
     for (uint64_t i = 0; i < info->chunks; i++, from += SPL_CHUNK_BYTES) {
         struct spl_chunk *chunk = &dataset->chunks[i];
         memmove(chunk, from, SPL_CHUNK_BYTES); /* never beyond it: the rest lies behind */
+        chunk->count = chunk->extra_bits >> SPL_EXTRA_COUNT & 255;
+        chunk->extra_bits &= ~(255u << SPL_EXTRA_COUNT);
         chunk->first_id = info->splats;
         const char *what = judge_chunk(chunk);
         if (what)
@@ -137,7 +138,8 @@ static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *cl
         const struct spl_chunk *chunk = &dataset->chunks[i];
         if (claimed[i])
             return wrong(dataset, err, "NODE", "node", index, "shares a chunk with another node");
-        if (chunk->geometry_word > page_words || spl_chunk_words(chunk) > page_words - chunk->geometry_word)
+        uint32_t words = spl_chunk_words(chunk) + spl_dataset_get_stream_words(dataset, dataset->info.stream_count, i);
+        if (chunk->geometry_word > page_words || words > page_words - chunk->geometry_word)
             return wrong(dataset, err, "CHNK", "chunk", i, "reaches beyond the end of its page");
         claimed[i] = 1;
         *splats += chunk->count;

@@ -36,6 +36,8 @@ struct spl_dataset_writer {
     struct words textures;                   /* of its chunks */
     struct words chunk_textures;             /* one of each chunk of the dataset */
     const struct spl_dictionary *dictionary; /* NULL = no textures */
+    const struct spl_stream *streams;        /* of all chunks */
+    uint32_t stream_count;
     struct spl_section *sections;
     size_t section_count, section_capacity;
     uint32_t page_count;
@@ -279,6 +281,43 @@ static int sync_directory(const char *path, struct spl_error *err)
     return rc;
 }
 
+void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams, uint32_t count)
+{
+    spl_assert(count <= SPL_STREAMS_MAX);
+    writer->streams = streams;
+    writer->stream_count = count;
+}
+
+static int write_streams(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
+{
+    size_t bases = chunk_count * sizeof(uint32_t), all = chunk_count * SPL_STREAM_CHUNK_BYTES;
+    char *bytes = writer->stream_count ? spl_alloc_raw(all, 1, err) : NULL;
+    int rc = writer->stream_count && !bytes ? SPL_E_NOMEM : SPL_OK;
+    for (uint32_t s = 0; s < writer->stream_count && !rc; s++) {
+        memcpy(bytes, writer->streams[s].base, bases);
+        memcpy(bytes + bases, writer->streams[s].width, chunk_count);
+        rc = add_section(writer, SPL_SECTION_STREAM, s, bytes, all, err);
+    }
+    free(bytes);
+    return rc;
+}
+
+/* META as the caller has it, and "streams"; NULL where memory is refused. */
+static char *describe(const struct spl_dataset_writer *writer, const json_t *meta)
+{
+    json_t *whole = json_copy((json_t *)meta), *streams = json_array();
+    for (uint32_t s = 0; s < writer->stream_count; s++) {
+        const struct spl_stream *stream = &writer->streams[s];
+        json_array_append_new(streams, json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit",
+                                                 stream->unit));
+    }
+    bool failed = json_array_size(streams) != writer->stream_count;
+    failed |= json_object_set_new(whole, "streams", streams) != 0;
+    char *text = failed ? NULL : json_dumps(whole, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    json_decref(whole);
+    return text;
+}
+
 /* ATOM and CTEX. */
 static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
 {
@@ -305,8 +344,11 @@ static int write_chunks(struct spl_dataset_writer *writer, const struct spl_chun
     char *bytes = spl_alloc_raw(chunk_count, SPL_CHUNK_BYTES, err);
     if (!bytes)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < chunk_count; i++)
-        memcpy(bytes + i * SPL_CHUNK_BYTES, &chunks[i], SPL_CHUNK_BYTES);
+    for (size_t i = 0; i < chunk_count; i++) {
+        struct spl_chunk chunk = chunks[i];
+        chunk.extra_bits |= chunk.count << SPL_EXTRA_COUNT;
+        memcpy(bytes + i * SPL_CHUNK_BYTES, &chunk, SPL_CHUNK_BYTES);
+    }
     int rc = add_section(writer, SPL_SECTION_CHUNKS, 0, bytes, chunk_count * SPL_CHUNK_BYTES, err);
     free(bytes);
     return rc;
@@ -322,6 +364,8 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
         rc = add_section(writer, SPL_SECTION_NODES, 0, nodes, node_count * sizeof *nodes, err);
     if (!rc)
         rc = write_chunks(writer, chunks, chunk_count, err);
+    if (!rc)
+        rc = write_streams(writer, chunk_count, err);
     if (!rc && writer->dictionary)
         rc = write_textures(writer, chunk_count, err);
     if (rc)
@@ -346,7 +390,7 @@ int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct sp
                               struct spl_error *err)
 {
     spl_assert(!writer->finished && node_count && chunk_count);
-    char *text = json_dumps(meta, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    char *text = describe(writer, meta);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->path);
     int rc = strlen(text) > SPL_META_BYTES_MAX

@@ -16,6 +16,7 @@ enum { batch_nodes = 256 };
 struct encoded { /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
+    struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT]; /* by chunk */
     size_t word_count;
     uint32_t chunk_count;
     struct spl_chunk_error error;
@@ -27,6 +28,46 @@ struct scratch { /* of one worker, for the largest node */
     float *radii;
 };
 
+/* What an attribute of the dataset is of a point, and of an inner node's splat. */
+static double class_of_point(const struct spl_points *points, size_t i)
+{
+    return points->color_class[i] >> 24;
+}
+
+static double class_of_inner(const struct spl_inner_splat *splat)
+{
+    return splat->color_class >> 24;
+}
+
+static double uncertainty_of_point(const struct spl_points *points, size_t i)
+{
+    return (double)points->uncertainty[i];
+}
+
+static double uncertainty_of_inner(const struct spl_inner_splat *splat)
+{
+    return (double)splat->uncertainty;
+}
+
+static bool has_class(const struct spl_points *points)
+{
+    return points->has_class;
+}
+
+static bool has_surface(const struct spl_points *points)
+{
+    return !points->no_surface;
+}
+
+static const struct attribute {
+    bool (*has)(const struct spl_points *points);
+    double (*of_point)(const struct spl_points *points, size_t i);
+    double (*of_inner)(const struct spl_inner_splat *splat);
+} attributes[SPL_STREAM_KNOWN_COUNT] = {
+    [SPL_STREAM_CLASS] = {has_class, class_of_point, class_of_inner},
+    [SPL_STREAM_UNCERTAINTY] = {has_surface, uncertainty_of_point, uncertainty_of_inner},
+};
+
 struct emit {
     const struct spl_tree *tree;
     const struct spl_points *points;
@@ -35,6 +76,8 @@ struct emit {
     struct scratch *scratch;
     struct encoded *batch;
     struct spl_node *nodes;
+    const struct attribute *attributes[SPL_STREAM_KNOWN_COUNT]; /* of each stream of `out` */
+    const struct spl_emitted *out;
     size_t first; /* node of the batch's first element */
     atomic_bool failed;
 };
@@ -43,7 +86,6 @@ static void set_color(struct spl_splat *s, uint32_t color_class)
 {
     for (int c = 0; c < 3; c++)
         s->color[c] = color_class >> 8 * c & 255;
-    s->classification = color_class >> 24;
 }
 
 static void load_leaf(const struct spl_points *p, const struct spl_tree_node *node, uint32_t at, struct spl_splat *s,
@@ -56,7 +98,6 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
         s->normal[c] = p->normal[i][c];
     }
     s->radius = p->radius[i];
-    s->uncertainty = p->uncertainty[i];
     s->linear = p->linear && p->linear[i];
     for (int c = 0; p->clip && c < 3; c++)
         s->clip.direction[c] = (float)p->clip[i].direction[c] / 127;
@@ -73,7 +114,6 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
         s->normal[c] = from->normal[c];
     }
     s->radius = from->radius;
-    s->uncertainty = from->uncertainty;
     s->linear = from->linear;
     set_color(s, from->color_class);
 }
@@ -99,6 +139,22 @@ static void level_radii(struct spl_splat *splats, uint32_t count)
         sum += splats[i].radius;
     for (uint32_t i = 0; i < count; i++)
         splats[i].radius = (float)(sum / count);
+}
+
+/* The codes of a chunk's optional attributes, stream by stream; returns their words. */
+static uint32_t encode_streams(const struct emit *e, const struct spl_tree_node *node, const struct spl_cut *items,
+                               uint32_t count, struct spl_stream_code *codes, uint32_t *words)
+{
+    uint32_t used = 0;
+    for (uint32_t s = 0; s < e->out->stream_count; s++) {
+        double values[SPL_CHUNK_SPLATS];
+        for (uint32_t i = 0; i < count; i++)
+            values[i] = node->child_count ? e->attributes[s]->of_inner(&node->splats[items[i].index])
+                                          : e->attributes[s]->of_point(e->points, node->begin + items[i].index);
+        used += spl_stream_encode(spl_stream_type_from_name(e->out->streams[s].type), values, count, &codes[s],
+                                  words + used);
+    }
+    return used;
 }
 
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
@@ -129,7 +185,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
     spl_chunks_cut(w->items, count);
     out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
     out->chunks = spl_alloc_raw(out->chunk_count, sizeof *out->chunks, NULL);
-    if (!out->chunks)
+    out->codes = spl_alloc_raw(out->chunk_count, sizeof *out->codes, NULL);
+    if (!out->chunks || !out->codes)
         return false;
     for (uint32_t c = 0; c < out->chunk_count; c++) {
         struct spl_splat splats[SPL_CHUNK_SPLATS];
@@ -151,6 +208,7 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
+        out->word_count += encode_streams(e, node, w->items + first, used, out->codes[c], w->words + out->word_count);
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }
@@ -173,6 +231,44 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
     }
 }
 
+/* Room for `wanted` chunks and their streams' codes. */
+static int reserve(struct spl_emitted *out, size_t wanted, size_t *capacity, struct spl_error *err)
+{
+    if (wanted <= *capacity)
+        return SPL_OK;
+    wanted += *capacity;
+    void *chunks = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
+    if (!chunks)
+        return SPL_E_NOMEM;
+    out->chunks = chunks;
+    for (uint32_t s = 0; s < out->stream_count; s++) {
+        uint32_t *bases = spl_realloc(out->bases[s], wanted, sizeof *bases, err);
+        if (!bases)
+            return SPL_E_NOMEM;
+        out->bases[s] = bases;
+        uint8_t *widths = spl_realloc(out->widths[s], wanted, sizeof *widths, err);
+        if (!widths)
+            return SPL_E_NOMEM;
+        out->widths[s] = widths;
+    }
+    *capacity = wanted;
+    return SPL_OK;
+}
+
+static void keep_codes(const struct encoded *encoded, struct spl_emitted *out)
+{
+    for (uint32_t c = 0; c < encoded->chunk_count; c++)
+        for (uint32_t s = 0; s < out->stream_count; s++) {
+            struct spl_stream_code code = encoded->codes[c][s];
+            uint64_t words = spl_stream_words(code.width, encoded->chunks[c].count);
+            uint64_t bits = (uint64_t)code.width * encoded->chunks[c].count;
+            out->bases[s][out->chunk_count + c] = code.base;
+            out->widths[s][out->chunk_count + c] = code.width;
+            out->stream_bits[s] += bits;
+            out->bits[SPL_ATTRIBUTE_CHUNK] += 32 * words - bits + 8 * SPL_STREAM_CHUNK_BYTES;
+        }
+}
+
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
                       size_t *chunk_capacity, struct spl_emitted *out, struct spl_error *err)
 {
@@ -186,18 +282,13 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     if (from->depth > UINT8_MAX)
         return spl_fail(err, SPL_E_LIMIT, "more than %d levels; points lie closer together than the scan is wide by more"
                         " than floats can say", UINT8_MAX + 1);
-    if (out->chunk_count + encoded->chunk_count > *chunk_capacity) {
-        size_t wanted = *chunk_capacity * 2 + encoded->chunk_count;
-        void *bigger = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
-        if (!bigger)
-            return SPL_E_NOMEM;
-        out->chunks = bigger;
-        *chunk_capacity = wanted;
-    }
-    int rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
+    int rc = reserve(out, out->chunk_count + encoded->chunk_count, chunk_capacity, err);
+    if (!rc)
+        rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
                                          encoded->chunk_count, &node->page, err);
     if (rc)
         return rc;
+    keep_codes(encoded, out);
     memcpy(out->chunks + out->chunk_count, encoded->chunks, encoded->chunk_count * sizeof *out->chunks);
     for (int c = 0; c < 3; c++)
         node->origin[c] = from->origin[c];
@@ -246,7 +337,8 @@ static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *e
         struct scratch *w = &e->scratch[t];
         w->items = spl_alloc_raw(largest, sizeof *w->items, err);
         w->radii = spl_alloc_raw(largest, sizeof *w->radii, err);
-        w->words = spl_alloc_raw(chunks, SPL_CHUNK_WORDS_MAX * sizeof *w->words, err);
+        size_t words = SPL_CHUNK_WORDS_MAX + out->stream_count * SPL_STREAM_WORDS_MAX; /* of a chunk */
+        w->words = spl_alloc_raw(chunks, words * sizeof *w->words, err);
         if (!w->items || !w->radii || !w->words)
             return SPL_E_NOMEM;
     }
@@ -258,6 +350,7 @@ static void clear_batch(struct encoded *batch)
     for (size_t i = 0; i < batch_nodes; i++) {
         free(batch[i].words);
         free(batch[i].chunks);
+        free(batch[i].codes);
         batch[i] = (struct encoded){0};
     }
 }
@@ -265,11 +358,16 @@ static void clear_batch(struct encoded *batch)
 int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
              struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out, struct spl_error *err)
 {
-    struct emit e = {.tree = tree, .points = points, .options = options, .stage = stage};
+    struct emit e = {.tree = tree, .points = points, .options = options, .stage = stage, .out = out};
     size_t chunk_capacity = 0, splats = 0;
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
     spl_stage_begin(stage, "encoding", "splats", splats);
+    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++)
+        if (attributes[s].has(points)) {
+            e.attributes[out->stream_count] = &attributes[s];
+            out->streams[out->stream_count++] = spl_streams_known[s];
+        }
     int rc = allocate(&e, out, err);
     for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
         size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;
@@ -283,6 +381,11 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     if (!rc) {
         unite_boxes(out->nodes, tree->count);
         out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * sizeof *out->nodes * 8;
+        for (uint32_t s = 0; s < out->stream_count; s++) {
+            out->streams[s].base = out->bases[s];
+            out->streams[s].width = out->widths[s];
+        }
+        spl_dataset_writer_set_streams(writer, out->streams, out->stream_count);
         spl_stage_end(stage);
     }
     for (unsigned t = 0; e.scratch && t < stage->threads; t++) {
@@ -301,5 +404,9 @@ void spl_emitted_finish(struct spl_emitted *emitted)
 {
     free(emitted->nodes);
     free(emitted->chunks);
+    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
+        free(emitted->bases[s]);
+        free(emitted->widths[s]);
+    }
     *emitted = (struct spl_emitted){0};
 }

@@ -13,10 +13,15 @@ struct spl_emitted {
     uint32_t pages;
     uint64_t splats;
     uint64_t bits[SPL_ATTRIBUTE_COUNT];
+    struct spl_stream streams[SPL_STREAM_KNOWN_COUNT]; /* the attributes that the points have */
+    uint32_t stream_count;
+    uint64_t stream_bits[SPL_STREAM_KNOWN_COUNT];
+    uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk, what `streams` look at */
+    uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
     struct spl_chunk_error error; /* sums over all splats */
 };
 
-/* Encodes and writes every node, breadth first. On failure too, `out` is finished by the caller. */
+/* Encodes and writes every node, breadth first, and tells the writer of the streams, which `out` keeps. On failure too, `out` is finished by the caller. */
 int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
              struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out,
              struct spl_error *err);

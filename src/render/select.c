@@ -153,7 +153,7 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     }
     uint32_t clip = spl_clip_count(chunk) && !w->params->points
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
-                        : 0; // at most 157
+                        : 0; // at most 109
     uint32_t linear = 3u << SPL_GEOMETRY_LINEAR;
     struct spl_draw_chunk out = {
         .step = chunk->step,

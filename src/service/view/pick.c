@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "dataset/chunk.h"
 #include "dataset/dataset.h"
 
 /* The point at view depth `z` on the ray through the pick. */
@@ -29,9 +28,9 @@ static json_t *normal(const float *n)
 
 static json_t *classification(const struct spl_dataset *dataset, uint32_t id)
 {
-    struct spl_splat splat;
-    bool known = dataset && spl_dataset_get_info(dataset)->has_class && spl_dataset_find_splat(dataset, id, &splat);
-    return known ? json_integer(splat.classification) : json_null();
+    double value;
+    bool known = dataset && spl_dataset_find_value(dataset, spl_dataset_find_stream(dataset, "class"), id, &value);
+    return known ? json_integer((json_int_t)value) : json_null();
 }
 
 /* Members that nothing has a value for are null. */

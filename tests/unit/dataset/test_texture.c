@@ -298,6 +298,7 @@ static void same_splats(const struct spl_dataset *a, const struct spl_dataset *b
 {
     uint64_t splats = spl_dataset_get_info(a)->splats;
     assert_int_equal(splats, spl_dataset_get_info(b)->splats);
+    static const char *const names[] = {"class", "uncertainty"};
     for (uint32_t id = 0; id < splats; id++) {
         struct spl_splat x = {0}, y = {0};
         assert_true(spl_dataset_find_splat(a, id, &x) && spl_dataset_find_splat(b, id, &y));
@@ -306,7 +307,13 @@ static void same_splats(const struct spl_dataset *a, const struct spl_dataset *b
         assert_memory_equal(x.position, y.position, sizeof x.position);
         assert_memory_equal(x.normal, y.normal, sizeof x.normal);
         assert_memory_equal(x.color, y.color, sizeof x.color);
-        assert_true(x.radius == y.radius && x.uncertainty == y.uncertainty && x.classification == y.classification);
+        assert_true(x.radius == y.radius);
+        for (int i = 0; i < 2; i++) {
+            double p = -1, q = -2;
+            assert_true(spl_dataset_find_value(a, spl_dataset_find_stream(a, names[i]), id, &p));
+            assert_true(spl_dataset_find_value(b, spl_dataset_find_stream(b, names[i]), id, &q));
+            assert_true(p == q);
+        }
     }
 }
 

@@ -287,7 +287,7 @@ static void test_linear_and_bare_points(void **state)
         assert_true((run == 0) == (info->attribute_bits[SPL_ATTRIBUTE_CLIP] > 0)); // the field has borders
         if (options.points_only)
             assert_true(!info->has_uncertainty && info->attribute_bits[SPL_ATTRIBUTE_RADIUS] == 0 &&
-                        info->attribute_bits[SPL_ATTRIBUTE_UNCERTAINTY] == 0);
+                        info->stream_count == 0);
         assert_true(info->splat_radius > 0.05 && info->splat_radius < 0.2);
         uint64_t chunk_count;
         uint32_t inner = 0;
