@@ -12,7 +12,7 @@ layout(constant_id = 2) const uint WIDE = 0;
 
 #include "common/payload.glsl"
 
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
+layout(std430, binding = SPL_STORAGE_PLANES) writeonly buffer plane_buffer { uint planes[]; };
 
 void main()
 {

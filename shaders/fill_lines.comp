@@ -6,7 +6,7 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-SPL_TEXEL_BUFFER(SPL_TEXELS_CHUNKS) line_texels; /* struct spl_draw_line[] */
+SPL_TEXEL_BUFFER(SPL_TEXELS_LINES) line_texels; /* struct spl_draw_line[] */
 
 uint line_word(uint line, int word)
 {

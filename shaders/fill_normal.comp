@@ -9,8 +9,8 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint WIDE = 0;
 
-layout(std430, binding = SPL_BIND_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
-layout(std430, binding = SPL_BIND_ID) writeonly buffer id_buffer { uint payloads[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_STORAGE_IDS) writeonly buffer id_buffer { uint payloads[]; };
 
 void main()
 {

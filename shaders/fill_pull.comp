@@ -8,7 +8,7 @@ layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint FIRST = 0;
 layout(constant_id = 1) const uint WIDE = 0;
 
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
+layout(std430, binding = SPL_STORAGE_PLANES) writeonly buffer plane_buffer { uint planes[]; };
 
 /* The word of level 0. */
 uint first_word(uint depth)

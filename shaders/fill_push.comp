@@ -14,9 +14,9 @@ layout(constant_id = 2) const uint WIDE = 0;
 
 #include "common/payload.glsl"
 
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
-layout(std430, binding = SPL_BIND_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
-layout(std430, binding = SPL_BIND_ID) writeonly buffer id_buffer { uint payloads[]; };
+layout(std430, binding = SPL_STORAGE_PLANES) writeonly buffer plane_buffer { uint planes[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) writeonly buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_STORAGE_IDS) writeonly buffer id_buffer { uint payloads[]; };
 
 /* Of cell i, the cell above being the first; three against it outvote that one, so that edges are not its steps. */
 float vote_of(int i)

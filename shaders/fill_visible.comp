@@ -18,7 +18,7 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint ADAPTIVE = 1;
 
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer plane_buffer { uint planes[]; };
+layout(std430, binding = SPL_STORAGE_PLANES) writeonly buffer plane_buffer { uint planes[]; };
 
 /* What lies before a sample at depth z: of each sector the narrowest blocked cone, the square of its half angle's
  * cotangent in focal lengths, as a float's bits, whose maximum takes fewer instructions; 0 = none. Sectors are half

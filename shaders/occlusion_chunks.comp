@@ -7,9 +7,9 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-layout(std430, binding = SPL_BIND_BOUNDS) readonly buffer bounds_buffer { spl_chunk_bounds bounds[]; };
-layout(std430, binding = SPL_BIND_CHUNKS) buffer chunk_buffer { spl_draw_chunk draw_chunks[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_ID) tile_texels; /* SPL_BIND_TILES */
+layout(std430, binding = SPL_STORAGE_BOUNDS) readonly buffer bounds_buffer { spl_chunk_bounds bounds[]; };
+layout(std430, binding = SPL_STORAGE_CHUNKS) buffer chunk_buffer { spl_draw_chunk draw_chunks[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_OCCLUDERS) tile_texels;
 
 void main()
 {

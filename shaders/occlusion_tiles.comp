@@ -5,9 +5,10 @@
 #include "common/frame.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint WIDE = 0; /* 1: words of 64 bits, payload and depth */
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
-layout(std430, binding = SPL_BIND_TILES) writeonly buffer tile_buffer { uint tiles[]; };
+layout(std430, binding = SPL_STORAGE_OCCLUDERS) writeonly buffer tile_buffer { uint tiles[]; };
 
 void main()
 {
@@ -22,6 +23,6 @@ void main()
     uint greatest = 0u;
     for (uint y = first.y; y < end.y; y++)
         for (uint x = first.x; x < end.x; x++)
-            greatest = max(greatest, imageLoad(depth_texels, int(y * frame.width + x)).x);
+            greatest = max(greatest, imageLoad(depth_texels, int((y * frame.width + x) * (1u + WIDE) + WIDE)).x);
     tiles[tile] = greatest;
 }

@@ -1,6 +1,5 @@
-/* Resolve pass: sums or winners of the samples become one word a pixel of one layer (constant 0), for method splat
- * (constant 1 = 0) or points (1). A neighbour stands for a speck of method splat. A pixel is the box average of its
- * supersample^2 samples:
+/* Resolve pass: sums or winners of the samples (constant 1) become one word a pixel of one layer (constant 0). A
+ * neighbour stands for a speck between sums. A pixel is the box average of its supersample^2 samples:
  *   color     RGBA8, straight alpha over the background
  *   depth     float, mean over the samples within 1 % of the nearest one, so that an edge gives no depth in between
  *   range     the same along the ray
@@ -14,12 +13,12 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
-layout(constant_id = 1) const uint POINTS = 0;
+layout(constant_id = 1) const uint RESOLVED = SPL_RESOLVED_SUMS;
 
-SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics and method points payload, depth */
-SPL_TEXEL_BUFFER(SPL_TEXELS_ID) id_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics payload, depth of the nearest */
+SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) sums_texels;
-layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
+layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 
 uint depth_word(uint at)
 {
@@ -49,8 +48,8 @@ uvec4 load_sums(uint at)
 /* View depth of a covered sample. */
 float sample_depth(uint at)
 {
-    float first = uintBitsToFloat(depth_word(at));
-    if (POINTS != 0u)
+    float first = uintBitsToFloat(RESOLVED == SPL_RESOLVED_BENT ? payload(at) : depth_word(at));
+    if (RESOLVED != SPL_RESOLVED_SUMS)
         return first;
     uvec4 sum = load_sums(at);
     precise float offset = (float(sum.y) * 512.0 + float(sum.x)) / float(sum.w);
@@ -60,16 +59,21 @@ float sample_depth(uint at)
 
 vec3 sample_normal(uint at)
 {
-    if (POINTS != 0u)
+    if (RESOLVED != SPL_RESOLVED_SUMS)
         return unpack_normal(payload(at));
     uvec4 sum = load_sums(at);
     return normalize(vec3(sum.xyz) / float(sum.w) - 127.5);
 }
 
+uvec3 unpack_color(uint word)
+{
+    return (uvec3(word) >> uvec3(0u, 8u, 16u)) & 255u;
+}
+
 uvec3 sample_color(uint at)
 {
-    if (POINTS != 0u)
-        return (uvec3(payload(at)) >> uvec3(0u, 8u, 16u)) & 255u;
+    if (RESOLVED != SPL_RESOLVED_SUMS)
+        return unpack_color(payload(at));
     uvec4 sum = load_sums(at);
     return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
 }
@@ -86,7 +90,7 @@ uint sample_beside(ivec2 at, int i)
 uint standing_for(ivec2 at)
 {
     uint own = sample_index(at), found = own;
-    if (POINTS != 0u || depth_word(own) != SPL_NOTHING)
+    if (RESOLVED != SPL_RESOLVED_SUMS || depth_word(own) != SPL_NOTHING)
         return own;
     precise float sum = 0.0;
     float covered = 0.0, closest = 3.4e38;
@@ -109,10 +113,33 @@ uint standing_for(ivec2 at)
     return found;
 }
 
+/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. */
+uvec3 smooth_color(ivec2 at, uint own)
+{
+    float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
+    vec3 sum = vec3(0.0);
+    for (int i = 0;;) {
+        uint beside = sample_beside(at, i);
+        float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
+        float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
+        weight = abs(z - first) <= SPL_SMOOTH_SHARE * first ? weight : 0.0;
+        sum += weight * vec3(unpack_color(payload(beside)));
+        weights += weight;
+        if (++i >= 9)
+            break;
+    }
+    return uvec3(sum / weights + 0.5);
+}
+
 /* The i-th sample, row by row, of the pixel whose first is `corner`; a side is a power of two. */
+ivec2 pixel_place(ivec2 corner, uint i)
+{
+    return corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample));
+}
+
 uint pixel_sample(ivec2 corner, uint i)
 {
-    return standing_for(corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample)));
+    return standing_for(pixel_place(corner, i));
 }
 
 void main()
@@ -131,7 +158,7 @@ void main()
         if (bits != SPL_NOTHING) {
             covered++;
             if (LAYER == SPL_RESOLVE_COLOR)
-                color += sample_color(at);
+                color += RESOLVED == SPL_RESOLVED_BENT ? smooth_color(pixel_place(corner, i), at) : sample_color(at);
             if (LAYER == SPL_RESOLVE_NORMAL)
                 normal += sample_normal(at);
             if (LAYER == SPL_RESOLVE_ID && bits <= nearest)

@@ -1,11 +1,11 @@
 /* Proves at open that a device runs our kernels as we mean them: struct layout of shared.h, specialisation constants,
- * storage bindings 0..7, texel buffers, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c
+ * storage bindings, texel buffers, dispatch indices, integer atomics and IEEE single precision. gpu/selftest.c
  * checks every word.
  *
  * OUTPUT: constants 0..7, then each field of frame, then each field of chunks[1], in the order of shared.h.
- * DRAW[i] -> SUMS[i] = bits of float(DRAW[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of DRAW, [3] or of ~PAGE;
- * with 64-bit atomics DEPTH[0] = min over (DRAW[i] << 32 | i), as uint64_t. ID[i] = i, plus by how much texels differ
- * from PAGE, which lies SPL_BIND_PAGE times its size into its buffer. */
+ * ENTRIES[i] -> SUMS[i] = bits of float(ENTRIES[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of ENTRIES, [3] or of ~PAGE;
+ * with 64-bit atomics DEPTH[0] = min over (ENTRIES[i] << 32 | i), as uint64_t. IDS[i] = i, plus by how much texels differ
+ * from PAGE, which lies SPL_SELFTEST_PAGE times its size into its buffer. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -24,21 +24,21 @@ layout(constant_id = 5) const uint c5 = 0;
 layout(constant_id = 6) const uint c6 = 0;
 layout(constant_id = 7) const uint c7 = 0;
 
-layout(std430, binding = SPL_BIND_FRAME) readonly buffer Frame { spl_frame_params frame; };
-layout(std430, binding = SPL_BIND_DRAW) readonly buffer Draw { uint draw[]; };
-layout(std430, binding = SPL_BIND_CHUNKS) readonly buffer Chunks { spl_draw_chunk chunks[]; };
-layout(std430, binding = SPL_BIND_PAGE) readonly buffer Page { uint page[]; };
+layout(std430, binding = SPL_STORAGE_FRAME) readonly buffer Frame { spl_frame_params frame; };
+layout(std430, binding = SPL_STORAGE_ENTRIES) readonly buffer Draw { uint draw[]; };
+layout(std430, binding = SPL_STORAGE_CHUNKS) readonly buffer Chunks { spl_draw_chunk chunks[]; };
+layout(std430, binding = SPL_STORAGE_PAGE) readonly buffer Page { uint page[]; };
 #ifdef SPL_ATOMICS_64
-layout(std430, binding = SPL_BIND_DEPTH) buffer Depth { uint64_t depth[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) buffer Depth { uint64_t depth[]; };
 #else
-layout(std430, binding = SPL_BIND_DEPTH) buffer Depth { uint depth[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) buffer Depth { uint depth[]; };
 #endif
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer Sums { uint sums[]; };
-layout(std430, binding = SPL_BIND_OUTPUT) writeonly buffer Output { uint words[]; };
-layout(std430, binding = SPL_BIND_ID) writeonly buffer Id { uint ids[]; };
+layout(std430, binding = SPL_STORAGE_SUMS) writeonly buffer Sums { uint sums[]; };
+layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer Output { uint words[]; };
+layout(std430, binding = SPL_STORAGE_IDS) writeonly buffer Id { uint ids[]; };
 
-layout(binding = SPL_TEXELS(SPL_TEXELS_PAGE), r32ui) uniform readonly uimageBuffer page_texels;
-layout(binding = SPL_TEXELS(SPL_TEXELS_CHUNKS), r32ui) uniform readonly uimageBuffer chunk_texels;
+layout(binding = SPL_TEXELS_PAGE, r32ui) uniform readonly uimageBuffer page_texels;
+layout(binding = SPL_TEXELS_CHUNKS, r32ui) uniform readonly uimageBuffer chunk_texels;
 
 uint at = 0;
 
@@ -106,7 +106,7 @@ void main()
         return;
     precise float f = float(draw[i]) * 0.5 + 0.25;
     sums[i] = floatBitsToUint(f);
-    int texel = SPL_BIND_PAGE * page.length() + int(i);
+    int texel = SPL_SELFTEST_PAGE * page.length() + int(i);
     uint page_differs = imageLoad(page_texels, texel).x - page[i], chunks_differ = imageLoad(chunk_texels, texel).x - page[i];
     ids[i] = i + page_differs + chunks_differ;
 #ifdef SPL_ATOMICS_64

@@ -27,42 +27,8 @@
 #define SPL_LANES 8
 #define SPL_WORKGROUP 64
 
-/* Every binding is a std430 storage buffer (a uniform block would pad arrays to 16 bytes an element); one numbering
- * serves Vulkan (set 0) and OpenGL. */
-#define SPL_BIND_FRAME 0   /* struct spl_frame_params */
-#define SPL_BIND_DRAW 1    /* uint[], draw-list entries of this dispatch's page, front to back */
-#define SPL_BIND_CHUNKS 2  /* struct spl_draw_chunk[] */
-#define SPL_BIND_PAGE 3    /* uint[], one page of the dataset as it lies in the file */
-#define SPL_BIND_DEPTH 4   /* uint[] or uint64[], one per sample */
-#define SPL_BIND_SUMS 5    /* uint[], four words a sample, see splat_shade.comp */
-#define SPL_BIND_OUTPUT 6  /* uint[], requested layers one after the other, one word a pixel */
-#define SPL_BIND_ID 7      /* uint[], id of the nearest splat, one per sample */
-#define SPL_BIND_COUNT 8
-/* The occlusion kernels use two of them otherwise, the lines of wires one, and so does the shade pass of splats with
- * textures. */
-#define SPL_BIND_BOUNDS SPL_BIND_DRAW  /* struct spl_chunk_bounds[], parallel to the chunks */
-#define SPL_BIND_LINES SPL_BIND_CHUNKS /* struct spl_draw_line[] */
-#define SPL_BIND_TILES SPL_BIND_ID     /* uint[], greatest depth word of every tile */
-#define SPL_BIND_TEXTURES SPL_BIND_OUTPUT /* uint[], one page's section TEXP as it lies in the file */
-#define SPL_BIND_ATOMS SPL_BIND_ID     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
-#define SPL_BIND_SUMMED SPL_BIND_ID    /* uint[], sums of atoms, texels as in the dictionary; written as SPL_BIND_SUMS */
-
-/* Some of them a second time, as texel buffers of words (image buffers, r32ui), whole and from their start: a software
- * driver gathers texels for all lanes in one instruction, but reads storage buffers in a loop over the lanes. Vulkan
- * numbers them behind the storage buffers, OpenGL as image units, of which it may have eight. */
-#define SPL_TEXELS_PAGE 0   /* SPL_BIND_PAGE */
-#define SPL_TEXELS_DEPTH 1  /* SPL_BIND_DEPTH */
-#define SPL_TEXELS_CHUNKS 2 /* SPL_BIND_CHUNKS, SPL_CHUNK_WORDS each */
-#define SPL_TEXELS_TEXTURES 3 /* SPL_BIND_TEXTURES */
-#define SPL_TEXELS_ATOMS 4  /* SPL_BIND_ATOMS */
-#define SPL_TEXELS_ID SPL_TEXELS_ATOMS /* SPL_BIND_ID, _TILES and _SUMMED, the same binding */
-#define SPL_TEXELS_SUMS 5   /* SPL_BIND_SUMS */
-#define SPL_TEXELS_COUNT 6
-#ifdef VULKAN
-#define SPL_TEXELS(index) (SPL_BIND_COUNT + index)
-#else
-#define SPL_TEXELS(index) index
-#endif
+/* The self-test's page lies this many times its own size into its buffer. */
+#define SPL_SELFTEST_PAGE 3
 
 /* What the shade pass sums up, and method points keeps as payload: one run per group of layers. */
 #define SPL_SUMS_COLOR 0
@@ -78,6 +44,13 @@
 #define SPL_RESOLVE_NORMAL 3
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
+
+/* What the resolve pass finds in a sample. */
+#define SPL_RESOLVED_SUMS 0    /* sums over fragments, as the shade pass leaves them */
+#define SPL_RESOLVED_NEAREST 1 /* the nearest one's depth and payload */
+#define SPL_RESOLVED_BENT 2    /* the same, but the depth only orders: that of layers is the payload; colours are smoothed */
+/* Samples of one surface that are smoothed differ in depth by this share at most. */
+#define SPL_SMOOTH_SHARE 0.01f
 
 /* A splat covers the samples within this many sample sizes of its centre, however small it is: half a sample's
  * diagonal, so that any centre covers one, and a thousandth more, for a centre in the corner between four and what

@@ -5,7 +5,7 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) coherent buffer depth_buffer { uint depth[]; };
 coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
 void draw(splat_run run, splat s)

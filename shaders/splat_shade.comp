@@ -6,7 +6,7 @@
  *   normal  x y z w         of w * (127 n + 127.5)
  *   id      least dataset index among the discs that set the depth, in the id buffer
  * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture
- * there. */
+ * there; with SPL_SUMMED too, interpolated in the sums that splat_sum.comp made. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -24,7 +24,7 @@ layout(local_size_x = SPL_WORKGROUP) in;
 const uint GROUP = SPL_SUMS_COLOR;
 #else
 layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
-layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint ids[]; };
+layout(std430, binding = SPL_STORAGE_IDS) buffer id_buffer { uint ids[]; };
 #endif
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
@@ -32,13 +32,13 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 /* a and b are added to words 2 pair and 2 pair + 1; neither can wrap (frame.weight_max), so one wide add serves
  * both. */
 #ifdef SPL_ATOMICS_64
-layout(std430, binding = SPL_BIND_SUMS) buffer sums_buffer { uint64_t sums[]; };
+layout(std430, binding = SPL_STORAGE_SUMS) buffer sums_buffer { uint64_t sums[]; };
 void add(uint pair, uint a, uint b)
 {
     atomicAdd(sums[pair], uint64_t(a) | uint64_t(b) << 32);
 }
 #else
-layout(std430, binding = SPL_BIND_SUMS) buffer sums_buffer { uint sums[]; };
+layout(std430, binding = SPL_STORAGE_SUMS) buffer sums_buffer { uint sums[]; };
 void add(uint pair, uint a, uint b)
 {
     if (a != 0u)

@@ -10,7 +10,7 @@
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-layout(std430, binding = SPL_BIND_SUMS) writeonly buffer summed_buffer { uint summed[]; };
+layout(std430, binding = SPL_STORAGE_SUMMED) writeonly buffer summed_buffer { uint summed[]; };
 
 /* Writes every `lanes`-th of the texels [at, end). */
 void write_sums(splat_texture t, uint at, uint end, uint lanes, uint to, uint atoms)

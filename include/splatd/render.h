@@ -10,28 +10,9 @@
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 #include <splatd/image.h>
+#include <splatd/method.h>
 
 struct spl_renderer;
-
-enum spl_method {
-    SPL_METHOD_SPLAT,   /* oriented discs, blended within a margin behind the first surface; specks closed */
-    SPL_METHOD_POINTS,  /* one pixel each */
-    SPL_METHOD_FILL,    /* one pixel each, hidden ones removed and holes filled in screen space */
-    SPL_METHOD_COUNT
-};
-const char *spl_method_name(enum spl_method method);
-int spl_method_from_name(const char *name);  /* -1 for an unknown name */
-bool spl_method_has_textures(enum spl_method method); /* draws them where there are any; else their mean colours */
-
-/* Method fill: which points are removed as hidden, and how holes are found. */
-enum spl_visibility {
-    SPL_VISIBILITY_ADAPTIVE, /* as far as the points lie apart on the image, in proportion to inverse depth */
-    SPL_VISIBILITY_CONSTANT, /* as far as the kernel everywhere, every pixel of it: the earlier work, slow */
-    SPL_VISIBILITY_NONE,     /* no point is removed; holes as adaptive finds them */
-    SPL_VISIBILITY_COUNT
-};
-const char *spl_visibility_name(enum spl_visibility visibility);
-int spl_visibility_from_name(const char *name); /* -1 for an unknown name */
 
 struct spl_view {
     struct spl_camera camera;
@@ -41,18 +22,19 @@ struct spl_view {
     double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size and
                                    enlarged */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
-    uint32_t atoms;             /* of a splat's texture that are drawn at most, 0..8; 0 = its mean colour */
-    enum spl_visibility visibility; /* method fill, as the next three */
-    double kernel;              /* side of the visibility kernel where it is largest, pixels: 3 to 129; 0 = from the
-                                   points' spacing on the image */
-    double threshold;           /* share of the eight sectors that must be open where a point is visible, 0..1 */
-    uint32_t pyramid;           /* levels of the pyramid that holes are filled from, 1..8; 0 = from the kernel */
-    double margin;              /* blend margin, multiple of the splat radius, 0..16 */
+    struct spl_disc_params disc; /* of methods that draw discs, as SPL_METHOD_PARAMS says */
+    struct spl_fill_params fill; /* of those that fill */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
-/* Fills everything but the camera with defaults: splat, color, lod 1, supersample 1, all atoms, opaque black. */
+/* Fills everything but the camera with defaults: the first method, color, lod 1, supersample 1, opaque black, and each
+ * method's parameters as their table says. */
 void spl_view_init(struct spl_view *view);
+
+/* A method's parameter by its place in the table; whole numbers and choices as doubles (what is none becomes one that
+ * spl_view_check() refuses). */
+double spl_view_get_param(const struct spl_view *view, enum spl_method_param param);
+void spl_view_set_param(struct spl_view *view, enum spl_method_param param, double value);
 
 /* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is the
  * pixels, which are enlarged, encoded and sent all the same. */
@@ -136,9 +118,8 @@ struct spl_residency_info {
 void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                                 struct spl_residency_info *info);
 
-/* Renders one frame; blocks at most until the view's deadline. A dataset without surface is drawn by method fill where
- * splat is asked for; its normals are the filled depth's, and SPL_E_INPUT (field "layer") refuses them of points. On
- * success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
+/* Renders one frame; blocks at most until the view's deadline. A dataset without surface is drawn by what stands in for
+ * a method that needs one; where that finds no normals SPL_E_INPUT (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
  * destroy it and make a new one. */
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err);

@@ -10,8 +10,8 @@
 #include "common/frame.glsl"
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_ID) id_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) plane_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_PLANES) plane_texels;
 
 #define SPACING_MASK ((1u << SPL_FILL_SPACING_BITS) - 1u)
 

@@ -4,7 +4,7 @@
 
 #include "shared.h"
 
-layout(std430, binding = SPL_BIND_FRAME) readonly buffer frame_buffer { spl_frame_params frame_in_memory; };
+layout(std430, binding = SPL_STORAGE_FRAME) readonly buffer frame_buffer { spl_frame_params frame_in_memory; };
 
 /* A copy in registers: software drivers load once for all lanes only where no lane can be off, else lane by lane. So
  * every main() begins with load_frame(), and nothing reads the parameters from memory in a loop or behind a branch. */
@@ -15,8 +15,9 @@ void load_frame()
     frame = frame_in_memory;
 }
 
-/* Words of a buffer as texels. */
-#define SPL_TEXEL_BUFFER(index) layout(binding = SPL_TEXELS(index), r32ui) uniform readonly uimageBuffer
+/* Words of a buffer as texels, under a number SPL_TEXELS_…; these and the SPL_STORAGE_… come from the kernel's row in
+ * shaders/meson.build. */
+#define SPL_TEXEL_BUFFER(number) layout(binding = number, r32ui) uniform readonly uimageBuffer
 
 /* The buffers' dimension in samples is frame.width x frame.height. */
 uint sample_index(ivec2 at)

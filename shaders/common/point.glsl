@@ -13,10 +13,10 @@ layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
 layout(constant_id = 1) const uint PASS = 0;
 
 #ifdef SPL_ATOMICS_64
-layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint64_t depth[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) coherent buffer depth_buffer { uint64_t depth[]; };
 #else
-layout(std430, binding = SPL_BIND_DEPTH) coherent buffer depth_buffer { uint depth[]; };
-layout(std430, binding = SPL_BIND_ID) buffer id_buffer { uint payloads[]; };
+layout(std430, binding = SPL_STORAGE_DEPTH) coherent buffer depth_buffer { uint depth[]; };
+layout(std430, binding = SPL_STORAGE_IDS) buffer id_buffer { uint payloads[]; };
 #endif
 
 coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* what is read may be old, never too near */

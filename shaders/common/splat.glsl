@@ -4,7 +4,7 @@
 
 #include "common/frame.glsl"
 
-layout(std430, binding = SPL_BIND_DRAW) readonly buffer draw_buffer { uint draw_entries[]; };
+layout(std430, binding = SPL_STORAGE_ENTRIES) readonly buffer draw_buffer { uint draw_entries[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_CHUNKS) chunk_texels; /* struct spl_draw_chunk[] */
 SPL_TEXEL_BUFFER(SPL_TEXELS_PAGE) page_texels;
 

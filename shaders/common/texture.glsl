@@ -1,16 +1,21 @@
 /* A splat's texture: the sum of PLANES atoms at most, read from the codes of src/dataset/texture.c and the dictionary
  * of src/dataset/dictionary.h. The level is the splat's: its texels are half a sample to a sample wide, and the nearest
  * one counts; it has 8 bits a channel. In chunks whose finest are wider than a sample they are interpolated, from the
- * sums that splat_sum.comp made of them: another kernel, because software drivers run both sides of a branch. */
+ * sums that splat_sum.comp made of them: another kernel (SPL_SUMMED), because software drivers run both sides of a
+ * branch. */
 #ifndef SPL_TEXTURE_GLSL
 #define SPL_TEXTURE_GLSL
 
 #include "common/clip.glsl"
 
-layout(constant_id = 0) const uint PLANES = 1; /* 0: sums are interpolated */
-
-SPL_TEXEL_BUFFER(SPL_TEXELS_TEXTURES) texture_texels;
+#ifdef SPL_SUMMED
+const uint PLANES = 0; /* sums are interpolated */
+SPL_TEXEL_BUFFER(SPL_TEXELS_SUMMED) atom_texels; /* of the same form */
+#else
+layout(constant_id = 0) const uint PLANES = 1;
 SPL_TEXEL_BUFFER(SPL_TEXELS_ATOMS) atom_texels;
+#endif
+SPL_TEXEL_BUFFER(SPL_TEXELS_TEXTURES) texture_texels;
 
 uint texture_word(uint at)
 {

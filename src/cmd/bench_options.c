@@ -11,6 +11,7 @@
 #include "shared.h"
 
 enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
+_Static_assert((int)SPL_METHOD_COUNT <= (int)LIST_MAX, "all methods fit the list");
 
 /* Splits `text` at commas, in place, and hands each piece to `take`. */
 static int each(const char *option, char *text,
@@ -38,8 +39,7 @@ static int take_method(struct spl_cmd_bench_arguments *a, const char *text, stru
 {
     int method = spl_method_from_name(text);
     if (method < 0)
-        return spl_fail(err, SPL_E_USAGE, "--method takes %s, %s or %s, not '%s'", spl_method_name(SPL_METHOD_SPLAT),
-                        spl_method_name(SPL_METHOD_POINTS), spl_method_name(SPL_METHOD_FILL), text);
+        return spl_fail(err, SPL_E_USAGE, "--method takes %s, not '%s'", spl_method_names(), text);
     a->methods[a->bench.method_count++] = (enum spl_method)method;
     return 0;
 }
@@ -171,9 +171,8 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
         return spl_fail(err, SPL_E_USAGE, "--json is for the table of frame times; with -o there is OUT/bench.json");
     if (a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF && (!a->views || a->set))
         return spl_fail(err, SPL_E_USAGE, "a reference is of views that have names: give them with --views");
-    if (!a->listed[0]) {
-        a->methods[1] = SPL_METHOD_POINTS;
-        a->methods[2] = SPL_METHOD_FILL;
+    for (int i = 0; i < SPL_METHOD_COUNT && !a->listed[0]; i++) {
+        a->methods[i] = (enum spl_method)i;
         a->bench.method_count = SPL_METHOD_COUNT;
     }
     if (!a->listed[1]) {
@@ -236,7 +235,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
         {NULL, 0, NULL, 0},
     };
     a->devices[0] = "auto";
-    a->methods[0] = SPL_METHOD_SPLAT;
+    a->methods[0] = SPL_METHOD_DEFAULT;
     a->lods[0] = 1;
     a->bench = (struct spl_bench_options){
         .datasets = a->datasets,

@@ -1,8 +1,10 @@
 /* Options mean what the HTTP parameters of the same name mean. One thread. */
 #include "cmd/drawing.h"
 
+#include <math.h>
+#include <string.h>
+
 #include "cmd/options.h"
-#include "shared.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -20,11 +22,40 @@ static int parse_name(const char *command, const char *option, const char *text,
                     : SPL_OK;
 }
 
+static int parse_param(struct spl_view *view, const char *command, enum spl_method_param param, const char *text,
+                       struct spl_error *err)
+{
+    const struct spl_method_param_info *info = spl_method_param_get(param);
+    char option[64];
+    int rc, choice = 0;
+    double value = 0;
+    uint64_t count = 0;
+    snprintf(option, sizeof option, "--%s", info->name);
+    switch (info->kind) {
+    case SPL_PARAM_CHOICE:
+        rc = parse_name(command, option, text, info->choice_from_name, &choice, err);
+        value = choice;
+        break;
+    case SPL_PARAM_WHOLE:
+        rc = spl_cmd_parse_count(option, text, (uint64_t)info->least, (uint64_t)info->most, &count, err);
+        value = (double)count;
+        break;
+    default:
+        rc = spl_cmd_parse_real(option, text, fmin(info->least, info->otherwise), info->most, &value, err);
+        rc = rc ? rc : spl_method_param_check(info, value, err);
+    }
+    if (!rc)
+        spl_view_set_param(view, param, value);
+    return rc;
+}
+
 int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id, const char *text,
                           struct spl_error *err)
 {
     int rc = SPL_OK, choice = 0;
     uint64_t count = 0;
+    if (id >= SPL_CMD_PARAM && id < SPL_CMD_OWN)
+        return parse_param(&d->view, command, (enum spl_method_param)(id - SPL_CMD_PARAM), text, err);
     switch (id) {
     case SPL_CMD_SIZE:
         return spl_cmd_parse_size("--size", text, &d->width, &d->height, err);
@@ -42,24 +73,6 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
         return spl_cmd_parse_real("--supersample", text, 0.25, 4, &d->view.supersample, err);
     case SPL_CMD_BACKGROUND:
         return spl_cmd_parse_color("--background", text, d->view.background, err);
-    case SPL_CMD_MARGIN:
-        return spl_cmd_parse_real("--margin", text, 0, 16, &d->view.margin, err);
-    case SPL_CMD_VISIBILITY:
-        rc = parse_name(command, "--visibility", text, spl_visibility_from_name, &choice, err);
-        d->view.visibility = (enum spl_visibility)choice;
-        return rc;
-    case SPL_CMD_KERNEL:
-        return spl_cmd_parse_real("--kernel", text, 0, 129, &d->view.kernel, err);
-    case SPL_CMD_THRESHOLD:
-        return spl_cmd_parse_real("--threshold", text, 0, 1, &d->view.threshold, err);
-    case SPL_CMD_PYRAMID:
-        rc = spl_cmd_parse_count("--pyramid", text, 0, SPL_FILL_LEVELS_MAX, &count, err);
-        d->view.pyramid = (uint32_t)count;
-        return rc;
-    case SPL_CMD_ATOMS:
-        rc = spl_cmd_parse_count("--atoms", text, 0, SPL_TEXTURE_ATOMS, &count, err);
-        d->view.atoms = (uint32_t)count;
-        return rc;
     case SPL_CMD_FORMAT:
         return parse_name(command, "--format", text, spl_format_from_name, &d->format, err);
     case SPL_CMD_QUALITY:
@@ -82,5 +95,53 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
     default: /* 'o' */
         d->output = text;
         return SPL_OK;
+    }
+}
+
+/* `text` behind column `column`, broken between words; `used` columns of the first line are taken. */
+static void print_wrapped(FILE *out, int used, int column, const char *text)
+{
+    enum { columns = 118 };
+    fprintf(out, "%*s", used < column ? column - used : 1, "");
+    used = used < column ? column : used + 1;
+    for (const char *word = text; *word;) {
+        int length = (int)strcspn(word, " ");
+        if (used + length > columns && used > column) {
+            fprintf(out, "\n%*s", column, "");
+            used = column;
+        }
+        used += fprintf(out, "%.*s%s", length, word, word[length] ? " " : "");
+        word += length + (word[length] == ' ');
+    }
+    fprintf(out, "\n");
+}
+
+static void print_param(FILE *out, enum spl_method_param param)
+{
+    const struct spl_method_param_info *info = spl_method_param_get(param);
+    char range[256] = "", text[768];
+    int used = 0;
+    if (info->kind == SPL_PARAM_CHOICE)
+        for (int i = 0; i <= (int)info->most && used < (int)sizeof range; i++)
+            used += snprintf(range + used, sizeof range - (size_t)used, "%s%s", i ? ", " : "", info->choice_name(i));
+    else
+        snprintf(range, sizeof range, "%g to %g", info->least, info->most);
+    if (info->kind == SPL_PARAM_CHOICE)
+        snprintf(text, sizeof text, "%s: %s (%s)", range, info->help, info->choice_name((int)info->otherwise));
+    else
+        snprintf(text, sizeof text, "%s; %s (%g)", info->help, range, info->otherwise);
+    used = fprintf(out, "    --%s %s", info->name, info->kind == SPL_PARAM_CHOICE ? "NAME" : info->kind == SPL_PARAM_WHOLE ? "N" : "X");
+    print_wrapped(out, used, 27, text);
+}
+
+void spl_cmd_drawing_help(FILE *out)
+{
+    fprintf(out, "Methods, and what each takes:\n");
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        const struct spl_method_info *info = spl_method_get((enum spl_method)method);
+        print_wrapped(out, fprintf(out, "  --method %s", info->name), 27, info->help);
+        for (int i = 0; i < SPL_PARAM_COUNT; i++)
+            if (info->params >> i & 1)
+                print_param(out, (enum spl_method_param)i);
     }
 }

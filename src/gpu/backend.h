@@ -11,6 +11,15 @@
 /* Submissions that may be in flight, the one being recorded included. */
 enum { SPL_GPU_SLOTS = 2 };
 
+enum { SPL_GPU_BOUND_MAX = 8 }; /* of either kind: OpenGL may have as many image units */
+
+/* What a kernel binds as one kind: the resource of each number. */
+struct spl_gpu_bound {
+    uint32_t count;
+    uint32_t optional; /* bit per number: may stay unbound */
+    uint8_t resource[SPL_GPU_BOUND_MAX]; /* enum spl_resource */
+};
+
 /* One embedded kernel. */
 struct spl_gpu_code {
     const char *name;
@@ -18,8 +27,11 @@ struct spl_gpu_code {
     size_t vulkan_bytes;
     const uint32_t *opengl; /* NULL: Vulkan only */
     size_t opengl_bytes;
+    struct spl_gpu_bound storages, texels; /* Vulkan numbers texels behind the storages */
 };
 const struct spl_gpu_code *spl_gpu_code_find(const char *name); /* NULL for an unknown name */
+/* Does the code bind nothing but what its row of shaders/meson.build says? */
+bool spl_gpu_code_is_as_declared(const struct spl_gpu_code *code);
 
 struct spl_gpu_buffer {
     struct spl_gpu *gpu;
@@ -30,6 +42,13 @@ struct spl_gpu_buffer {
 
 struct spl_gpu_kernel {
     struct spl_gpu *gpu;
+    const struct spl_gpu_code *code;
+};
+
+/* A dispatch as its kernel numbers what it binds: nothing is missing. */
+struct spl_gpu_arguments {
+    struct spl_gpu_binding storage[SPL_GPU_BOUND_MAX];
+    struct spl_gpu_buffer *texels[SPL_GPU_BOUND_MAX]; /* whole */
 };
 
 struct spl_gpu_backend;
@@ -61,10 +80,11 @@ struct spl_gpu_backend {
                          size_t constant_count, struct spl_gpu_kernel **out, struct spl_error *err);
     void (*kernel_destroy)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel);
 
-    /* The slot's previous submission has ended. Bindings have their bytes filled in; buffer NULL = unused. */
+    /* The slot's previous submission has ended. */
     int (*begin)(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
-    void (*dispatch)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                     uint32_t workgroups);
+    /* `counts`: as of spl_gpu_dispatch_indirect(), NULL: `workgroups`. */
+    void (*dispatch)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
+                     uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
     void (*barrier)(struct spl_gpu *gpu);
     void (*copy)(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
                  uint64_t to_offset, uint64_t bytes);
@@ -76,11 +96,6 @@ struct spl_gpu_backend {
     int (*wait)(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err);
     void (*read_timestamps)(struct spl_gpu *gpu, uint64_t ticket); /* of an ended submission */
 };
-
-/* The binding that each texel buffer of a dispatch shows. */
-static const uint8_t spl_gpu_texels_of[SPL_TEXELS_COUNT] = {
-    [SPL_TEXELS_PAGE] = SPL_BIND_PAGE, [SPL_TEXELS_DEPTH] = SPL_BIND_DEPTH, [SPL_TEXELS_CHUNKS] = SPL_BIND_CHUNKS,
-    [SPL_TEXELS_TEXTURES] = SPL_BIND_TEXTURES, [SPL_TEXELS_ATOMS] = SPL_BIND_ATOMS, [SPL_TEXELS_SUMS] = SPL_BIND_SUMS};
 
 extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;
 

@@ -129,12 +129,14 @@ int spl_gpu_kernel_create(struct spl_gpu *gpu, const char *name, const uint32_t 
     const struct spl_gpu_code *code = spl_gpu_code_find(name);
     if (!code)
         return spl_fail(err, SPL_E_NOT_FOUND, "no kernel '%s' is built in", name);
+    spl_assert(spl_gpu_code_is_as_declared(code));
     if (gpu->lost)
         return lost(gpu, err);
     int result = gpu->backend->kernel_create(gpu, code, constants, constant_count, out, err);
     if (result < 0)
         return result;
     (*out)->gpu = gpu;
+    (*out)->code = code;
     gpu->kernels++;
     return 0;
 }
@@ -182,23 +184,51 @@ static void check_range(const struct spl_gpu *gpu, const struct spl_gpu_buffer *
     spl_assert(buffer->gpu == gpu && offset <= buffer->bytes && bytes <= buffer->bytes - offset);
 }
 
-void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                      const struct spl_gpu_binding bindings[SPL_BIND_COUNT], uint32_t workgroups)
+/* What number `i` of `bound` sees. What may stay unbound sees the first storage buffer then: no kernel touches it. */
+static struct spl_gpu_binding check_binding(const struct spl_gpu *gpu, const struct spl_gpu_code *code,
+                                            const struct spl_gpu_bound *bound, uint32_t i,
+                                            const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT])
 {
-    spl_assert(gpu->recording && kernel->gpu == gpu && workgroups <= gpu->limits.workgroups);
-    struct spl_gpu_binding checked[SPL_BIND_COUNT];
-    for (size_t i = 0; i < SPL_BIND_COUNT; i++) {
-        checked[i] = bindings[i];
-        if (!checked[i].buffer)
-            continue;
-        spl_assert(checked[i].offset % 256 == 0 && checked[i].offset < checked[i].buffer->bytes);
-        if (!checked[i].bytes)
-            checked[i].bytes = checked[i].buffer->bytes - checked[i].offset;
-        check_range(gpu, checked[i].buffer, checked[i].offset, checked[i].bytes);
-        spl_assert(checked[i].bytes <= gpu->limits.binding_bytes && checked[i].bytes % 4 == 0);
-    }
+    struct spl_gpu_binding checked = bindings[bound->resource[i]];
+    if (!checked.buffer && bound->optional >> i & 1)
+        checked = bindings[code->storages.resource[0]];
+    spl_assert(checked.buffer && checked.offset % 256 == 0 && checked.offset < checked.buffer->bytes);
+    if (!checked.bytes)
+        checked.bytes = checked.buffer->bytes - checked.offset;
+    check_range(gpu, checked.buffer, checked.offset, checked.bytes);
+    spl_assert(checked.bytes <= gpu->limits.binding_bytes && checked.bytes % 4 == 0);
+    return checked;
+}
+
+static void check_bindings(const struct spl_gpu *gpu, const struct spl_gpu_kernel *kernel,
+                           const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], struct spl_gpu_arguments *out)
+{
+    spl_assert(gpu->recording && kernel->gpu == gpu);
+    for (uint32_t i = 0; i < kernel->code->storages.count; i++)
+        out->storage[i] = check_binding(gpu, kernel->code, &kernel->code->storages, i, bindings);
+    for (uint32_t i = 0; i < kernel->code->texels.count; i++)
+        out->texels[i] = check_binding(gpu, kernel->code, &kernel->code->texels, i, bindings).buffer;
+}
+
+void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
+                      const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t workgroups)
+{
+    struct spl_gpu_arguments arguments;
+    check_bindings(gpu, kernel, bindings, &arguments);
+    spl_assert(workgroups <= gpu->limits.workgroups);
     if (workgroups)
-        gpu->backend->dispatch(gpu, kernel, checked, workgroups);
+        gpu->backend->dispatch(gpu, kernel, &arguments, workgroups, NULL, 0);
+}
+
+void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
+                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT],
+                               struct spl_gpu_buffer *counts, uint64_t offset)
+{
+    struct spl_gpu_arguments arguments;
+    check_bindings(gpu, kernel, bindings, &arguments);
+    spl_assert(offset % 4 == 0);
+    check_range(gpu, counts, offset, 3 * sizeof(uint32_t));
+    gpu->backend->dispatch(gpu, kernel, &arguments, 0, counts, offset);
 }
 
 void spl_gpu_barrier(struct spl_gpu *gpu)

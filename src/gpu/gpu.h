@@ -14,7 +14,7 @@
 #include <splatd/render.h> /* struct spl_device_info */
 
 #include "base/error.h"
-#include "shared.h" /* SPL_BIND_COUNT */
+#include "gpu/resources.h"
 
 struct spl_gpu;
 struct spl_gpu_buffer;
@@ -77,7 +77,7 @@ int spl_gpu_kernel_create(struct spl_gpu *gpu, const char *name, const uint32_t 
                           struct spl_gpu_kernel **out, struct spl_error *err);
 void spl_gpu_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel); /* NULL-safe */
 
-/* What a dispatch sees: slot i is binding i of shared.h; buffer NULL = unused. */
+/* What a dispatch sees of a resource; buffer NULL = nothing. */
 struct spl_gpu_binding {
     struct spl_gpu_buffer *buffer;
     uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
@@ -86,8 +86,14 @@ struct spl_gpu_binding {
 /* Recording. One list at a time: begin … submit. Lists run in order, each seeing all that the one before wrote. Errors
  * of recording (bad ranges are our bugs: assertions) surface at submit. */
 int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
+/* Runs `kernel` over what it binds of `bindings`; the others are ignored. */
 void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                      const struct spl_gpu_binding bindings[SPL_BIND_COUNT], uint32_t workgroups);
+                      const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t workgroups);
+/* The same with the number of workgroups in three words (x, y, z; at most limits.workgroups in x, 1 in y and z: the
+ * caller's kernel that wrote them keeps to that) at `offset`, a multiple of 4, of `counts`. */
+void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
+                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT],
+                               struct spl_gpu_buffer *counts, uint64_t offset);
 void spl_gpu_barrier(struct spl_gpu *gpu);   /* everything before is visible to everything after (and to the host) */
 void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
                   uint64_t to_offset, uint64_t bytes);

@@ -1,4 +1,4 @@
-/* The self-test at open: a small kernel touches every binding, every field of the shared structs, every specialisation
+/* The self-test at open: a small kernel touches storage buffers and texels, every field of the shared structs, every specialisation
  * constant and each kind of atomic that our kernels use, and each word it writes is compared with what C says. A driver
  * that miscompiles or lays out differently is refused here, with the first wrong word, instead of rendering nonsense.
  */
@@ -8,15 +8,23 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "shared.h"
+
+/* The kernel's storage buffers in the order of their numbers; the first four are read. */
+enum place { FRAME, ENTRIES, CHUNKS, PAGE, DEPTH, SUMS, OUTPUT, IDS, PLACES };
+static const enum spl_resource resources[PLACES] = {
+    SPL_RESOURCE_FRAME, SPL_RESOURCE_ENTRIES, SPL_RESOURCE_CHUNKS, SPL_RESOURCE_PAGE,
+    SPL_RESOURCE_DEPTH, SPL_RESOURCE_SUMS,    SPL_RESOURCE_OUTPUT, SPL_RESOURCE_IDS};
 
 enum {
     N = 1000, /* not a multiple of the workgroup: the last one is partly idle */
     FRAME_WORDS = sizeof(struct spl_frame_params) / 4,
     CHUNK_WORDS = sizeof(struct spl_draw_chunk) / 4,
     OUTPUT_WORDS = SPL_GPU_CONSTANTS_MAX + FRAME_WORDS + CHUNK_WORDS,
-    INPUTS = SPL_BIND_PAGE + 1, /* frame, draw, chunks, page */
-    REGION = 4096               /* bytes per binding, at least 4 N */
+    INPUTS = PAGE + 1,
+    REGION = 4096 /* bytes per binding, at least 4 N */
 };
+_Static_assert((int)PAGE == SPL_SELFTEST_PAGE, "where the shader looks for it");
 _Static_assert(4 * N <= REGION && 4 * OUTPUT_WORDS <= REGION, "each binding fits its region");
 
 static const uint32_t constants[SPL_GPU_CONSTANTS_MAX] = {3, 1, 4, 1, 5, 9, 0x80000001u, 0xffffffffu};
@@ -32,19 +40,19 @@ static uint32_t draw_value(uint32_t i)
     return (i * 2654435761u) >> 8; /* 24 bits: exact as a float */
 }
 
-/* What the kernel leaves in binding `slot`, which is zero before (the nearest depth all ones). */
-static void expect(uint32_t slot, bool atomics_64, uint32_t *words)
+/* What the kernel leaves in `place`, which is zero before (the nearest depth all ones). */
+static void expect(enum place place, bool atomics_64, uint32_t *words)
 {
     uint64_t nearest = UINT64_MAX;
     for (uint32_t i = 0; i < N; i++) {
         uint32_t value = draw_value(i);
         uint64_t key = (uint64_t)value << 32 | i;
         float f = (float)value * 0.5f + 0.25f;
-        if (slot == SPL_BIND_SUMS)
+        if (place == SUMS)
             memcpy(&words[i], &f, 4);
-        if (slot == SPL_BIND_ID)
+        if (place == IDS)
             words[i] = i;
-        if (slot != SPL_BIND_DEPTH)
+        if (place != DEPTH)
             continue;
         nearest = key < nearest ? key : nearest;
         if (atomics_64) {
@@ -56,7 +64,7 @@ static void expect(uint32_t slot, bool atomics_64, uint32_t *words)
             words[3] |= ~pattern(i);
         }
     }
-    if (slot == SPL_BIND_OUTPUT) {
+    if (place == OUTPUT) {
         memcpy(words, constants, sizeof constants);
         for (uint32_t i = 0; i < FRAME_WORDS + CHUNK_WORDS; i++)
             words[SPL_GPU_CONSTANTS_MAX + i] = pattern(i);
@@ -65,8 +73,8 @@ static void expect(uint32_t slot, bool atomics_64, uint32_t *words)
 
 static void fill_inputs(uint8_t *map)
 {
-    uint32_t *frame = (uint32_t *)map, *chunk = (uint32_t *)(map + SPL_BIND_CHUNKS * REGION) + CHUNK_WORDS;
-    uint32_t *draw = (uint32_t *)(map + SPL_BIND_DRAW * REGION), *page = (uint32_t *)(map + SPL_BIND_PAGE * REGION);
+    uint32_t *frame = (uint32_t *)map, *chunk = (uint32_t *)(map + CHUNKS * REGION) + CHUNK_WORDS;
+    uint32_t *draw = (uint32_t *)(map + ENTRIES * REGION), *page = (uint32_t *)(map + PAGE * REGION);
     memset(map, 0, (size_t)INPUTS * REGION);
     for (uint32_t i = 0; i < FRAME_WORDS; i++)
         frame[i] = pattern(i);
@@ -81,23 +89,23 @@ static void fill_inputs(uint8_t *map)
 static int compare(const struct spl_gpu *gpu, const char *name, bool atomics_64, const uint8_t *map,
                    struct spl_error *err)
 {
-    for (uint32_t slot = INPUTS; slot < SPL_BIND_COUNT; slot++) {
+    for (uint32_t place = INPUTS; place < PLACES; place++) {
         uint32_t want[REGION / 4] = {0};
-        const uint32_t *got = (const uint32_t *)(map + (slot - INPUTS) * REGION);
-        expect(slot, atomics_64, want);
+        const uint32_t *got = (const uint32_t *)(map + (place - INPUTS) * REGION);
+        expect((enum place)place, atomics_64, want);
         for (uint32_t i = 0; i < REGION / 4; i++)
             if (got[i] != want[i])
                 return spl_fail(err, SPL_E_NO_DEVICE,
                                 "self-test '%s' failed on device '%s' (%s): word %u of binding %u is 0x%08" PRIx32
                                 ", not 0x%08" PRIx32 "; its driver is not usable", name, gpu->info.name,
-                                gpu->info.driver, i, slot, got[i], want[i]);
+                                gpu->info.driver, i, place, got[i], want[i]);
     }
     return 0;
 }
 
 static int run(struct spl_gpu *gpu, const char *name, bool atomics_64, struct spl_error *err)
 {
-    const uint64_t outputs = (SPL_BIND_COUNT - INPUTS) * REGION;
+    const uint64_t outputs = (PLACES - INPUTS) * REGION;
     struct spl_gpu_buffer *input = NULL, *device = NULL, *readback = NULL;
     struct spl_gpu_kernel *kernel = NULL;
     uint64_t ticket;
@@ -109,15 +117,15 @@ static int run(struct spl_gpu *gpu, const char *name, bool atomics_64, struct sp
         (code = spl_gpu_begin(gpu, err)) < 0)
         goto done;
     fill_inputs(spl_gpu_buffer_map(input));
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    for (uint32_t i = 0; i < SPL_BIND_COUNT; i++)
-        bindings[i] = (struct spl_gpu_binding){.buffer = i < INPUTS ? input : device,
-                                               .offset = (i < INPUTS ? i : i - INPUTS) * REGION,
-                                               .bytes = REGION};
-    bindings[SPL_BIND_DRAW].bytes = 4 * N; /* the kernel takes its count from the range */
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {0};
+    for (uint32_t i = 0; i < PLACES; i++)
+        bindings[resources[i]] = (struct spl_gpu_binding){.buffer = i < INPUTS ? input : device,
+                                                          .offset = (i < INPUTS ? i : i - INPUTS) * REGION,
+                                                          .bytes = REGION};
+    bindings[SPL_RESOURCE_ENTRIES].bytes = 4 * N; /* the kernel takes its count from the range */
     spl_gpu_fill(gpu, device, 0, outputs, 0);
     spl_gpu_barrier(gpu);
-    spl_gpu_fill(gpu, device, (SPL_BIND_DEPTH - INPUTS) * REGION, atomics_64 ? 8 : 4, SPL_NOTHING);
+    spl_gpu_fill(gpu, device, (DEPTH - INPUTS) * REGION, atomics_64 ? 8 : 4, SPL_NOTHING);
     spl_gpu_barrier(gpu);
     spl_gpu_dispatch(gpu, kernel, bindings, (N + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
     spl_gpu_barrier(gpu);

@@ -113,7 +113,7 @@ int spl_left_out_render(struct spl_renderer *renderer, const struct spl_dataset 
     spl_view_init(&view);
     view.camera = named->camera;
     view.lod = lod;
-    view.atoms = 0;
+    view.disc.atoms = 0;
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH | 1u << SPL_LAYER_ID | 1u << SPL_LAYER_COVERAGE;
     *width_px = NULL;
     memset(render, 0, SPL_LEFT_OUT_KINDS * sizeof *render);
@@ -124,7 +124,7 @@ int spl_left_out_render(struct spl_renderer *renderer, const struct spl_dataset 
         render[SPL_LEFT_OUT_COLORED] = frame.images[SPL_LAYER_COLOR];
         frame.images[SPL_LAYER_COLOR] = (struct spl_image){0};
         spl_frame_finish(&frame);
-        view.atoms = 8;
+        view.disc.atoms = 8;
         view.layers = 1u << SPL_LAYER_COLOR;
         rc = spl_renderer_render(renderer, dataset, &view, &frame, err);
     }

@@ -40,7 +40,7 @@ static int measure_view(struct spl_renderer *renderer, const struct spl_dataset 
             struct spl_frame frame;
             spl_view_init(&view);
             view.camera = *camera;
-            view.atoms = spl_passes_caps[cap];
+            view.disc.atoms = spl_passes_caps[cap];
             view.layers = 1u << SPL_LAYER_COLOR | (round ? 0 : 1u << SPL_LAYER_COVERAGE);
             int rc = spl_renderer_render(renderer, dataset, &view, &frame, err);
             if (rc)

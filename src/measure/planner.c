@@ -12,6 +12,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "render/method.h"
 #include "shared.h"
 
 static const double spread_quantile = 0.97, spread_step = 0.08;
@@ -21,19 +22,25 @@ static const double learned_most = 6.9; /* ln 1000 */
 enum { first_frames = 6 };
 static const double first_gain = 0.5;
 
-/* Without a profile: a software driver's times on two slow cores, and PSNR as no more than an order; both as on the
- * courtyard scene ("Without a profile" in tests/bench/RESULTS.md). */
-enum { all = SPL_TEXTURE_ATOMS };
-static const struct spl_candidate common[] = {
-    {{SPL_METHOD_POINTS, 4, 1, all}, 4, 10, 14.8, NAN, 0},    {{SPL_METHOD_POINTS, 2, 0.25, all}, 4, 15, 17.2, NAN, 0},
-    {{SPL_METHOD_POINTS, 1, 0.25, all}, 4, 20, 20.2, NAN, 0}, {{SPL_METHOD_SPLAT, 2, 0.25, all}, 5, 30, 21.1, NAN, 0},
-    {{SPL_METHOD_FILL, 1, 0.25, all}, 5, 31, 22.0, NAN, 0},   {{SPL_METHOD_SPLAT, 1, 0.25, all}, 5, 42, 22.1, NAN, 0},
-    {{SPL_METHOD_SPLAT, 2, 0.5, all}, 6, 72, 22.6, NAN, 0},   {{SPL_METHOD_FILL, 1, 0.5, all}, 8, 60, 23.36, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 0.5, all}, 8, 90, 23.42, NAN, 0},  {{SPL_METHOD_SPLAT, 2, 1, all}, 8, 180, 23.6, NAN, 0},
-    {{SPL_METHOD_FILL, 1, 1, all}, 8, 140, 23.7, NAN, 0},     {{SPL_METHOD_SPLAT, 1, 1, all}, 10, 250, 24.4, NAN, 0},
-    {{SPL_METHOD_SPLAT, 1, 2, all}, 20, 900, 25.1, NAN, 0},
-};
-enum { common_count = sizeof common / sizeof *common };
+/* Without a profile, what the methods' rows say. */
+static size_t add_guesses(struct spl_candidate *candidates, bool (*usable)(const struct spl_setting *setting))
+{
+    size_t count = 0;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        const struct spl_method_guess *guess = spl_method_row((enum spl_method)method)->guesses;
+        for (int i = 0; i < SPL_METHOD_GUESSES_MAX && guess[i].lod > 0; i++) {
+            struct spl_setting setting = {(enum spl_method)method, guess[i].lod, guess[i].supersample,
+                                          SPL_TEXTURE_ATOMS};
+            if (!usable || usable(&setting))
+                candidates[count++] = (struct spl_candidate){.setting = setting,
+                                                             .fixed_ms = guess[i].fixed_ms,
+                                                             .ms_per_mpx = guess[i].ms_per_mpx,
+                                                             .psnr = guess[i].psnr,
+                                                             .bound = NAN};
+        }
+    }
+    return count;
+}
 
 /* One-sided 95 % point of Student's t, by Cornish and Fisher's expansion: within 1 % from 4 degrees of freedom on. */
 static double student(double freedom)
@@ -52,7 +59,8 @@ double spl_profile_psnr_bound(const struct spl_profile *profile, const struct sp
 int spl_planner_init(struct spl_planner *planner, const struct spl_profile *profile,
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err)
 {
-    size_t capacity = profile && profile->count > common_count ? profile->count : common_count;
+    size_t guesses = SPL_METHOD_COUNT * SPL_METHOD_GUESSES_MAX;
+    size_t capacity = profile && profile->count > guesses ? profile->count : guesses;
     double tail = 0;
     *planner = (struct spl_planner){0};
     if (!(planner->candidates = spl_alloc(capacity, sizeof *planner->candidates, err)))
@@ -71,9 +79,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
     /* From the 90 % quantile of a normal distribution to its 97 %: 1.88 / 1.28. */
     planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
     if (!planner->count)
-        for (size_t i = 0; i < common_count; i++)
-            if (!usable || usable(&common[i].setting))
-                planner->candidates[planner->count++] = common[i];
+        planner->count = add_guesses(planner->candidates, usable);
     for (size_t i = 0; i < planner->count; i++)
         planner->atoms |= planner->candidates[i].setting.atoms != SPL_TEXTURE_ATOMS;
     return 0;

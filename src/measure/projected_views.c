@@ -54,7 +54,7 @@ static int render(const struct spl_projected_options *o, const struct spl_named_
     spl_view_init(&view);
     view.camera = named->camera;
     view.layers = layers;
-    view.atoms = atoms;
+    view.disc.atoms = atoms;
     return spl_renderer_render(o->renderer, o->dataset, &view, frame, err);
 }
 

@@ -53,7 +53,7 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     out->method = o->settings[setting].method;
     out->lod = o->settings[setting].lod;
     out->supersample = o->settings[setting].supersample;
-    out->atoms = o->settings[setting].atoms;
+    out->disc.atoms = o->settings[setting].atoms;
     if (size == SPL_SWEEP_FULL)
         return;
     struct spl_camera *c = &out->camera;
@@ -98,7 +98,7 @@ static int mark_dense(struct job *job, size_t v, struct spl_truth *t, struct spl
     struct spl_frame frame;
     double ms;
     fill_view(job->options, 0, v, SPL_SWEEP_FULL, &view);
-    view.method = SPL_METHOD_POINTS;
+    view.method = SPL_METHOD_RAW;
     view.lod = 0;
     view.supersample = 1;
     view.layers = 1u << SPL_LAYER_DEPTH;
@@ -131,7 +131,7 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_t
     view.background[3] = 0;
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH | 1u << SPL_LAYER_NORMAL | 1u << SPL_LAYER_ID |
                   1u << SPL_LAYER_COVERAGE;
-    if (view.method == SPL_METHOD_POINTS && !spl_dataset_get_info(o->dataset)->has_surface)
+    if (!spl_method_has_normals(view.method, spl_dataset_get_info(o->dataset)))
         view.layers &= ~(1u << SPL_LAYER_NORMAL);
     struct spl_frame frame;
     double ms;

@@ -1,5 +1,5 @@
 /* Recording the screen-space filter: pull of the nearest samples, visibility, pull of what is visible, push. All passes
- * work on planes of words in the sums buffer, which method splat alone uses otherwise: nearest samples, levels 0 …
+ * work on planes of words: nearest samples, levels 0 …
  * rings; states, one a sample; means of depth and of payload, levels 1 … levels. That is 3 words a sample and a little;
  * the buffer has 4. Tiles begin at multiples of the coarsest cell and overlap by as far as samples act on each other,
  * so a pixel is the same in whatever tile it lies. */
@@ -10,6 +10,7 @@
 #include "dataset/dataset.h"
 #include "dataset/format.h"
 #include "render/renderer.h"
+#include "render/tiling.h"
 
 /* A sector of a kernel that reaches k spacings holds k^2 pi / 8 points on average. With three it is 3.5, and of random
  * points leaves four or more sectors of eight empty, which the threshold takes for open, in one pixel of 10^4. */
@@ -25,22 +26,24 @@ static uint32_t round_up(double value, uint32_t align)
     return (uint32_t)ceil(value / align) * align;
 }
 
-void spl_fill_plan_init(struct spl_fill_plan *plan, const struct spl_view *view, double spacing)
+void spl_fill_plan_init(struct spl_fill_plan *plan, struct spl_reach *reach, const struct spl_view *view,
+                        double spacing)
 {
     double side = view->supersample;
-    double kernel = view->kernel > 0 ? view->kernel * side / 2 : reach_spacings * spacing;
+    const struct spl_fill_params *params = &view->fill;
+    double kernel = params->kernel > 0 ? params->kernel * side / 2 : reach_spacings * spacing;
     double around = kernel_most_px * (side > 1 ? side : 1);
-    double most = view->visibility == SPL_VISIBILITY_CONSTANT ? around : fmax(around, kernel_most);
+    double most = params->visibility == SPL_VISIBILITY_CONSTANT ? around : fmax(around, kernel_most);
     kernel = fmin(fmax(kernel, 1.5), most);
     int rings = 1 + (int)floor(log2(kernel) + 0.25);
     rings = rings < 2 ? 2 : rings < SPL_FILL_LEVELS_MAX ? rings : SPL_FILL_LEVELS_MAX - 1;
     *plan = (struct spl_fill_plan){.kernel = kernel, .rings = (uint32_t)rings};
-    plan->levels = view->pyramid ? view->pyramid : plan->rings;
+    plan->levels = params->pyramid ? params->pyramid : plan->rings;
     uint32_t top = plan->levels > plan->rings ? plan->levels : plan->rings;
-    double looks = view->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
-    plan->align = 1u << top;
-    plan->guard = 1u << (uint32_t)ceil(log2(fmin(fmax(kernel, 4), around))); /* 4: of whole groups of lanes */
-    plan->apron = round_up(looks + (2u << plan->levels) + 2, plan->align);   /* 2: normals look so far */
+    double looks = params->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
+    reach->align = 1u << top;
+    reach->guard = 1u << (uint32_t)ceil(log2(fmin(fmax(kernel, 4), around))); /* 4: of whole groups of lanes */
+    reach->apron = round_up(looks + (2u << plan->levels) + 2, reach->align);   /* 2: normals look so far */
 }
 
 void spl_fill_set_params(struct spl_tile *tile)
@@ -53,9 +56,9 @@ void spl_fill_set_params(struct spl_tile *tile)
     p->fill_reach = (float)(reach_spacings / SPL_RADIUS_SPACING * fmax(tile->camera.fx, tile->camera.fy));
     p->fill_kernel = (float)plan->kernel;
     p->fill_margin = (float)(margin_spacings / SPL_RADIUS_SPACING);
-    p->fill_threshold = (float)(8 * view->threshold);
+    p->fill_threshold = (float)(8 * view->fill.threshold);
     p->fill_levels = plan->rings;
-    p->fill_keep = view->visibility == SPL_VISIBILITY_NONE;
+    p->fill_keep = view->fill.visibility == SPL_VISIBILITY_NONE;
 }
 
 struct planes {
@@ -88,8 +91,15 @@ static void lay_out(const struct spl_tile *tile, struct planes *planes)
 }
 
 struct pass {
-    uint32_t slot, level, from, to, items;
+    struct spl_kernel_key key;
+    uint32_t level, from, to, items;
 };
+
+/* Depth and payload share a word of 64 bits: every pass is told. */
+static bool has_wide(const struct spl_tile *tile)
+{
+    return spl_gpu_get_limits(tile->renderer->gpu)->atomics_64;
+}
 
 static int record_pass(struct spl_tile *tile, const struct planes *planes, const struct pass *pass,
                        struct spl_error *err)
@@ -99,44 +109,47 @@ static int record_pass(struct spl_tile *tile, const struct planes *planes, const
     params.fill_from = pass->from;
     params.fill_to = pass->to;
     params.fill_stride = planes->stride;
-    return spl_tile_dispatch_items(tile, pass->slot, &params, pass->items, err);
+    return spl_tile_dispatch_items(tile, &pass->key, &params, pass->items, err);
 }
 
 /* Which samples are visible: depths alone, so the same for every group of layers. */
 static int record_visibility(struct spl_tile *tile, const struct planes *p, struct spl_error *err)
 {
-    uint32_t rings = tile->fill.rings, adaptive = tile->view->visibility != SPL_VISIBILITY_CONSTANT;
+    uint32_t rings = tile->fill.rings, wide = has_wide(tile), adaptive = tile->view->fill.visibility != SPL_VISIBILITY_CONSTANT;
     int rc = SPL_OK;
     for (uint32_t level = 1; level <= rings && !rc; level++)
         rc = record_pass(tile, p,
-                         &(struct pass){SPL_KERNEL_FILL_PULL + (level == 1), level, p->nearest[level - 1],
+                         &(struct pass){{"fill_pull", false, {level == 1, wide}}, level, p->nearest[level - 1],
                                         p->nearest[level], p->samples[level]},
                          err);
     return rc ? rc
               : record_pass(
                     tile, p,
-                    &(struct pass){SPL_KERNEL_FILL_VISIBLE + adaptive, 0, p->states, p->nearest[rings], p->samples[0]},
+                    &(struct pass){{"fill_visible", false, {adaptive, wide}}, 0, p->states, p->nearest[rings],
+                                   p->samples[0]},
                     err);
 }
 
 int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
-    uint32_t levels = tile->fill.levels;
+    uint32_t levels = tile->fill.levels, wide = has_wide(tile);
     struct planes p;
+    if (first)
+        spl_tile_begin_area(tile, SPL_AREA_PLANES);
     lay_out(tile, &p);
     int rc = first ? record_visibility(tile, &p, err) : SPL_OK;
     for (uint32_t level = 1; level <= levels && !rc; level++)
         rc = record_pass(tile, &p,
-                         &(struct pass){SPL_KERNEL_FILL_GATHER + 2 * group + (level == 1), level, p.means[level - 1],
+                         &(struct pass){{"fill_gather", false, {group, level == 1, wide}}, level, p.means[level - 1],
                                         p.means[level], p.samples[level]},
                          err);
     for (uint32_t level = levels; level-- > 0 && !rc;)
         rc = record_pass(tile, &p,
-                         &(struct pass){SPL_KERNEL_FILL_PUSH + 2 * group + (level == 0), level, p.means[level + 1],
+                         &(struct pass){{"fill_push", false, {group, level == 0, wide}}, level, p.means[level + 1],
                                         p.means[level], p.samples[level]},
                          err);
     if (!rc && group == SPL_SUMS_NORMAL && !spl_dataset_get_info(tile->resident->dataset)->has_surface)
-        rc = record_pass(tile, &p, &(struct pass){SPL_KERNEL_FILL_NORMAL, 0, 0, 0, p.samples[0]}, err);
+        rc = record_pass(tile, &p, &(struct pass){{"fill_normal", false, {wide}}, 0, 0, 0, p.samples[0]}, err);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;
 }

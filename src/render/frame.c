@@ -3,17 +3,12 @@
 #include "render/frame.h"
 
 #include "base/clock.h"
+#include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/wires.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
-
-static const struct spl_method_ops *const methods[SPL_METHOD_COUNT] = {
-    [SPL_METHOD_SPLAT] = &spl_method_splat,
-    [SPL_METHOD_POINTS] = &spl_method_points,
-    [SPL_METHOD_FILL] = &spl_method_fill,
-};
 
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
 static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
@@ -43,15 +38,16 @@ static bool ask_textures(void *context, uint32_t page)
 
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera)
 {
+    const struct spl_method_row *method = spl_method_row(job->view->method);
     return (struct spl_select_params){
         .dataset = job->resident->dataset,
         .camera = camera,
         .lod = job->view->lod,
         .low_pass = SPL_LOW_PASS,
-        .points = job->view->method != SPL_METHOD_SPLAT,
-        .lines = job->view->method == SPL_METHOD_FILL,
+        .discs = method->discs,
+        .lines = method->lines,
         .resident = ask_page,
-        .atoms = spl_view_is_textured(job->view) ? job->view->atoms : 0,
+        .atoms = spl_view_is_textured(job->view) ? job->view->disc.atoms : 0,
         .textured = ask_textures,
         .context = job,
     };
@@ -60,6 +56,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
 static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
+    const struct spl_method_row *method = spl_method_row(job->view->method);
     struct spl_select_params params = spl_frame_selection(job, &tile->camera);
     spl_residency_begin_frame(&r->residency);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
@@ -68,10 +65,10 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (job->view->method == SPL_METHOD_FILL && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
+    if (method->lines && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
         return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
-    if (!tile->params.weight_max && job->view->method == SPL_METHOD_SPLAT)
+    if (!tile->params.weight_max && method->sums)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
                               "at lod %g up to %llu splats would blend in one pixel; raise lod", job->view->lod,
                               (unsigned long long)r->list.sample_splats);
@@ -122,12 +119,13 @@ static int record(struct spl_tile *tile, struct spl_error *err)
                 layers |= 1u << layer & wanted;
         if (!layers)
             continue;
-        rc = methods[tile->view->method]->record(tile, group, first, err);
+        rc = spl_method_row(tile->view->method)->record(tile, group, first, err);
         first = false;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
             if (layers >> layer & 1)
                 rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);
         spl_gpu_barrier(r->gpu);
+        spl_tile_end_group(tile);
         spl_tile_stamp(tile, SPL_STAGE_RESOLVE);
     }
     if (!rc && r->scratch.output) {

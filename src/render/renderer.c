@@ -37,8 +37,7 @@ void spl_renderer_destroy(struct spl_renderer *renderer)
     if (renderer->gpu) {
         spl_residency_finish(&renderer->residency);
         spl_scratch_finish(&renderer->scratch, renderer->gpu);
-        for (int i = 0; i < SPL_KERNEL_COUNT; i++)
-            spl_gpu_kernel_destroy(renderer->gpu, renderer->kernels[i]);
+        spl_kernels_finish(&renderer->kernels, renderer->gpu);
     }
     spl_draw_list_finish(&renderer->list);
     spl_gpu_close(renderer->gpu);

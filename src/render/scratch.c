@@ -1,4 +1,5 @@
-/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's buffers may grow. */
+/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's buffers may grow. What may
+ * share a block, and for how long each holds it, stands in one table. */
 #include "render/renderer.h"
 
 #include <inttypes.h>
@@ -10,6 +11,59 @@ enum {
     lines_at_start = 65536, // wires are drawn whole whatever pages there are: more than most scans have in view
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
+
+enum lifetime { LIFE_DISPATCHES, LIFE_GROUP, LIFE_TILE };
+static const struct {
+    bool large; /* of the two blocks */
+    enum lifetime life;
+    enum spl_resource resource;
+} areas[SPL_AREA_COUNT] = {
+    [SPL_AREA_SUMS] = {true, LIFE_GROUP, SPL_RESOURCE_SUMS},
+    [SPL_AREA_PLANES] = {true, LIFE_TILE, SPL_RESOURCE_PLANES},
+    [SPL_AREA_IDS] = {false, LIFE_GROUP, SPL_RESOURCE_IDS},
+    [SPL_AREA_OCCLUDERS] = {false, LIFE_DISPATCHES, SPL_RESOURCE_OCCLUDERS},
+    [SPL_AREA_SUMMED] = {false, LIFE_DISPATCHES, SPL_RESOURCE_SUMMED},
+};
+
+struct spl_gpu_buffer *spl_tile_begin_area(struct spl_tile *tile, enum spl_area area)
+{
+    struct spl_scratch *scratch = &tile->renderer->scratch;
+    for (int other = 0; other < SPL_AREA_COUNT; other++)
+        spl_assert(!(tile->areas >> other & 1) || areas[other].large != areas[area].large);
+    tile->areas |= 1u << area;
+    return areas[area].large ? scratch->large : scratch->small;
+}
+
+void spl_tile_end_area(struct spl_tile *tile, enum spl_area area)
+{
+    spl_assert(tile->areas >> area & 1);
+    tile->areas &= ~(1u << area);
+}
+
+void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT])
+{
+    const struct spl_scratch *scratch = &tile->renderer->scratch;
+    memset(bindings, 0, SPL_RESOURCE_COUNT * sizeof *bindings);
+    bindings[SPL_RESOURCE_ENTRIES].buffer = scratch->entries;
+    bindings[SPL_RESOURCE_CHUNKS].buffer = scratch->chunks;
+    bindings[SPL_RESOURCE_BOUNDS].buffer = scratch->bounds;
+    bindings[SPL_RESOURCE_LINES].buffer = scratch->lines;
+    bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
+    bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
+    for (int area = 0; area < SPL_AREA_COUNT; area++)
+        if (tile->areas >> area & 1)
+            bindings[areas[area].resource].buffer = areas[area].large ? scratch->large : scratch->small;
+}
+
+void spl_tile_end_group(struct spl_tile *tile)
+{
+    for (int area = 0; area < SPL_AREA_COUNT; area++) {
+        bool holds = tile->areas >> area & 1;
+        spl_assert(!holds || areas[area].life != LIFE_DISPATCHES);
+        if (holds && areas[area].life == LIFE_GROUP)
+            spl_tile_end_area(tile, (enum spl_area)area);
+    }
+}
 
 /* What the account of device memory takes for a buffer. */
 static uint64_t taken(uint64_t bytes)
@@ -38,8 +92,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         uint64_t bytes;
     } wanted[] = {
         {&scratch->depth, SPL_GPU_DEVICE, samples * (limits->atomics_64 ? 8 : 4)},
-        {&scratch->sums, SPL_GPU_DEVICE, samples * 16},
-        {&scratch->ids, SPL_GPU_DEVICE, 4 * (samples > run_texels ? samples : run_texels)},
+        {&scratch->large, SPL_GPU_DEVICE, samples * 16},
+        {&scratch->small, SPL_GPU_DEVICE, 4 * (samples > run_texels ? samples : run_texels)},
         {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
         {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
@@ -72,7 +126,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
 
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
-    struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->sums,   scratch->ids,    scratch->output,
+    struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->large,  scratch->small,  scratch->output,
                                     scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
                                     scratch->entries,  scratch->lines};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)

@@ -151,7 +151,7 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
     } else {
         spl_occupancy_add_everywhere(&w->occupancy, count);
     }
-    uint32_t clip = spl_clip_count(chunk) && !w->params->points
+    uint32_t clip = spl_clip_count(chunk) && w->params->discs
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
                         : 0; // at most 109
     uint32_t linear = 3u << SPL_GEOMETRY_LINEAR;
@@ -178,7 +178,7 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
         *view[i] = (float)(r[0] * origin[0] + r[1] * origin[1] + r[2] * origin[2]);
     }
     w->list->splats += count;
-    if (!w->params->points && disc_side(camera, radius, near) > SPL_WINDOW)
+    if (w->params->discs && disc_side(camera, radius, near) > SPL_WINDOW)
         return add_windows(w, page, &out, low, high, near, err);
     struct spl_chunk_bounds bounds = occlusion_bounds(camera, low, high, near);
     return spl_draw_list_add(w->list, page, &out, &bounds, err);

@@ -23,7 +23,7 @@ struct spl_select_params {
     const struct spl_camera *camera;                /* of the tile, in samples */
     double lod;                                     /* samples; 0 = leaves in full */
     double low_pass;                                /* samples */
-    bool points;                                    /* splats have no extent: chunks are never drawn by windows */
+    bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
     bool lines;                                     /* chunks with linear splats are batches of their own */
     bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
@@ -35,7 +35,7 @@ struct spl_select_params {
 /* Does the view draw textures where there are any: colours, by splats, with atoms? */
 static inline bool spl_view_is_textured(const struct spl_view *view)
 {
-    return spl_method_has_textures(view->method) && view->atoms && view->layers >> SPL_LAYER_COLOR & 1;
+    return spl_method_has_textures(view->method) && view->disc.atoms && view->layers >> SPL_LAYER_COLOR & 1;
 }
 
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */

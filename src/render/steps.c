@@ -11,10 +11,9 @@
 #include "base/memory.h"
 #include "image/enlarge.h"
 #include "render/frame.h"
+#include "render/method.h"
 #include "render/readback.h"
 
-/* 25 x 25 at 1248 x 768 is 0.7e9 looks and 0.8 s of two cores. */
-static const double constant_looks = 65000, constant_work = 3e9;
 enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
 
 struct spl_frame_steps {
@@ -44,49 +43,12 @@ static int make_images(struct spl_frame *frame, const struct spl_view *view, str
     return SPL_OK;
 }
 
-/* The constant operator looks at every sample of the kernel: what a software driver cannot do before the device's
- * deadline, or in the rounds that it allows an invocation, is refused before it costs the device. */
-static int check_work(const struct spl_frame_job *job, const struct spl_camera *camera, struct spl_error *err)
-{
-    const struct spl_fill_plan *plan = &job->tiling.fill;
-    double side = 2 * floor(plan->kernel) + 1;
-    double samples = ((double)camera->width + 2 * plan->guard) * ((double)camera->height + 2 * plan->guard);
-    samples = fmin(samples, (double)job->renderer->scratch.samples);
-    if (job->view->visibility != SPL_VISIBILITY_CONSTANT)
-        return SPL_OK;
-    if (side * side > constant_looks ||
-        (spl_gpu_get_device(job->renderer->gpu)->software && side * side * samples > constant_work))
-        return spl_fail_field(
-            err, SPL_E_LIMIT, "kernel",
-            "visibility constant with a kernel of %g x %g samples takes too long in this image; ask for a "
-            "smaller kernel, or for visibility adaptive",
-            side, side);
-    return SPL_OK;
-}
-
-/* The plan is the whole image's, or tiles would show where they meet. */
-static int plan_fill(struct spl_frame_job *job, struct spl_error *err)
-{
-    struct spl_camera camera;
-    double spacing = 1;
-    spl_tiling_get_camera(job->view, &camera);
-    struct spl_select_params params = spl_frame_selection(job, &camera);
-    uint64_t clock = spl_now_ns();
-    spl_residency_begin_frame(&job->renderer->residency);
-    int rc = job->view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
-    job->frame->stats.select_ms += spl_since_ms(&clock);
-    if (job->page_error.code)
-        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
-    spl_fill_plan_init(&job->tiling.fill, job->view, spacing);
-    return rc ? rc : check_work(job, &camera, err);
-}
-
 /* A share of the size, to be enlarged; a pixel's centre stays where it is in the world. */
 static void make_coarse(struct spl_view *view)
 {
     double scale = view->supersample;
     view->supersample = 1;
-    view->kernel = view->kernel > 0 ? fmax(view->kernel * scale, 3) : view->kernel;
+    view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
     view->camera.width = (uint32_t)ceil(view->camera.width * scale);
     view->camera.height = (uint32_t)ceil(view->camera.height * scale);
     view->camera.fx *= scale;
@@ -105,10 +67,12 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 {
     struct spl_frame_job *job = &steps->job;
     const struct spl_view *view = &steps->view;
+    const struct spl_method_row *method = spl_method_row(view->method);
+    job->tiling.reach = (struct spl_reach){.align = 1, .apron = method->apron};
     int rc = find_resident(steps, err);
-    if (!rc && view->method == SPL_METHOD_FILL)
-        rc = plan_fill(job, err);
-    if (!rc && view->method == SPL_METHOD_FILL)
+    if (!rc && method->prepare)
+        rc = method->prepare(job, err);
+    if (!rc && method->lines)
         rc = spl_dataset_get_wires(steps->dataset, &job->wires, err);
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
@@ -130,14 +94,12 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
         rc = spl_view_check_layers(view, info, err);
     if (rc)
         return rc;
-    bool bare = !info->has_surface;
     struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;
     steps->dataset = dataset;
     steps->wanted = *view;
-    if (bare && view->method == SPL_METHOD_SPLAT)
-        steps->wanted.method = SPL_METHOD_FILL;
+    steps->wanted.method = spl_method_for(view->method, info);
     steps->view = steps->wanted;
     if (view->supersample < 1)
         make_coarse(&steps->view);

@@ -1,90 +1,21 @@
-/* Recording the dispatches of one tile: parameters, bindings, timestamps, kernels. */
+/* Recording the dispatches of one tile: parameters, bindings, timestamps. */
 #include <string.h>
 
+#include "render/method.h"
 #include "render/renderer.h"
 
-/* Every kernel's name and constants. */
-static const char *describe(enum spl_kernel_slot slot, bool wide, uint32_t constants[3], size_t *count)
+int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_gpu_kernel **plain,
+                              struct spl_gpu_kernel **clipped, struct spl_error *err)
 {
-    *count = 0;
-    memset(constants, 0, 3 * sizeof *constants);
-    if (slot <= SPL_KERNEL_SPLAT_DEPTH_CLIPPED) {
-        constants[2] = slot - SPL_KERNEL_SPLAT_DEPTH;
-        *count = 3;
-        return "splat_depth";
-    }
-    if (slot == SPL_KERNEL_OCCLUSION_TILES)
-        return "occlusion_tiles";
-    if (slot == SPL_KERNEL_OCCLUSION_CHUNKS)
-        return "occlusion_chunks";
-    if (slot >= SPL_KERNEL_SPLAT_SUM && slot < SPL_KERNEL_POINTS) {
-        *count = 1;
-        constants[0] = slot - SPL_KERNEL_SPLAT_SUM + 1;
-        return "splat_sum";
-    }
-    if (slot >= SPL_KERNEL_SPLAT_TEXTURE && slot < SPL_KERNEL_POINTS) {
-        *count = 3;
-        constants[0] = (slot - SPL_KERNEL_SPLAT_TEXTURE) / 2;
-        constants[2] = (slot - SPL_KERNEL_SPLAT_TEXTURE) % 2;
-        return wide ? "splat_texture64" : "splat_texture";
-    }
-    if (slot < SPL_KERNEL_POINTS) {
-        constants[0] = (slot - SPL_KERNEL_SPLAT_SHADE) / 2;
-        constants[2] = (slot - SPL_KERNEL_SPLAT_SHADE) % 2;
-        *count = 3;
-        return wide ? "splat_shade64" : "splat_shade";
-    }
-    if (slot >= SPL_KERNEL_FILL_LINES && slot < SPL_KERNEL_FILL_PULL) {
-        *count = 2;
-        constants[0] = (slot - SPL_KERNEL_FILL_LINES) / 2;
-        constants[1] = (slot - SPL_KERNEL_FILL_LINES) % 2;
-        return wide ? "fill_lines64" : "fill_lines";
-    }
-    if (slot < SPL_KERNEL_FILL_LINES) {
-        *count = 3;
-        constants[0] = (slot - SPL_KERNEL_POINTS) / 2 % SPL_SUMS_COUNT;
-        constants[1] = (slot - SPL_KERNEL_POINTS) % 2;
-        constants[2] = slot >= SPL_KERNEL_FILL_POINTS;
-        return wide ? "points64" : "points";
-    }
-    if (slot == SPL_KERNEL_FILL_NORMAL) {
-        *count = 1;
-        constants[0] = wide;
-        return "fill_normal";
-    }
-    if (slot < SPL_KERNEL_FILL_NORMAL) {
-        bool pull = slot < SPL_KERNEL_FILL_VISIBLE;
-        *count = 2;
-        constants[0] = slot - (pull ? SPL_KERNEL_FILL_PULL : SPL_KERNEL_FILL_VISIBLE);
-        constants[1] = wide;
-        return pull ? "fill_pull" : "fill_visible";
-    }
-    if (slot < SPL_KERNEL_RESOLVE) {
-        *count = 3;
-        constants[0] = (slot - SPL_KERNEL_FILL_GATHER) / 2 % SPL_SUMS_COUNT;
-        constants[1] = (slot - SPL_KERNEL_FILL_GATHER) % 2;
-        constants[2] = wide;
-        return slot < SPL_KERNEL_FILL_PUSH ? "fill_gather" : "fill_push";
-    }
-    *count = 2;
-    constants[0] = (slot - SPL_KERNEL_RESOLVE) / 2;
-    constants[1] = (slot - SPL_KERNEL_RESOLVE) % 2;
-    return wide && constants[1] ? "resolve64" : "resolve";
-}
-
-int spl_renderer_get_kernel(struct spl_renderer *renderer, enum spl_kernel_slot slot, struct spl_gpu_kernel **out,
-                            struct spl_error *err)
-{
-    if (!renderer->kernels[slot]) {
-        uint32_t constants[3];
-        size_t count;
-        const char *name = describe(slot, spl_gpu_get_limits(renderer->gpu)->atomics_64, constants, &count);
-        int rc = spl_gpu_kernel_create(renderer->gpu, name, constants, count, &renderer->kernels[slot], err);
-        if (rc)
-            return rc;
-    }
-    *out = renderer->kernels[slot];
-    return SPL_OK;
+    enum { clipped_constant = 2 };
+    struct spl_renderer *r = tile->renderer;
+    bool any = false;
+    for (size_t i = 0; i < r->list.batch_count; i++)
+        any |= r->list.batches[i].apart;
+    *clipped = NULL;
+    int rc = spl_kernels_get(&r->kernels, r->gpu, &key, plain, err);
+    key.constants[clipped_constant] = 1;
+    return rc || !any ? rc : spl_kernels_get(&r->kernels, r->gpu, &key, clipped, err);
 }
 
 static int too_many(struct spl_error *err)
@@ -111,24 +42,12 @@ static int next_params(struct spl_tile *tile, const struct spl_frame_params *par
     return SPL_OK;
 }
 
-static void bind_scratch(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_BIND_COUNT])
-{
-    const struct spl_scratch *scratch = &tile->renderer->scratch;
-    memset(bindings, 0, SPL_BIND_COUNT * sizeof *bindings);
-    bindings[SPL_BIND_DRAW].buffer = scratch->entries;
-    bindings[SPL_BIND_CHUNKS].buffer = scratch->chunks;
-    bindings[SPL_BIND_DEPTH].buffer = scratch->depth;
-    bindings[SPL_BIND_SUMS].buffer = scratch->sums;
-    bindings[SPL_BIND_ID].buffer = scratch->ids;
-    bindings[SPL_BIND_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
-}
-
 enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
 
 int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
 {
     uint64_t workgroups = spl_gpu_get_limits(tile->renderer->gpu)->workgroups, size = tile->params.texture_size;
-    uint64_t words = spl_gpu_buffer_get_bytes(tile->renderer->scratch.ids) / sizeof(uint32_t);
+    uint64_t words = spl_gpu_buffer_get_bytes(tile->renderer->scratch.small) / sizeof(uint32_t);
     uint64_t most = workgroups * entries_per_workgroup,
              summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
@@ -140,16 +59,11 @@ int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
     return SPL_OK;
 }
 
-/* Sums the textures of as many entries into the id buffer, where `shade` reads them. */
+/* Sums the textures of as many entries, for the dispatch behind to read. */
 static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
-                          const struct spl_gpu_binding shade[SPL_BIND_COUNT], uint32_t entries)
+                          const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t entries)
 {
-    const struct spl_resident_dataset *resident = tile->resident;
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
     uint32_t invocations = entries * SPL_RUN_SPLATS * SPL_SUM_LANES(tile->params.texture_size);
-    memcpy(bindings, shade, sizeof bindings);
-    bindings[SPL_BIND_SUMS].buffer = shade[SPL_BIND_SUMMED].buffer;
-    bindings[SPL_BIND_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
     spl_gpu_barrier(tile->renderer->gpu); /* whoever reads the last sums is done */
     spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (invocations + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
     spl_gpu_barrier(tile->renderer->gpu);
@@ -160,25 +74,25 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    bind_scratch(tile, bindings);
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
+    spl_tile_bind(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
         if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
             (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
             continue;
-        bindings[SPL_BIND_PAGE].buffer = resident->pages[batch->page].buffer;
-        if (what->planes)
-            bindings[SPL_BIND_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->page)].buffer;
-        if (what->planes && !what->sum)
-            bindings[SPL_BIND_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
+        bindings[SPL_RESOURCE_PAGE].buffer = resident->pages[batch->page].buffer;
+        if (what->planes) {
+            bindings[SPL_RESOURCE_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->page)].buffer;
+            bindings[SPL_RESOURCE_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
+        }
         uint32_t slot = batch->first_slot;
         for (uint32_t done = 0; done < batch->entries; done += batch->slot_entries) {
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
             params.entries = left < batch->slot_entries ? left : batch->slot_entries;
-            bindings[SPL_BIND_FRAME] = put_params(tile, slot++, &params);
+            bindings[SPL_RESOURCE_FRAME] = put_params(tile, slot++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
             spl_gpu_dispatch(tile->renderer->gpu, batch->apart && what->clipped ? what->clipped : kernel, bindings,
@@ -187,72 +101,62 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
     }
 }
 
-int spl_tile_dispatch_items(struct spl_tile *tile, enum spl_kernel_slot slot, const struct spl_frame_params *params,
-                            uint32_t items, struct spl_error *err)
+int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,
+                            const struct spl_frame_params *params, uint32_t items, struct spl_error *err)
 {
+    struct spl_renderer *r = tile->renderer;
     struct spl_gpu_kernel *kernel;
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    bind_scratch(tile, bindings);
-    bindings[SPL_BIND_BOUNDS].buffer = tile->renderer->scratch.bounds;
-    if (slot >= SPL_KERNEL_FILL_LINES && slot < SPL_KERNEL_FILL_PULL)
-        bindings[SPL_BIND_LINES].buffer = tile->renderer->scratch.lines;
-    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
+    spl_tile_bind(tile, bindings);
+    int rc = spl_kernels_get(&r->kernels, r->gpu, key, &kernel, err);
     if (!rc)
-        rc = next_params(tile, params, &bindings[SPL_BIND_FRAME], err);
+        rc = next_params(tile, params, &bindings[SPL_RESOURCE_FRAME], err);
     if (!rc)
-        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
-    spl_gpu_barrier(tile->renderer->gpu);
+        spl_gpu_dispatch(r->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
+    spl_gpu_barrier(r->gpu);
     return rc;
 }
 
-/* Items of which the kernel sees the first at first_entry. */
-static int dispatch_range(struct spl_tile *tile, enum spl_kernel_slot slot, size_t first, size_t count,
+/* Items of which the kernel sees the first at first_entry; as many dispatches as the device needs. */
+static int dispatch_range(struct spl_tile *tile, const struct spl_kernel_key *key, size_t first, size_t end,
                           struct spl_error *err)
 {
-    struct spl_frame_params params = tile->params;
-    params.first_entry = (uint32_t)first;
-    params.entries = (uint32_t)count;
-    return spl_tile_dispatch_items(tile, slot, &params, (uint32_t)count, err);
+    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
+    int rc = SPL_OK;
+    for (; first < end && !rc; first += most) {
+        struct spl_frame_params params = tile->params;
+        params.first_entry = (uint32_t)first;
+        params.entries = (uint32_t)(end - first < most ? end - first : most);
+        rc = spl_tile_dispatch_items(tile, key, &params, params.entries, err);
+    }
+    return rc;
 }
 
-int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, struct spl_error *err)
+int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err)
 {
     enum { side = SPL_OCCLUSION_TILE };
-    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
     size_t tiles = (size_t)((tile->camera.width + side - 1) / side) * ((tile->camera.height + side - 1) / side);
-    size_t end = tile->renderer->list.chunk_count;
-    int rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_TILES, 0, tiles, err);
-    for (size_t first = first_chunk; first < end && !rc; first += most)
-        rc = dispatch_range(tile, SPL_KERNEL_OCCLUSION_CHUNKS, first, end - first < most ? end - first : most, err);
+    spl_tile_begin_area(tile, SPL_AREA_OCCLUDERS);
+    int rc = dispatch_range(tile, &(struct spl_kernel_key){"occlusion_tiles", false, {wide}}, 0, tiles, err);
+    if (!rc)
+        rc = dispatch_range(tile, &(struct spl_kernel_key){.name = "occlusion_chunks"}, first_chunk,
+                            tile->renderer->list.chunk_count, err);
+    spl_tile_end_area(tile, SPL_AREA_OCCLUDERS);
     return rc;
 }
 
-int spl_tile_dispatch_lines(struct spl_tile *tile, uint32_t kernel, struct spl_error *err)
+int spl_tile_dispatch_lines(struct spl_tile *tile, const struct spl_kernel_key *key, struct spl_error *err)
 {
-    size_t most = (size_t)spl_gpu_get_limits(tile->renderer->gpu)->workgroups * SPL_WORKGROUP;
-    size_t end = tile->renderer->list.line_count;
-    int rc = SPL_OK;
-    for (size_t first = 0; first < end && !rc; first += most)
-        rc = dispatch_range(tile, SPL_KERNEL_FILL_LINES + kernel, first, end - first < most ? end - first : most, err);
-    return rc;
+    return dispatch_range(tile, key, 0, tile->renderer->list.line_count, err);
 }
 
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)
 {
-    struct spl_gpu_kernel *kernel;
-    uint32_t slot = SPL_KERNEL_RESOLVE + 2 * layer + (tile->view->method != SPL_METHOD_SPLAT);
-    int rc = spl_renderer_get_kernel(tile->renderer, slot, &kernel, err);
-    if (rc)
-        return rc;
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-    bind_scratch(tile, bindings);
+    uint32_t resolved = spl_method_row(tile->view->method)->resolve;
+    struct spl_kernel_key key = {"resolve", resolved != SPL_RESOLVED_SUMS, {layer, resolved}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
-    rc = next_params(tile, &params, &bindings[SPL_BIND_FRAME], err);
-    if (!rc)
-        spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
-                         (tile->width * tile->height + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
-    return rc;
+    return spl_tile_dispatch_items(tile, &key, &params, tile->width * tile->height, err);
 }
 
 void spl_tile_stamp(struct spl_tile *tile, enum spl_stage stage)

@@ -6,6 +6,7 @@
 
 #include <math.h>
 
+#include "render/method.h"
 #include "render/renderer.h"
 
 void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camera)
@@ -23,17 +24,16 @@ void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camer
 int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint64_t samples, struct spl_error *err)
 {
     uint32_t side = (uint32_t)view->supersample, layers = (uint32_t)__builtin_popcount(view->layers);
-    const struct spl_fill_plan *plan = &tiling->fill;
-    if (view->method != SPL_METHOD_FILL)
-        tiling->fill = (struct spl_fill_plan){.align = 1, .apron = view->method == SPL_METHOD_SPLAT};
-    uint64_t guard = 2 * (uint64_t)plan->guard, around = 2 * (uint64_t)plan->apron + plan->align - 1;
+    const struct spl_reach *reach = &tiling->reach;
+    uint64_t guard = 2 * (uint64_t)reach->guard, around = 2 * (uint64_t)reach->apron + reach->align - 1;
     uint64_t square = (uint64_t)sqrt((double)samples);
     if ((view->camera.width * side + guard) * (view->camera.height * side + guard) <= samples)
         around = guard;
-    if (view->method == SPL_METHOD_FILL && square < around + side)
+    if (square < around + side)
         return spl_fail_field(err, SPL_E_LIMIT, "kernel",
-                              "a kernel of %g pixels needs tiles of more than %llu samples; ask for a smaller one",
-                              2 * plan->kernel / side, (unsigned long long)samples);
+                              "what is looked at around a pixel, %llu samples across, needs tiles of more than %llu "
+                              "samples; ask for a smaller kernel",
+                              (unsigned long long)(around + side), (unsigned long long)samples);
     uint64_t per_pixel = (uint64_t)side * side > layers ? (uint64_t)side * side : layers;
     uint64_t widest = around
                           ? (samples / 2 / (around + side) > square ? samples / 2 / (around + side) : square) - around
@@ -47,13 +47,13 @@ int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint
 }
 
 /* The range [begin, end) of pixels along an axis of `size` pixels, in samples, with what is drawn around it. */
-static void widen(const struct spl_fill_plan *plan, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
+static void widen(const struct spl_reach *reach, uint32_t side, uint32_t size, uint32_t begin, uint32_t end,
                   int64_t *from, int64_t *to)
 {
-    int64_t guarded = (int64_t)begin * side - plan->apron + plan->guard;
-    *from = (guarded > 0 ? guarded - guarded % plan->align : 0) - plan->guard;
-    *to = (int64_t)end * side + plan->apron;
-    *to = *to > (int64_t)size * side + plan->guard ? (int64_t)size * side + plan->guard : *to;
+    int64_t guarded = (int64_t)begin * side - reach->apron + reach->guard;
+    *from = (guarded > 0 ? guarded - guarded % reach->align : 0) - reach->guard;
+    *to = (int64_t)end * side + reach->apron;
+    *to = *to > (int64_t)size * side + reach->guard ? (int64_t)size * side + reach->guard : *to;
 }
 
 static void set_params(struct spl_tile *tile)
@@ -69,7 +69,7 @@ static void set_params(struct spl_tile *tile)
         .near = (float)camera->near,
         .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
         .low_pass = SPL_LOW_PASS,
-        .margin = (float)view->margin,
+        .margin = (float)view->disc.margin,
         .width = camera->width,
         .height = camera->height,
         .supersample = (uint32_t)view->supersample,
@@ -96,8 +96,8 @@ void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, s
     tile->height = whole->height - y < tiling->height ? whole->height - y : tiling->height;
     tile->fill = tiling->fill;
     int64_t from[2], to[2];
-    widen(&tiling->fill, side, whole->width, x, x + tile->width, &from[0], &to[0]);
-    widen(&tiling->fill, side, whole->height, y, y + tile->height, &from[1], &to[1]);
+    widen(&tiling->reach, side, whole->width, x, x + tile->width, &from[0], &to[0]);
+    widen(&tiling->reach, side, whole->height, y, y + tile->height, &from[1], &to[1]);
     spl_tiling_get_camera(tile->view, &tile->camera);
     tile->camera.width = (uint32_t)(to[0] - from[0]);
     tile->camera.height = (uint32_t)(to[1] - from[1]);
@@ -107,6 +107,7 @@ void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, s
     set_params(tile);
     tile->params.crop_x = (uint32_t)((int64_t)x * side - from[0]);
     tile->params.crop_y = (uint32_t)((int64_t)y * side - from[1]);
-    if (tile->view->method == SPL_METHOD_FILL)
-        spl_fill_set_params(tile);
+    const struct spl_method_row *method = spl_method_row(tile->view->method);
+    if (method->place)
+        method->place(tile);
 }

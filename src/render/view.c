@@ -10,62 +10,18 @@
 enum { side_max = 32768 };
 #define PIXELS_MAX (1ull << 28)
 
-static const char *const method_names[SPL_METHOD_COUNT] = {
-    [SPL_METHOD_SPLAT] = "splat",
-    [SPL_METHOD_POINTS] = "points",
-    [SPL_METHOD_FILL] = "fill",
-};
-
-static const char *const visibility_names[SPL_VISIBILITY_COUNT] = {
-    [SPL_VISIBILITY_ADAPTIVE] = "adaptive",
-    [SPL_VISIBILITY_CONSTANT] = "constant",
-    [SPL_VISIBILITY_NONE] = "none",
-};
-
-const char *spl_method_name(enum spl_method method)
-{
-    return (unsigned)method < SPL_METHOD_COUNT ? method_names[method] : "unknown";
-}
-
-int spl_method_from_name(const char *name)
-{
-    for (int i = 0; i < SPL_METHOD_COUNT; i++)
-        if (!strcmp(name, method_names[i]))
-            return i;
-    return -1;
-}
-
-bool spl_method_has_textures(enum spl_method method)
-{
-    return method == SPL_METHOD_SPLAT;
-}
-
-const char *spl_visibility_name(enum spl_visibility visibility)
-{
-    return (unsigned)visibility < SPL_VISIBILITY_COUNT ? visibility_names[visibility] : "unknown";
-}
-
-int spl_visibility_from_name(const char *name)
-{
-    for (int i = 0; i < SPL_VISIBILITY_COUNT; i++)
-        if (!strcmp(name, visibility_names[i]))
-            return i;
-    return -1;
-}
-
 void spl_view_init(struct spl_view *view)
 {
     *view = (struct spl_view){
-        .method = SPL_METHOD_SPLAT,
+        .method = SPL_METHOD_DEFAULT,
         .layers = 1u << SPL_LAYER_COLOR,
         .lod = 1,
         .supersample = 1,
         .background = {0, 0, 0, 255},
-        .atoms = SPL_TEXTURE_ATOMS,
-        .margin = 1,
-        .threshold = 0.38, /* above three open sectors of eight, a hole's most; the edge of a surface leaves four */
         .deadline_ns = UINT64_MAX,
     };
+    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+        spl_view_set_param(view, i, spl_method_param_get(i)->otherwise);
 }
 
 uint64_t spl_view_get_samples(const struct spl_view *view)
@@ -102,31 +58,26 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     double side = view->supersample;
     if (side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
-    if (view->atoms > SPL_TEXTURE_ATOMS)
-        return spl_fail_field(err, SPL_E_USAGE, "atoms", "atoms %u is not within 0 and %d", view->atoms,
-                              SPL_TEXTURE_ATOMS);
-    if ((unsigned)view->visibility >= SPL_VISIBILITY_COUNT)
-        return spl_fail_field(err, SPL_E_USAGE, "visibility", "visibility %d does not exist", (int)view->visibility);
-    if (view->kernel != 0 && !(view->kernel >= 3 && view->kernel <= 129))
-        return spl_fail_field(err, SPL_E_USAGE, "kernel", "kernel %g is neither 0 nor within 3 and 129 pixels",
-                              view->kernel);
-    if (!(view->threshold >= 0 && view->threshold <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "threshold", "threshold %g is not within 0 and 1", view->threshold);
-    if (view->pyramid > SPL_FILL_LEVELS_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "pyramid", "pyramid %u is not within 0 and %d", view->pyramid,
-                              SPL_FILL_LEVELS_MAX);
-    if (!(view->margin >= 0 && view->margin <= 16))
-        return spl_fail_field(err, SPL_E_USAGE, "margin", "margin %g is not within 0 and 16", view->margin);
-    return SPL_OK;
+    for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
+        rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
+    return rc;
+}
+
+static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
+{
+    const char *finds = "that finds them";
+    for (int i = SPL_METHOD_COUNT; i-- > 0;)
+        if (spl_method_get(i)->finds_normals)
+            finds = spl_method_name(i);
+    return spl_fail_field(err, SPL_E_INPUT, "layer",
+                          "dataset '%s' has no normals, as it was packed with --points-only: ask for method %s, which "
+                          "takes them from depth, or pack it without", info->id, finds);
 }
 
 int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
-    if (!info->has_surface && view->layers >> SPL_LAYER_NORMAL & 1 && view->method == SPL_METHOD_POINTS)
-        return spl_fail_field(err, SPL_E_INPUT, "layer",
-                              "dataset '%s' has no normals, as it was packed with --points-only: ask for method "
-                              "fill, which takes them from depth, or pack it without",
-                              info->id);
+    if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
+        return refuse_normals(info, err);
     if (info->splats > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
                               "dataset '%s' has %llu splats, more than the 32 bits of layer id number (%u): ask for "

@@ -93,8 +93,8 @@ static void measure(struct spl_renderer *renderer, const struct spl_dataset *dat
             spl_view_init(&view);
             view.camera = *camera;
             view.method = settings[i].method;
-            view.visibility = settings[i].visibility;
-            view.kernel = settings[i].kernel;
+            view.fill.visibility = settings[i].visibility;
+            view.fill.kernel = settings[i].kernel;
             double begin = bench_now_ms(clock);
             if (spl_renderer_render(renderer, dataset, &view, &frame, &err))
                 fail(err.message);

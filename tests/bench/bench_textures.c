@@ -65,7 +65,7 @@ int main(int argc, char **argv)
         for (int round = -1; round < rounds; round++)
             for (int cap = 0; cap < caps; cap++) {
                 struct spl_frame frame;
-                view.atoms = atoms[cap];
+                view.disc.atoms = atoms[cap];
                 double begin = processor_ms();
                 must(spl_renderer_render(renderer, dataset, &view, &frame, &err), &err);
                 if (round >= 0)

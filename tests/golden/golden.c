@@ -83,7 +83,7 @@ static struct spl_view make_view(const struct golden *golden)
     view.layers = 1u << golden->layer;
     view.lod = golden->lod;
     view.supersample = golden->supersample;
-    view.atoms = golden->atoms;
+    view.disc.atoms = golden->atoms;
     memcpy(view.background, golden->background, sizeof view.background);
     return view;
 }

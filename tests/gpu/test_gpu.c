@@ -14,6 +14,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "gpu/gpu.h"
+#include "shared.h"
 
 static const char *device; /* "vulkan" or "egl" */
 
@@ -185,6 +186,12 @@ static void fill_and_copy_match(void **state)
     close_checked(gpu);
 }
 
+/* The self-test kernel's storage buffers in the order of their numbers. */
+static const enum spl_resource resources[] = {SPL_RESOURCE_FRAME, SPL_RESOURCE_ENTRIES, SPL_RESOURCE_CHUNKS,
+                                              SPL_RESOURCE_PAGE,  SPL_RESOURCE_DEPTH,   SPL_RESOURCE_SUMS,
+                                              SPL_RESOURCE_OUTPUT, SPL_RESOURCE_IDS};
+enum { ENTRIES = 1, SUMS = 5, IDS = 7, PLACES = 8 };
+
 /* The self-test kernel on random input of many lengths, bound at offsets; 32 or 64 bit atomics. */
 static void dispatch_matches(const char *name, bool wide)
 {
@@ -199,22 +206,31 @@ static void dispatch_matches(const char *name, bool wide)
     assert_int_equal(spl_gpu_kernel_create(gpu, name, constants, 3, &kernel, NULL), 0);
     struct spl_gpu_buffer *up = buffer(gpu, SPL_GPU_UPLOAD, 4 * region), *out = buffer(gpu, SPL_GPU_DEVICE, 4 * region);
     struct spl_gpu_buffer *down = buffer(gpu, SPL_GPU_READBACK, 4 * region);
+    struct spl_gpu_buffer *groups = buffer(gpu, SPL_GPU_DEVICE, 16);
     uint8_t *input = spl_gpu_buffer_map(up), *result = spl_gpu_buffer_map(down);
-    const uint32_t *draw = (uint32_t *)(input + SPL_BIND_DRAW * region);
+    const uint32_t *draw = (uint32_t *)(input + ENTRIES * region);
     static const uint32_t counts[] = {1, 63, 64, 65, 1000, 4097, capacity};
     for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
         for (int i = 0; i < region; i++)
             ((uint32_t *)input)[i] = random_word() >> 8;
-        struct spl_gpu_binding bindings[SPL_BIND_COUNT];
-        for (uint32_t i = 0; i < SPL_BIND_COUNT; i++)
-            bindings[i] = (struct spl_gpu_binding){i < 4 ? up : out, i % 4 * region, region};
-        bindings[SPL_BIND_DRAW].bytes = 4 * counts[c];
+        struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {0};
+        for (uint32_t i = 0; i < PLACES; i++)
+            bindings[resources[i]] = (struct spl_gpu_binding){i < 4 ? up : out, i % 4 * region, region};
+        bindings[SPL_RESOURCE_ENTRIES].bytes = 4 * counts[c];
         assert_int_equal(spl_gpu_begin(gpu, NULL), 0);
         spl_gpu_fill(gpu, out, 0, 4 * region, SPL_NOTHING);
         spl_gpu_barrier(gpu);
         spl_gpu_fill(gpu, out, 4, 12, wide ? SPL_NOTHING : 0);
         spl_gpu_barrier(gpu);
-        spl_gpu_dispatch(gpu, kernel, bindings, (counts[c] + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
+        uint32_t workgroups = (counts[c] + SPL_WORKGROUP - 1) / SPL_WORKGROUP;
+        if (c % 2) { /* the same, counted on the device */
+            spl_gpu_fill(gpu, groups, 4, 4, workgroups);
+            spl_gpu_fill(gpu, groups, 8, 8, 1);
+            spl_gpu_barrier(gpu);
+            spl_gpu_dispatch_indirect(gpu, kernel, bindings, groups, 4);
+        } else {
+            spl_gpu_dispatch(gpu, kernel, bindings, workgroups);
+        }
         spl_gpu_barrier(gpu);
         spl_gpu_copy(gpu, out, 0, down, 0, 4 * region);
         run(gpu);
@@ -228,8 +244,8 @@ static void dispatch_matches(const char *name, bool wide)
             least = draw[i] < least ? draw[i] : least;
             most = draw[i] > most ? draw[i] : most;
             sum += draw[i];
-            assert_memory_equal(result + (SPL_BIND_SUMS - 4) * region + 4 * i, &f, 4);
-            assert_memory_equal(result + (SPL_BIND_ID - 4) * region + 4 * i, &i, 4);
+            assert_memory_equal(result + (SUMS - 4) * region + 4 * i, &f, 4);
+            assert_memory_equal(result + (IDS - 4) * region + 4 * i, &i, 4);
         }
         const uint32_t *depth = (uint32_t *)result, *words = depth + region / 2;
         if (wide) {
@@ -241,11 +257,12 @@ static void dispatch_matches(const char *name, bool wide)
         }
         for (uint32_t i = 0; i < SPL_GPU_CONSTANTS_MAX; i++)
             assert_int_equal(words[i], i < 3 ? constants[i] : 0); /* those not given keep the shader's default */
-        const uint32_t *past = (uint32_t *)(result + (SPL_BIND_SUMS - 4) * region);
+        const uint32_t *past = (uint32_t *)(result + (SUMS - 4) * region);
         assert_int_equal(past[counts[c]], SPL_NOTHING);
     }
     spl_gpu_kernel_destroy(gpu, kernel);
     spl_gpu_buffer_destroy(gpu, up);
+    spl_gpu_buffer_destroy(gpu, groups);
     spl_gpu_buffer_destroy(gpu, out);
     spl_gpu_buffer_destroy(gpu, down);
     close_checked(gpu);

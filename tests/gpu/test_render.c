@@ -375,7 +375,7 @@ static void inside_the_cloud_matches(void **state)
     struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
     view.camera.cx += 31.7;
     view.camera.fy *= 1.3;
-    view.margin = 0;
+    view.disc.margin = 0;
     same_images(dataset, &view, "shifted principal point, no margin");
     done(dataset);
 }
@@ -471,11 +471,11 @@ static void what_method_fill_takes_matches(void **state)
         struct spl_view view = looking(origin, 3, 97, 75);
         view.method = SPL_METHOD_FILL;
         view.lod = i % 2;
-        view.visibility = i % SPL_VISIBILITY_COUNT;
-        view.kernel = (double[]){0, 3, 9, 25}[i / 3];
-        view.threshold = (double[]){0.38, 0.5, 1}[i % 4 % 3];
-        view.pyramid = (uint32_t[]){0, 2, 1, 5}[i / 3];
-        same_images(dataset, &view, spl_visibility_name(view.visibility));
+        view.fill.visibility = i % SPL_VISIBILITY_COUNT;
+        view.fill.kernel = (double[]){0, 3, 9, 25}[i / 3];
+        view.fill.threshold = (double[]){0.38, 0.5, 1}[i % 4 % 3];
+        view.fill.pyramid = (uint32_t[]){0, 2, 1, 5}[i / 3];
+        same_images(dataset, &view, spl_visibility_name(view.fill.visibility));
     }
     done(dataset);
 }
@@ -543,7 +543,7 @@ static void tiles_of_method_fill_leave_no_seams(void **state)
         struct spl_frame frames[2];
         view.method = SPL_METHOD_FILL;
         view.supersample = side;
-        view.kernel = 8.0 / side; /* a guard of half a cell of the coarsest level */
+        view.fill.kernel = 8.0 / side; /* a guard of half a cell of the coarsest level */
         assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frames[0], NULL), SPL_OK);
         assert_int_equal(spl_renderer_render(small, dataset, &view, &frames[1], NULL), SPL_OK);
         assert_int_equal(frames[0].stats.tiles, 1);
@@ -559,7 +559,7 @@ static void tiles_of_method_fill_leave_no_seams(void **state)
     struct spl_frame frame;
     struct spl_error err = {0};
     view.method = SPL_METHOD_FILL;
-    view.kernel = 129;
+    view.fill.kernel = 129;
     assert_int_equal(spl_renderer_render(small, dataset, &view, &frame, &err), SPL_E_LIMIT);
     assert_string_equal(err.field, "kernel");
     spl_renderer_remove(small, dataset);
@@ -726,7 +726,7 @@ static void views_out_of_range_name_their_field(void **state)
     } bad[] = {
         {"lod", offsetof(struct spl_view, lod), NAN},
         {"lod", offsetof(struct spl_view, lod), -1},
-        {"margin", offsetof(struct spl_view, margin), INFINITY},
+        {"margin", offsetof(struct spl_view, disc.margin), INFINITY},
     };
     struct spl_frame frame;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

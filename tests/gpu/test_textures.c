@@ -94,7 +94,7 @@ static void same_as_reference(const struct spl_dataset *dataset, const struct sp
     const struct spl_image *a = &gpu.images[SPL_LAYER_COLOR], *b = &cpu.images[SPL_LAYER_COLOR];
     size_t pixels = (size_t)a->width * a->height, differ = differing(a, b, 1);
     if (differ > pixels / 2000 + 1)
-        fail_msg("%s, %u atoms, lod %g: %zu of %zu pixels differ", what, view->atoms, view->lod, differ, pixels);
+        fail_msg("%s, %u atoms, lod %g: %zu of %zu pixels differ", what, view->disc.atoms, view->lod, differ, pixels);
     spl_frame_finish(&gpu);
     spl_frame_finish(&cpu);
 }
@@ -131,10 +131,10 @@ static void textures_match_the_reference(void **state)
         view.lod = rows[i].lod;
         static const uint32_t atoms[2][3] = {{8, 3, 0}, {7, 5, 1}};
         for (int k = 0; k < 3; k++) {
-            view.atoms = atoms[i % 2][k];
+            view.disc.atoms = atoms[i % 2][k];
             same_as_reference(dataset, &view, rows[i].what);
         }
-        view.atoms = 8;
+        view.disc.atoms = 8;
         view.supersample = 2;
         if (i == 0)
             same_as_reference(dataset, &view, rows[i].what);
@@ -156,9 +156,9 @@ static void textures_change_colours_only(void **state)
     view.layers = (1 << SPL_LAYER_COUNT) - 1;
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         view.method = method;
-        view.atoms = 8;
+        view.disc.atoms = 8;
         struct spl_frame a = render(plain, &view), b = render(dataset, &view);
-        view.atoms = 0;
+        view.disc.atoms = 0;
         struct spl_frame none = render(dataset, &view);
         for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
             const struct spl_image *x = &a.images[layer], *y = &b.images[layer], *z = &none.images[layer];
@@ -175,7 +175,7 @@ static void textures_change_colours_only(void **state)
     view.layers = 1 << SPL_LAYER_COLOR;
     struct spl_frame last = render(dataset, &view);
     for (uint32_t atoms = 1; atoms <= 8; atoms++) {
-        view.atoms = atoms;
+        view.disc.atoms = atoms;
         struct spl_frame next = render(dataset, &view), again = render(dataset, &view);
         assert_true(differing(&last.images[0], &next.images[0], 0) > 100);
         assert_int_equal(differing(&again.images[0], &next.images[0], 0), 0);
@@ -184,7 +184,7 @@ static void textures_change_colours_only(void **state)
         last = next;
     }
     spl_frame_finish(&last);
-    view.atoms = 9;
+    view.disc.atoms = 9;
     struct spl_error err = {0};
     assert_int_equal(spl_view_check(&view, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "atoms");
@@ -204,12 +204,12 @@ static void textures_count_as_memory(void **state)
     struct spl_residency_info resident;
     struct spl_view view = looking(2.5, 64, 48);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-    view.atoms = 0;
+    view.disc.atoms = 0;
     struct spl_frame frame = render(dataset, &view);
     spl_frame_finish(&frame);
     spl_renderer_get_residency(renderer, dataset, &resident);
     uint64_t without = resident.bytes;
-    view.atoms = 1;
+    view.disc.atoms = 1;
     frame = render(dataset, &view);
     assert_true(frame.stats.complete);
     spl_renderer_get_residency(renderer, dataset, &resident);
@@ -233,7 +233,7 @@ static void textures_count_as_memory(void **state)
     assert_int_equal(spl_renderer_preload(small, dataset, NULL), SPL_OK);
     struct spl_frame poor = render(dataset, &view);
     assert_false(poor.stats.complete);
-    view.atoms = 0;
+    view.disc.atoms = 0;
     struct spl_frame colors = render(dataset, &view);
     assert_true(colors.stats.complete);
     assert_int_equal(differing(&poor.images[0], &colors.images[0], 0), 0);

@@ -174,7 +174,7 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
         if (row.whole && !c->suite->whole)
             continue;
         views[0].method = views[1].method = drawings[i].method;
-        views[0].atoms = views[1].atoms = drawings[i].atoms;
+        views[0].disc.atoms = views[1].disc.atoms = drawings[i].atoms;
         bool measured = measure(c, world, views, truths, true, &row);
         if (measured && c->update)
             table_put(c->table, &row);
@@ -198,7 +198,7 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
     struct drawing drawings[SPL_METHOD_COUNT];
     for (int method = 0; method < SPL_METHOD_COUNT; method++)
         drawings[method] =
-            (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method, view->atoms};
+            (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method, view->disc.atoms};
     measure_rows(c, world, view, drawings, SPL_METHOD_COUNT, &(struct row){condition, value, NULL, whole_only, {0}});
 }
 

@@ -178,7 +178,7 @@ bool world_render(struct suite *suite, const struct world *world, const struct p
         planted.camera.cy += 0.5;
     }
     if (suite->plant == PLANT_MARGIN_0)
-        planted.margin = 0;
+        planted.disc.margin = 0;
     int rc = spl_renderer_add(suite->renderer, world->dataset, &err);
     if (!rc)
         rc = spl_renderer_render(suite->renderer, world->dataset, &planted, frame, &err);

@@ -16,15 +16,16 @@
 #include "render/occupancy.h"
 #include "render/fill.h"
 #include "render/select.h"
+#include "render/tiling.h"
 #include "render/wires.h"
 #include "support/reference_fill.h"
 
 struct sample {
     float first;   /* pushed depth, INFINITY = nothing */
-    float nearest; /* method points: depth of the winner */
+    float own;     /* method nearest: depth of the winner, which is not bent */
     uint32_t id;
     uint32_t word;    /* method fill: depth, spacing, linear */
-    uint32_t payload; /* methods points and fill: colour */
+    uint32_t payload; /* of the winner, where one wins: colour */
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
@@ -58,6 +59,17 @@ struct disc {
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
 };
+
+/* Are discs drawn, and are they summed up? Else the nearest wins. */
+static bool draws_discs(const struct spl_view *view)
+{
+    return view->method == SPL_METHOD_SPLAT || view->method == SPL_METHOD_NEAREST;
+}
+
+static bool sums(const struct scene *s)
+{
+    return s->view->method == SPL_METHOD_SPLAT;
+}
 
 static bool always(void *context, uint32_t page)
 {
@@ -196,6 +208,22 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
     }
 }
 
+/* Method nearest: a fragment whose depth is bent to `bent`; each layer's least payload among equals. */
+static void bend(struct sample *at, const struct disc *d, float z, float bent)
+{
+    uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
+    if (bent > at->first)
+        return;
+    bool nearer = bent < at->first;
+    at->first = bent;
+    at->payload = nearer || payload < at->payload ? payload : at->payload;
+    at->own = nearer || z < at->own ? z : at->own;
+    if (nearer || d->id < at->id) {
+        at->id = d->id;
+        memcpy(at->normal_winner, d->n, sizeof d->n);
+    }
+}
+
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 {
     int first[2], last[2];
@@ -213,6 +241,10 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
                 continue;
             struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
             float pushed = z + margin;
+            if (!sums(s)) {
+                bend(at, d, z, z + margin * distance);
+                continue;
+            }
             if (!shade) {
                 if (pushed < at->first)
                     at->first = pushed;
@@ -372,7 +404,7 @@ static void for_each_disc(struct scene *s, bool shade)
             double median = spl_dataset_get_info(s->dataset)->splat_radius;
             float radius = fminf(splat.radius, SPL_FILL_STRAY * draw->radius_min);
             uint32_t low_bits = reference_fill_code(radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0);
-            if (s->view->method != SPL_METHOD_SPLAT)
+            if (!draws_discs(s->view))
                 point(s, &d, low_bits);
             else
                 depth_disc(s, &d, shade);
@@ -382,8 +414,8 @@ static void for_each_disc(struct scene *s, bool shade)
 
 static float depth_of(const struct scene *s, const struct sample *at)
 {
-    if (s->view->method != SPL_METHOD_SPLAT)
-        return at->first;
+    if (!sums(s))
+        return s->view->method == SPL_METHOD_NEAREST ? at->own : at->first;
     return (float)((double)at->first * (1 - (double)at->depth / (double)at->weight / 262144.0));
 }
 
@@ -391,8 +423,7 @@ static void normal_of(const struct scene *s, const struct sample *at, double out
 {
     double length = 0;
     for (int i = 0; i < 3; i++) {
-        out[i] = s->view->method != SPL_METHOD_SPLAT ? at->normal_winner[i]
-                                                     : (double)at->normal[i] / (double)at->weight - 127.5;
+        out[i] = sums(s) ? (double)at->normal[i] / (double)at->weight - 127.5 : at->normal_winner[i];
         length += out[i] * out[i];
     }
     for (int i = 0; i < 3; i++)
@@ -406,7 +437,7 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     const struct sample *own = &s->samples[(size_t)y * s->camera.width + (size_t)x], *around[8], *found = own;
     int covered = 0;
     float sum = 0, closest = INFINITY;
-    if (s->view->method != SPL_METHOD_SPLAT || own->first < INFINITY)
+    if (!sums(s) || own->first < INFINITY)
         return own;
     for (int64_t j = y > 0 ? y - 1 : y; j <= y + 1 && j < s->camera.height; j++)
         for (int64_t i = x > 0 ? x - 1 : x; i <= x + 1 && i < s->camera.width; i++) {
@@ -424,6 +455,28 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
         }
     }
     return found;
+}
+
+/* Channel `c` of what a sample contributes: of method nearest the mean over those around on its surface, 4 : 1 : 1/2. */
+static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
+{
+    if (sums(s))
+        return (at->color[c] + at->weight / 2) / at->weight;
+    if (s->view->method != SPL_METHOD_NEAREST)
+        return at->payload >> 8 * c & 255;
+    int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
+    double sum = 0, weights = 0;
+    for (int64_t j = -1; j <= 1; j++)
+        for (int64_t i = -1; i <= 1; i++) {
+            bool inside = x + i >= 0 && x + i < width && y + j >= 0 && y + j < s->camera.height;
+            const struct sample *beside = inside ? at + j * width + i : at;
+            double weight = i && j ? 0.5 : i || j ? 1 : 4;
+            if (!(fabsf(beside->first - at->first) <= SPL_SMOOTH_SHARE * at->first))
+                continue;
+            sum += weight * (beside->payload >> 8 * c & 255);
+            weights += weight;
+        }
+    return (uint64_t)(sum / weights + 0.5);
 }
 
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
@@ -453,8 +506,7 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
             double n[3];
             normal_of(s, at, n);
             for (int c = 0; c < 3; c++) {
-                color[c] += s->view->method != SPL_METHOD_SPLAT ? (at->payload >> 8 * c & 255)
-                                                                : (at->color[c] + at->weight / 2) / at->weight;
+                color[c] += color_of(s, at, c);
                 normal[c] += n[c];
             }
         }
@@ -533,29 +585,30 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.fy *= view->supersample;
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
-    s.margin = (float)view->margin;
+    s.margin = (float)view->disc.margin;
     struct spl_select_params params = {.dataset = dataset,
                                        .camera = &s.camera,
                                        .lod = view->lod,
                                        .low_pass = SPL_LOW_PASS,
                                        .resident = always,
                                        .lines = view->method == SPL_METHOD_FILL,
-                                       .points = view->method != SPL_METHOD_SPLAT,
+                                       .discs = draws_discs(view),
                                        .textured = always,
-                                       .atoms = spl_view_is_textured(view) ? view->atoms : 0};
+                                       .atoms = spl_view_is_textured(view) ? view->disc.atoms : 0};
     const struct spl_wires *wires = NULL;
     struct spl_fill_plan plan;
+    struct spl_reach reach = {0};
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
         double spacing = 1;
         bool complete = true;
-        rc = view->kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &complete, err);
-        spl_fill_plan_init(&plan, view, spacing);
-        s.guard = plan.guard;
-        s.camera.width += 2 * plan.guard;
-        s.camera.height += 2 * plan.guard;
-        s.camera.cx += plan.guard;
-        s.camera.cy += plan.guard;
+        rc = view->fill.kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &complete, err);
+        spl_fill_plan_init(&plan, &reach, view, spacing);
+        s.guard = reach.guard;
+        s.camera.width += 2 * reach.guard;
+        s.camera.height += 2 * reach.guard;
+        s.camera.cx += reach.guard;
+        s.camera.cy += reach.guard;
     }
     if (!rc)
         rc = spl_select(&params, &s.list, err);
@@ -582,7 +635,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
         lines(&s);
-        if (view->method == SPL_METHOD_SPLAT)
+        if (sums(&s))
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
             fill(&s, &plan);

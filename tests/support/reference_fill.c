@@ -116,7 +116,7 @@ static float coarse_reach(const struct filter *f, int x, int y)
 static bool is_visible(const struct filter *f, int x, int y, float z)
 {
     float steep[8] = {0}, open = 0;
-    bool constant = f->view->visibility == SPL_VISIBILITY_CONSTANT;
+    bool constant = f->view->fill.visibility == SPL_VISIBILITY_CONSTANT;
     if (constant) {
         int k = (int)f->plan->kernel;
         for (int cy = y - k; cy <= y + k; cy++)
@@ -252,7 +252,7 @@ void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height
     f.reach = (float)(3 / 1.128379f * focal);
     f.margin = (float)(1 / 1.128379f);
     f.radius = (float)(median / 16);
-    f.threshold = (float)(8 * view->threshold);
+    f.threshold = (float)(8 * view->fill.threshold);
     for (uint32_t level = 0; level <= SPL_FILL_LEVELS_MAX; level++) {
         f.width[level] = (width + (1u << level) - 1) >> level;
         f.height[level] = (height + (1u << level) - 1) >> level;
@@ -276,7 +276,7 @@ void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height
     for (uint32_t i = 0; i < width * height; i++) {
         const struct cell *own = &f.nearest[0][i];
         f.means[0][i] = *own;
-        bool keeps = own->w > 0 && view->visibility == SPL_VISIBILITY_NONE;
+        bool keeps = own->w > 0 && view->fill.visibility == SPL_VISIBILITY_NONE;
         f.means[0][i].hole =
             !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
     }

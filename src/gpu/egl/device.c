@@ -11,9 +11,8 @@ enum { DEDICATED_VIDMEM_NVX = 0x9047, VBO_FREE_MEMORY_ATI = 0x87FB, SUBGROUP_SIZ
 static void gl_close(struct spl_gpu *base)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
-    if (gpu->dummy) {
+    if (gpu->ready) {
         gl_use(gpu);
-        gl_buffer_destroy(base, gpu->dummy);
         gl_frames_finish(gpu);
     }
     gl_context_close(gpu);
@@ -82,7 +81,7 @@ static int gl_open(uint32_t index, const struct spl_gpu_options *options, struct
         }
         read_limits(gpu);
         gl_frames_init(gpu);
-        gl_buffer_create(&gpu->base, SPL_GPU_DEVICE, 256, &gpu->dummy, &failure);
+        gpu->ready = true;
     }
     if (failure.code) {
         gl_close(&gpu->base);

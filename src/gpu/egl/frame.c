@@ -41,26 +41,26 @@ int gl_begin(struct spl_gpu *base, uint32_t index, struct spl_error *err)
     return check(gpu, err);
 }
 
-void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                 uint32_t workgroups)
+void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
+                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_use(gpu);
-    for (uint32_t i = 0; i < SPL_BIND_COUNT; i++) {
-        const struct gl_buffer *buffer = (const struct gl_buffer *)bindings[i].buffer;
-        if (buffer)
-            gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, buffer->name, (GLintptr)bindings[i].offset,
-                                    (GLsizeiptr)bindings[i].bytes);
-        else
-            gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, ((struct gl_buffer *)gpu->dummy)->name, 0, 256);
+    for (uint32_t i = 0; i < kernel->code->storages.count; i++) {
+        const struct spl_gpu_binding *binding = &arguments->storage[i];
+        gpu->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, i, ((const struct gl_buffer *)binding->buffer)->name,
+                                (GLintptr)binding->offset, (GLsizeiptr)binding->bytes);
     }
-    for (uint32_t i = 0; i < SPL_TEXELS_COUNT; i++) {
-        const struct gl_buffer *buffer = (const struct gl_buffer *)bindings[spl_gpu_texels_of[i]].buffer;
-        GLuint texels = buffer ? buffer->texels : ((struct gl_buffer *)gpu->dummy)->texels;
-        gpu->gl.BindImageTexture(i, texels, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R32UI);
-    }
+    for (uint32_t i = 0; i < kernel->code->texels.count; i++)
+        gpu->gl.BindImageTexture(i, ((const struct gl_buffer *)arguments->texels[i])->texels, 0, GL_FALSE, 0,
+                                 GL_READ_ONLY, GL_R32UI);
     gpu->gl.UseProgram(((struct gl_kernel *)kernel)->program);
-    gpu->gl.DispatchCompute(workgroups, 1, 1);
+    if (counts) {
+        gpu->gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, ((const struct gl_buffer *)counts)->name);
+        gpu->gl.DispatchComputeIndirect((GLintptr)offset);
+    } else {
+        gpu->gl.DispatchCompute(workgroups, 1, 1);
+    }
 }
 
 void gl_barrier(struct spl_gpu *base)

@@ -13,6 +13,7 @@
 /* Every entry point that is used: FUNCTION(type, name without "gl"). All of them are core in OpenGL 4.5. */
 #define GL_FUNCTIONS                                                                                                   \
     FUNCTION(PFNGLATTACHSHADERPROC, AttachShader)                                                                      \
+    FUNCTION(PFNGLBINDBUFFERPROC, BindBuffer)                                                                          \
     FUNCTION(PFNGLBINDBUFFERRANGEPROC, BindBufferRange)                                                                \
     FUNCTION(PFNGLBINDIMAGETEXTUREPROC, BindImageTexture)                                                              \
     FUNCTION(PFNGLCLEARNAMEDBUFFERSUBDATAPROC, ClearNamedBufferSubData)                                                \
@@ -31,6 +32,7 @@
     FUNCTION(PFNGLDELETESYNCPROC, DeleteSync)                                                                          \
     FUNCTION(PFNGLDELETETEXTURESPROC, DeleteTextures)                                                                  \
     FUNCTION(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)                                                                \
+    FUNCTION(PFNGLDISPATCHCOMPUTEINDIRECTPROC, DispatchComputeIndirect)                                                \
     FUNCTION(PFNGLENABLEPROC, Enable)                                                                                  \
     FUNCTION(PFNGLFENCESYNCPROC, FenceSync)                                                                            \
     FUNCTION(PFNGLFLUSHPROC, Flush)                                                                                    \
@@ -77,7 +79,7 @@ struct gl_gpu {
     struct gl_slot slots[SPL_GPU_SLOTS];
     struct gl_slot *slot;         /* being recorded */
     uint64_t ended;               /* largest ticket known to have ended */
-    struct spl_gpu_buffer *dummy; /* what unused bindings see */
+    bool ready;                   /* there is something to finish */
 };
 
 struct gl_buffer {
@@ -114,8 +116,8 @@ void gl_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel);
 void gl_frames_init(struct gl_gpu *gpu);
 void gl_frames_finish(struct gl_gpu *gpu);
 int gl_begin(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
-void gl_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                 uint32_t workgroups);
+void gl_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
+                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
 void gl_barrier(struct spl_gpu *gpu);
 void gl_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
              uint64_t to_offset, uint64_t bytes);

@@ -1,5 +1,4 @@
-/* Opening and closing a Vulkan device, and the backend's table. One compute queue; one descriptor set layout and
- * pipeline layout for every kernel. Owned by the thread that opens it. */
+/* Opening and closing a Vulkan device, and the backend's table. One compute queue. Owned by the thread that opens it. */
 #include "gpu/vulkan/vk.h"
 
 #include <stdlib.h>
@@ -12,12 +11,8 @@ static void vk_close(struct spl_gpu *base)
     if (gpu->device) {
         if (!base->lost)
             vk_cache_save(gpu);
-        if (gpu->dummy)
-            vk_buffer_destroy(base, gpu->dummy);
         vk_frames_finish(gpu);
         vkDestroyPipelineCache(gpu->device, gpu->cache, NULL);
-        vkDestroyPipelineLayout(gpu->device, gpu->layout, NULL);
-        vkDestroyDescriptorSetLayout(gpu->device, gpu->set_layout, NULL);
         vkDestroyDevice(gpu->device, NULL);
     }
     free(gpu);
@@ -103,34 +98,6 @@ static int create_device(struct vk_gpu *gpu, bool *atomics_64, struct spl_error 
     return 0;
 }
 
-static int create_layout(struct vk_gpu *gpu, struct spl_error *err)
-{
-    enum { count = SPL_BIND_COUNT + SPL_TEXELS_COUNT };
-    VkDescriptorSetLayoutBinding bindings[count];
-    for (uint32_t i = 0; i < count; i++)
-        bindings[i] = (VkDescriptorSetLayoutBinding){.binding = i,
-                                                     .descriptorType = i < SPL_BIND_COUNT
-                                                                           ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
-                                                                           : VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
-                                                     .descriptorCount = 1,
-                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT};
-    VkResult result = vkCreateDescriptorSetLayout(
-        gpu->device,
-        &(VkDescriptorSetLayoutCreateInfo){.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                                           .flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR,
-                                           .bindingCount = count,
-                                           .pBindings = bindings},
-        NULL, &gpu->set_layout);
-    if (result >= 0)
-        result = vkCreatePipelineLayout(
-            gpu->device,
-            &(VkPipelineLayoutCreateInfo){.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                                          .setLayoutCount = 1,
-                                          .pSetLayouts = &gpu->set_layout},
-            NULL, &gpu->layout);
-    return result < 0 ? vk_fail(err, SPL_E_NO_DEVICE, result, "no pipeline layout") : 0;
-}
-
 static int vk_open(uint32_t index, const struct spl_gpu_options *options, struct spl_gpu **out, struct spl_error *err)
 {
     VkPhysicalDeviceProperties properties;
@@ -150,9 +117,7 @@ static int vk_open(uint32_t index, const struct spl_gpu_options *options, struct
     if ((code = create_device(gpu, &atomics_64, err)) < 0)
         goto failed;
     read_limits(gpu, &properties, atomics_64);
-    if ((code = create_layout(gpu, err)) < 0 || (code = vk_cache_load(gpu, &properties, options->cache_dir, err)) < 0 ||
-        (code = vk_frames_init(gpu, err)) < 0 ||
-        (code = vk_buffer_create(&gpu->base, SPL_GPU_DEVICE, 256, &gpu->dummy, err)) < 0)
+    if ((code = vk_cache_load(gpu, &properties, options->cache_dir, err)) < 0 || (code = vk_frames_init(gpu, err)) < 0)
         goto failed;
     *out = &gpu->base;
     return 0;

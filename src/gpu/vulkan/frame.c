@@ -51,7 +51,7 @@ void vk_barrier(struct spl_gpu *base)
         .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
         .srcStageMask = work,
         .srcAccessMask = VK_ACCESS_2_MEMORY_WRITE_BIT,
-        .dstStageMask = work | VK_PIPELINE_STAGE_2_HOST_BIT,
+        .dstStageMask = work | VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT | VK_PIPELINE_STAGE_2_HOST_BIT,
         .dstAccessMask = VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
     };
     vkCmdPipelineBarrier2(gpu->slot->commands, &(VkDependencyInfo){.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
@@ -77,39 +77,44 @@ int vk_begin(struct spl_gpu *base, uint32_t index, struct spl_error *err)
     return 0;
 }
 
-void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                 uint32_t workgroups)
+void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *base_kernel, const struct spl_gpu_arguments *arguments,
+                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
+    const struct vk_kernel *kernel = (const struct vk_kernel *)base_kernel;
+    const struct spl_gpu_code *code = kernel->base.code;
     VkCommandBuffer commands = gpu->slot->commands;
-    VkDescriptorBufferInfo ranges[SPL_BIND_COUNT];
-    VkBufferView views[SPL_TEXELS_COUNT];
-    VkWriteDescriptorSet writes[SPL_BIND_COUNT + SPL_TEXELS_COUNT];
-    for (uint32_t i = 0; i < SPL_BIND_COUNT; i++) {
-        const struct vk_buffer *buffer = (const struct vk_buffer *)bindings[i].buffer;
-        if (buffer)
-            ranges[i] = (VkDescriptorBufferInfo){buffer->buffer, bindings[i].offset, bindings[i].bytes};
-        else
-            ranges[i] = (VkDescriptorBufferInfo){((struct vk_buffer *)gpu->dummy)->buffer, 0, VK_WHOLE_SIZE};
-        writes[i] = (VkWriteDescriptorSet){.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-                                           .dstBinding = i,
-                                           .descriptorCount = 1,
-                                           .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-                                           .pBufferInfo = &ranges[i]};
+    VkDescriptorBufferInfo ranges[SPL_GPU_BOUND_MAX];
+    VkBufferView views[SPL_GPU_BOUND_MAX];
+    VkWriteDescriptorSet writes[2 * SPL_GPU_BOUND_MAX];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < code->storages.count; i++) {
+        const struct spl_gpu_binding *binding = &arguments->storage[i];
+        ranges[i] = (VkDescriptorBufferInfo){((const struct vk_buffer *)binding->buffer)->buffer, binding->offset,
+                                             binding->bytes};
+        writes[count] = (VkWriteDescriptorSet){.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                               .dstBinding = count,
+                                               .descriptorCount = 1,
+                                               .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                                               .pBufferInfo = &ranges[i]};
+        count++;
     }
-    for (uint32_t i = 0; i < SPL_TEXELS_COUNT; i++) {
-        const struct vk_buffer *buffer = (const struct vk_buffer *)bindings[spl_gpu_texels_of[i]].buffer;
-        views[i] = buffer && buffer->texels ? buffer->texels : ((struct vk_buffer *)gpu->dummy)->texels;
-        writes[SPL_BIND_COUNT + i] = (VkWriteDescriptorSet){.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-                                                            .dstBinding = SPL_BIND_COUNT + i,
-                                                            .descriptorCount = 1,
-                                                            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
-                                                            .pTexelBufferView = &views[i]};
+    for (uint32_t i = 0; i < code->texels.count; i++) {
+        views[i] = ((const struct vk_buffer *)arguments->texels[i])->texels;
+        spl_assert(views[i]);
+        writes[count] = (VkWriteDescriptorSet){.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                               .dstBinding = count,
+                                               .descriptorCount = 1,
+                                               .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
+                                               .pTexelBufferView = &views[i]};
+        count++;
     }
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, ((struct vk_kernel *)kernel)->pipeline);
-    gpu->push_descriptors(commands, VK_PIPELINE_BIND_POINT_COMPUTE, gpu->layout, 0,
-                          SPL_BIND_COUNT + SPL_TEXELS_COUNT, writes);
-    vkCmdDispatch(commands, workgroups, 1, 1);
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel->pipeline);
+    gpu->push_descriptors(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel->layout, 0, count, writes);
+    if (counts)
+        vkCmdDispatchIndirect(commands, ((const struct vk_buffer *)counts)->buffer, offset);
+    else
+        vkCmdDispatch(commands, workgroups, 1, 1);
 }
 
 void vk_copy(struct spl_gpu *base, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,

@@ -15,6 +15,34 @@
 /* No driver's cache of a dozen kernels comes near this; a file beyond it is not one. */
 enum { CACHE_BYTES_MAX = 64 << 20 };
 
+/* Storage buffers, then texels, pushed with each dispatch. */
+static VkResult create_layout(struct vk_gpu *gpu, const struct spl_gpu_code *code, struct vk_kernel *kernel)
+{
+    VkDescriptorSetLayoutBinding bindings[2 * SPL_GPU_BOUND_MAX];
+    uint32_t count = code->storages.count + code->texels.count;
+    for (uint32_t i = 0; i < count; i++)
+        bindings[i] = (VkDescriptorSetLayoutBinding){.binding = i,
+                                                     .descriptorType = i < code->storages.count
+                                                                           ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
+                                                                           : VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER,
+                                                     .descriptorCount = 1,
+                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT};
+    VkResult result = vkCreateDescriptorSetLayout(
+        gpu->device,
+        &(VkDescriptorSetLayoutCreateInfo){.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
+                                           .flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR,
+                                           .bindingCount = count,
+                                           .pBindings = bindings},
+        NULL, &kernel->set_layout);
+    return result < 0 ? result
+                      : vkCreatePipelineLayout(gpu->device,
+                                               &(VkPipelineLayoutCreateInfo){
+                                                   .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                                   .setLayoutCount = 1,
+                                                   .pSetLayouts = &kernel->set_layout},
+                                               NULL, &kernel->layout);
+}
+
 int vk_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, const uint32_t *constants,
                      size_t constant_count, struct spl_gpu_kernel **out, struct spl_error *err)
 {
@@ -29,14 +57,16 @@ int vk_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, cons
                                            .pMapEntries = entries,
                                            .dataSize = 4 * constant_count,
                                            .pData = constants};
-    VkShaderModule module;
-    VkResult result = vkCreateShaderModule(gpu->device,
+    VkShaderModule module = VK_NULL_HANDLE;
+    VkResult result = create_layout(gpu, code, kernel);
+    if (result >= 0)
+        result = vkCreateShaderModule(gpu->device,
                                            &(VkShaderModuleCreateInfo){
                                                .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                                .codeSize = code->vulkan_bytes,
                                                .pCode = code->vulkan},
                                            NULL, &module);
-    if (result >= 0) {
+    if (result >= 0)
         result = vkCreateComputePipelines(
             gpu->device, gpu->cache, 1,
             &(VkComputePipelineCreateInfo){
@@ -46,14 +76,13 @@ int vk_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, cons
                           .module = module,
                           .pName = "main",
                           .pSpecializationInfo = &specialization},
-                .layout = gpu->layout},
+                .layout = kernel->layout},
             NULL, &kernel->pipeline);
-        vkDestroyShaderModule(gpu->device, module, NULL);
-    }
+    vkDestroyShaderModule(gpu->device, module, NULL);
     if (result < 0) {
         char what[128];
         snprintf(what, sizeof what, "kernel '%s' was refused", code->name);
-        free(kernel);
+        vk_kernel_destroy(base, &kernel->base);
         return vk_fail(err, SPL_E_UNSUPPORTED, result, what);
     }
     *out = &kernel->base;
@@ -65,6 +94,8 @@ void vk_kernel_destroy(struct spl_gpu *base, struct spl_gpu_kernel *base_kernel)
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     struct vk_kernel *kernel = (struct vk_kernel *)base_kernel;
     vkDestroyPipeline(gpu->device, kernel->pipeline, NULL);
+    vkDestroyPipelineLayout(gpu->device, kernel->layout, NULL);
+    vkDestroyDescriptorSetLayout(gpu->device, kernel->set_layout, NULL);
     free(kernel);
 }
 

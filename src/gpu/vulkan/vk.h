@@ -21,15 +21,12 @@ struct vk_gpu {
     VkDevice device;
     VkQueue queue;
     uint32_t family;
-    VkDescriptorSetLayout set_layout;
-    VkPipelineLayout layout;
     VkPipelineCache cache;
     char cache_path[4096];         /* "" = none */
     size_t cache_loaded;           /* bytes that came from disk */
     VkSemaphore timeline;          /* its value is the last ended ticket */
     struct vk_slot slots[SPL_GPU_SLOTS];
     struct vk_slot *slot;          /* being recorded */
-    struct spl_gpu_buffer *dummy;  /* what unused bindings see */
     double timestamp_period_ns;
     uint64_t timestamp_mask;
     PFN_vkCmdPushDescriptorSetKHR push_descriptors;
@@ -44,6 +41,8 @@ struct vk_buffer {
 
 struct vk_kernel {
     struct spl_gpu_kernel base;    /* first */
+    VkDescriptorSetLayout set_layout;
+    VkPipelineLayout layout;
     VkPipeline pipeline;
 };
 
@@ -76,8 +75,8 @@ void vk_cache_save(struct vk_gpu *gpu);
 int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err);
 void vk_frames_finish(struct vk_gpu *gpu);
 int vk_begin(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
-void vk_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                 uint32_t workgroups);
+void vk_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
+                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
 void vk_barrier(struct spl_gpu *gpu);
 void vk_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
              uint64_t to_offset, uint64_t bytes);

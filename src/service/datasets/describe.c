@@ -19,12 +19,12 @@ static json_t *describe_layers(void)
     return list;
 }
 
-/* Without radii there are no discs: method fill is drawn where splat is asked for. */
+/* Those that are drawn as they are called: without radii something else stands in for discs. */
 static json_t *describe_methods(const struct spl_dataset_info *info)
 {
     json_t *list = json_array();
     for (int i = 0; i < SPL_METHOD_COUNT; i++)
-        if (i != SPL_METHOD_SPLAT || info->has_surface)
+        if (spl_method_for((enum spl_method)i, info) == (enum spl_method)i)
             json_array_append_new(list, json_string(spl_method_name((enum spl_method)i)));
     return list;
 }

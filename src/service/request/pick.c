@@ -31,7 +31,7 @@ static int resolve(const struct values *values, const struct spl_camera_defaults
     spl_values_resolve_splats(values, &out->view);
     spl_values_resolve_version(values, out);
     out->view.layers = (1u << SPL_LAYER_COUNT) - 1;
-    out->view.atoms = 0; // its colour is the splat's
+    out->view.disc.atoms = 0; // its colour is the splat's
     out->view.camera = *camera;
     out->view.camera.cx += 0.5 - out->pick.x;
     out->view.camera.cy += 0.5 - out->pick.y;

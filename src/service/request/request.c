@@ -69,13 +69,13 @@ static int resolve_layers(const struct values *values, struct spl_view_request *
 
 void spl_values_resolve_splats(const struct values *values, struct spl_view *view)
 {
-    view->visibility = (enum spl_visibility)get(values, PARAM_visibility, view->visibility);
-    view->kernel = get(values, PARAM_kernel, view->kernel);
-    view->threshold = get(values, PARAM_threshold, view->threshold);
-    view->pyramid = (uint32_t)fmin(get(values, PARAM_pyramid, view->pyramid), UINT32_MAX);
+#define TAKE(name, ...)                                                                                                \
+    if (given(values, PARAM_##name))                                                                                   \
+        spl_view_set_param(view, SPL_PARAM_##name, values->v[PARAM_##name].n[0]);
+    SPL_METHOD_PARAMS(TAKE, TAKE, TAKE)
+#undef TAKE
     view->method = (enum spl_method)get(values, PARAM_method, view->method);
     view->lod = get(values, PARAM_lod, view->lod);
-    view->margin = get(values, PARAM_margin, view->margin);
 }
 
 static int resolve_drawing(const struct values *values, struct spl_view_request *out, struct spl_error *err)
@@ -86,7 +86,6 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
         return rc;
     spl_values_resolve_splats(values, view);
     view->supersample = get(values, PARAM_supersample, 1);
-    view->atoms = (uint32_t)fmin(get(values, PARAM_atoms, view->atoms), UINT32_MAX);
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)
             view->background[i] = (uint8_t)values->v[PARAM_background].n[i];
@@ -144,7 +143,7 @@ static int resolve_demand(const struct values *values, const struct spl_camera_l
     demand->kept.method = out->view.method;
     demand->kept.lod = out->view.lod;
     demand->kept.supersample = out->view.supersample;
-    demand->kept.atoms = out->view.atoms;
+    demand->kept.atoms = out->view.disc.atoms;
     return 0;
 }
 

@@ -87,6 +87,21 @@ static int parse_version(struct spl_value *value, const char *name, const char *
     return 0;
 }
 
+/* Of a method's parameter. */
+static int parse_choice(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    const struct spl_method_param_info *param = spl_method_param_get(spl_method_param_from_name(name));
+    int choice = param->choice_from_name(text);
+    if (choice < 0) {
+        char known[256] = "";
+        for (int i = 0, used = 0; i <= (int)param->most && used < (int)sizeof known; i++)
+            used += snprintf(known + used, sizeof known - (size_t)used, "%s%s", i ? ", " : "", param->choice_name(i));
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, text, known);
+    }
+    value->n[0] = choice;
+    return 0;
+}
+
 int spl_value_add_layer(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
     int layer = spl_layer_from_name(text);
@@ -137,8 +152,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         const char *choices;
     } table[] = {
         [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
-        [SPL_KIND_METHOD] = {spl_method_from_name, "splat, points, fill"},
-        [SPL_KIND_VISIBILITY] = {spl_visibility_from_name, "adaptive, constant, none"},
+        [SPL_KIND_METHOD] = {spl_method_from_name, spl_method_names()},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
                                                          ? "jpeg, png, webp, npy, raw"
@@ -151,6 +165,8 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_duration(value, name, text, err);
     if (kind == SPL_KIND_LAYERS)
         return parse_layers(value, name, text, err);
+    if (kind == SPL_KIND_CHOICE)
+        return parse_choice(value, name, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

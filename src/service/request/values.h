@@ -14,7 +14,7 @@ enum {
     SPL_KIND_FLAG = SPL_KIND_END,
     SPL_KIND_COLOR,
     SPL_KIND_METHOD,
-    SPL_KIND_VISIBILITY,
+    SPL_KIND_CHOICE, /* of a method's parameter */
     SPL_KIND_LAYER,
     SPL_KIND_LAYERS, /* bit per enum spl_layer */
     SPL_KIND_FORMAT,

@@ -124,12 +124,11 @@ static void inject(struct gpu *gpu)
     spl_renderer_inject_loss(gpu->renderer);
 }
 
-/* A pick asks for all layers, and method points has no normals of bare points: the reply then says null. */
+/* A pick asks for all layers, and not every method has normals of bare points: the reply then says null. */
 static void leave_out_normals(struct spl_job *job)
 {
     struct spl_view *view = &job->request.view;
-    if (job->request.picks && view->method == SPL_METHOD_POINTS && job->dataset &&
-        !spl_dataset_get_info(job->dataset)->has_surface)
+    if (job->request.picks && job->dataset && !spl_method_has_normals(view->method, spl_dataset_get_info(job->dataset)))
         view->layers &= ~(1u << SPL_LAYER_NORMAL);
 }
 

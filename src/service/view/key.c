@@ -92,12 +92,13 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     add(&form, (uint64_t)view->method << 32 | view->layers);
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
-    add_number(&form, view->margin);
-    bool fills = view->method != SPL_METHOD_POINTS; /* where there are bare points, splat is drawn as fill */
-    add(&form, fills ? (uint64_t)view->visibility << 32 | view->pyramid : 0);
-    add_number(&form, fills ? view->kernel : 0);
-    add_number(&form, fills ? view->threshold : 0);
-    add(&form, view->layers & 1u << SPL_LAYER_COLOR ? (uint64_t)view->atoms << 32 | background : 0);
+    bool colored = view->layers >> SPL_LAYER_COLOR & 1;
+    uint32_t params = spl_method_get_params(view->method);
+    for (int i = 0; i < SPL_PARAM_COUNT; i++) {
+        bool counts = params >> i & 1 && (colored || spl_method_param_get(i)->shapes);
+        add_number(&form, counts ? spl_view_get_param(view, i) : 0);
+    }
+    add(&form, colored ? background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {
         add_camera(&form, &request->pick.camera);

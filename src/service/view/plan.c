@@ -157,8 +157,8 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     struct spl_demand demand = request->demand;
     demand.keep_atoms &= plan->info->atoms > 0;
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
-        demand.keep_method = true; /* of bare points method points has no normals; splat is drawn as fill */
-        demand.kept.method = SPL_METHOD_SPLAT;
+        demand.keep_method = true; /* not every method has normals of bare points */
+        demand.kept.method = SPL_METHOD_DEFAULT;
     }
     pthread_mutex_lock(&plan->mutex);
     demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
@@ -170,7 +170,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         return rc;
     request->view.method = choice->setting.method;
     request->view.lod = choice->setting.lod;
-    request->view.atoms = choice->setting.atoms;
+    request->view.disc.atoms = choice->setting.atoms;
     set_supersample(&request->view, &choice->setting);
     *promised_ms = choice->ms + demand.extra_ms;
     return 0;
@@ -179,11 +179,12 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
 void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
 {
     const struct spl_view *view = &request->view;
-    bool fills = view->method == SPL_METHOD_FILL || (!plan->info->has_surface && view->method == SPL_METHOD_SPLAT);
-    if (fills && (view->visibility != SPL_VISIBILITY_ADAPTIVE || view->kernel > 0 || view->pyramid))
-        return; /* what it took says nothing of the settings that were measured */
+    uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params & ~SPL_PARAM_BIT(atoms);
+    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+        if (params >> i & 1 && spl_view_get_param(view, i) != spl_method_param_get(i)->otherwise)
+            return; /* what it took says nothing of the settings that were measured */
     struct spl_setting setting = {view->method, view->lod, view->supersample,
-                                  plan->info->atoms ? view->atoms : SPL_TEXTURE_ATOMS};
+                                  plan->info->atoms ? view->disc.atoms : SPL_TEXTURE_ATOMS};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
     if (index >= 0)
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);

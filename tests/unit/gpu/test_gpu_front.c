@@ -15,7 +15,7 @@
 #include "gpu/backend.h"
 
 static struct {
-    int buffers, kernels, waits, closes;
+    int buffers, kernels, dispatches, waits, closes;
     bool refuse_buffers, refuse_submit;
     uint64_t ended; /* tickets up to this one have ended */
     uint64_t last_timeout_ns;
@@ -69,10 +69,12 @@ static int fake_begin(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err)
     return 0;
 }
 
-static void fake_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_binding *bindings,
-                          uint32_t workgroups)
+static void fake_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
+                          const struct spl_gpu_arguments *arguments, uint32_t workgroups,
+                          struct spl_gpu_buffer *counts, uint64_t offset)
 {
-    (void)gpu, (void)kernel, (void)bindings, (void)workgroups;
+    (void)gpu, (void)arguments, (void)workgroups, (void)counts, (void)offset;
+    fake.dispatches += kernel->code->storages.count;
 }
 
 static void fake_barrier(struct spl_gpu *gpu)
@@ -332,27 +334,87 @@ static void offset_that_wraps(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer
     spl_gpu_fill(gpu, buffer, UINT64_MAX - 3, 8, 0);
 }
 
-static void dispatch_with(struct spl_gpu *gpu, struct spl_gpu_binding binding, uint32_t workgroups)
+/* All that the kernel binds but `out` is `rest`. */
+static void dispatch_with(struct spl_gpu *gpu, const char *name, struct spl_gpu_binding rest, enum spl_resource out,
+                          struct spl_gpu_binding binding, uint32_t workgroups)
 {
-    struct spl_gpu_binding bindings[SPL_BIND_COUNT] = {[SPL_BIND_SUMS] = binding};
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
     struct spl_gpu_kernel *kernel = NULL;
-    spl_gpu_kernel_create(gpu, "selftest", NULL, 0, &kernel, NULL);
+    for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
+        bindings[i] = i == (int)out ? binding : rest;
+    assert_int_equal(spl_gpu_kernel_create(gpu, name, NULL, 0, &kernel, NULL), 0);
     spl_gpu_dispatch(gpu, kernel, bindings, workgroups);
+    spl_gpu_kernel_destroy(gpu, kernel);
+}
+
+static void misdispatch(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, struct spl_gpu_binding binding,
+                        uint32_t workgroups)
+{
+    dispatch_with(gpu, "selftest", (struct spl_gpu_binding){buffer, 0, 16}, SPL_RESOURCE_SUMS, binding, workgroups);
 }
 
 static void unaligned_binding(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
 {
-    dispatch_with(gpu, (struct spl_gpu_binding){buffer, 128, 16}, 1);
+    misdispatch(gpu, buffer, (struct spl_gpu_binding){buffer, 128, 16}, 1);
 }
 
 static void binding_beyond_the_limit(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
 {
-    dispatch_with(gpu, (struct spl_gpu_binding){buffer, 0, 1028}, 1);
+    misdispatch(gpu, buffer, (struct spl_gpu_binding){buffer, 0, 1028}, 1);
 }
 
 static void too_many_workgroups(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
 {
-    dispatch_with(gpu, (struct spl_gpu_binding){buffer, 0, 16}, 101);
+    misdispatch(gpu, buffer, (struct spl_gpu_binding){buffer, 0, 16}, 101);
+}
+
+static void binding_that_is_missing(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
+{
+    misdispatch(gpu, buffer, (struct spl_gpu_binding){0}, 1);
+}
+
+static void counts_past_the_end(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
+{
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
+    struct spl_gpu_kernel *kernel = NULL;
+    for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
+        bindings[i] = (struct spl_gpu_binding){buffer, 0, 16};
+    spl_gpu_kernel_create(gpu, "selftest", NULL, 0, &kernel, NULL);
+    spl_gpu_dispatch_indirect(gpu, kernel, bindings, buffer, 2040);
+}
+
+/* A kernel is given what its row declares, under any resource's name; '?' may be missing. */
+static void kernels_bind_what_they_declare(void **state)
+{
+    (void)state;
+    struct spl_gpu gpu = make();
+    struct spl_gpu_buffer *buffer;
+    uint64_t ticket;
+    assert_int_equal(spl_gpu_buffer_create(&gpu, SPL_GPU_DEVICE, 1024, &buffer, NULL), 0);
+    assert_int_equal(spl_gpu_begin(&gpu, NULL), 0);
+    struct spl_gpu_binding binding = {buffer, 0, 16};
+    dispatch_with(&gpu, "selftest", binding, SPL_RESOURCE_SUMS, binding, 1);
+    assert_int_equal(fake.dispatches, 8);
+    dispatch_with(&gpu, "resolve", binding, SPL_RESOURCE_IDS, (struct spl_gpu_binding){0}, 1);
+    dispatch_with(&gpu, "selftest", binding, SPL_RESOURCE_LINES, (struct spl_gpu_binding){0}, 1);
+    assert_int_equal(fake.dispatches, 18);
+    assert_int_equal(spl_gpu_submit(&gpu, &ticket, NULL), 0);
+    fake.ended = ticket;
+    spl_gpu_buffer_destroy(&gpu, buffer);
+    spl_gpu_close(&gpu);
+}
+
+static void every_kernel_is_as_declared(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"fill_gather", "fill_lines64", "points64", "resolve", "selftest64",
+                                        "splat_depth", "splat_shade64", "splat_summed", "splat_texture64"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        struct spl_gpu_code code = *spl_gpu_code_find(names[i]);
+        assert_true(spl_gpu_code_is_as_declared(&code));
+        code.storages.count = 0; /* the shader's highest numbers are not declared then */
+        assert_false(spl_gpu_code_is_as_declared(&code));
+    }
 }
 
 static void map_of_device_memory(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
@@ -375,6 +437,8 @@ static void our_own_bugs_abort(void **state)
     expect_abort(unaligned_binding);
     expect_abort(binding_beyond_the_limit);
     expect_abort(too_many_workgroups);
+    expect_abort(binding_that_is_missing);
+    expect_abort(counts_past_the_end);
     expect_abort(map_of_device_memory);
     expect_abort(close_with_live_buffers);
 }
@@ -392,6 +456,8 @@ int main(void)
         cmocka_unit_test(work_without_end_keeps_its_memory),
         cmocka_unit_test(injected_and_real_losses_stick),
         cmocka_unit_test(selftest_names_the_wrong_word),
+        cmocka_unit_test(kernels_bind_what_they_declare),
+        cmocka_unit_test(every_kernel_is_as_declared),
         cmocka_unit_test(our_own_bugs_abort),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

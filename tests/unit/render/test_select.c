@@ -35,7 +35,7 @@ static void a_spacing_of_stand_ins_is_not_complete(void **state)
     assert_int_equal(spl_camera_set_fov(&view.camera, 40, 256, 256, NULL), SPL_OK);
     int left = 1000;
     struct spl_select_params params = {
-        .dataset = dataset, .camera = &view.camera, .lod = 1, .resident = take_one, .points = true, .context = &left};
+        .dataset = dataset, .camera = &view.camera, .lod = 1, .resident = take_one, .context = &left};
     double fine, coarse;
     bool complete = true;
     assert_int_equal(spl_select_spacing(&params, &fine, &complete, NULL), SPL_OK);

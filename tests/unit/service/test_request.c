@@ -61,8 +61,8 @@ static void every_parameter_arrives(void **state)
     assert_int_equal(r.view.method, SPL_METHOD_POINTS);
     assert_int_equal(r.view.layers, 1 << SPL_LAYER_DEPTH);
     assert_int_equal(r.view.supersample, 2);
-    assert_int_equal(r.view.atoms, 5);
-    assert_true(r.view.lod == 2 && r.view.margin == 1.5);
+    assert_int_equal(r.view.disc.atoms, 5);
+    assert_true(r.view.lod == 2 && r.view.disc.margin == 1.5);
     static const uint8_t background[] = {16, 32, 48, 0};
     assert_memory_equal(r.view.background, background, 4);
     assert_int_equal(r.encode.format, SPL_FORMAT_NPY);

@@ -1,45 +1,37 @@
 /* Method splat: depth, attribute and resolve passes of the sparse-coded-splat-textures paper, section 3.6, as compute
  * kernels. The depth pass runs once a tile, in two halves: what the nearer half hides is dropped from the other, and
  * what both hide from the shade pass, which runs once a group of layers. */
+#include "render/method.h"
 #include "render/renderer.h"
-
-/* The kernel of `slot`, and where chunks are drawn that have clip lines the one of theirs. */
-static int get_kernels(struct spl_renderer *r, uint32_t slot, struct spl_gpu_kernel **plain,
-                       struct spl_gpu_kernel **clipped, struct spl_error *err)
-{
-    bool any = false;
-    for (size_t i = 0; i < r->list.batch_count; i++)
-        any |= r->list.batches[i].apart;
-    *clipped = NULL;
-    int rc = spl_renderer_get_kernel(r, slot, plain, err);
-    return rc || !any ? rc : spl_renderer_get_kernel(r, slot + 1, clipped, err);
-}
 
 static int record_depth(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     struct spl_gpu_kernel *depth;
     struct spl_dispatch what = {.phases = SPL_PHASE_FRONT};
-    int rc = get_kernels(r, SPL_KERNEL_SPLAT_DEPTH, &depth, &what.clipped, err);
+    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, &what.clipped, err);
     if (rc)
         return rc;
     spl_tile_dispatch_splats(tile, depth, &what);
     spl_gpu_barrier(r->gpu);
-    rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, err);
+    rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, false, err);
     what.phases = SPL_PHASE_BACK;
     spl_tile_dispatch_splats(tile, depth, &what);
     spl_gpu_barrier(r->gpu);
-    return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, err);
+    return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, false, err);
 }
 
 /* The kernels of `what`, by its number of planes. */
-static int get_texture_kernels(struct spl_renderer *r, struct spl_dispatch *what, struct spl_gpu_kernel **kernel,
+static int get_texture_kernels(struct spl_tile *tile, struct spl_dispatch *what, struct spl_gpu_kernel **kernel,
                                struct spl_error *err)
 {
+    struct spl_renderer *r = tile->renderer;
     what->sum = NULL;
-    int rc = what->smooth ? spl_renderer_get_kernel(r, SPL_KERNEL_SPLAT_SUM + what->planes - 1, &what->sum, err) : 0;
-    uint32_t slot = SPL_KERNEL_SPLAT_TEXTURE + (what->smooth ? 0 : 2 * what->planes);
-    return rc ? rc : get_kernels(r, slot, kernel, &what->clipped, err);
+    struct spl_kernel_key key = {"splat_texture", true, {what->planes}}, sum = {"splat_sum", false, {what->planes}};
+    if (!what->smooth)
+        return spl_tile_get_disc_kernels(tile, key, kernel, &what->clipped, err);
+    int rc = spl_kernels_get(&r->kernels, r->gpu, &sum, &what->sum, err);
+    return rc ? rc : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_summed", true, {0}}, kernel, &what->clipped, err);
 }
 
 /* Colours: chunks with atoms by the kernels of their number of planes, the others by the one that knows none. */
@@ -53,15 +45,19 @@ static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, str
     struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true, .clipped = clipped};
     spl_tile_dispatch_splats(tile, plain, &what);
     int rc = SPL_OK;
-    for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1) && !rc; kind++) {
+    for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1); kind++) {
         struct spl_gpu_kernel *kernel;
         if (!(seen >> kind & 1))
             continue;
         what.planes = kind / 2;
         what.smooth = kind % 2;
-        rc = get_texture_kernels(tile->renderer, &what, &kernel, err);
-        if (!rc)
-            spl_tile_dispatch_splats(tile, kernel, &what);
+        if ((rc = get_texture_kernels(tile, &what, &kernel, err)))
+            break;
+        if (what.smooth)
+            spl_tile_begin_area(tile, SPL_AREA_SUMMED);
+        spl_tile_dispatch_splats(tile, kernel, &what);
+        if (what.smooth)
+            spl_tile_end_area(tile, SPL_AREA_SUMMED);
     }
     return rc;
 }
@@ -70,21 +66,21 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 {
     struct spl_renderer *r = tile->renderer;
     struct spl_gpu_kernel *shade, *clipped;
-    int rc = get_kernels(r, SPL_KERNEL_SPLAT_SHADE + 2 * group, &shade, &clipped, err);
+    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, &clipped, err);
     if (rc)
         return rc;
     if (first)
         spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * 4, SPL_NOTHING);
     if (group != SPL_SUMS_ID)
-        spl_gpu_fill(r->gpu, r->scratch.sums, 0, tile->samples * 16, 0);
+        spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_SUMS), 0, tile->samples * 16, 0);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     if (first) {
         rc = record_depth(tile, err);
         spl_tile_stamp(tile, SPL_STAGE_DEPTH);
     }
-    if (group == SPL_SUMS_ID) { /* only now: occlusion used the buffer */
-        spl_gpu_fill(r->gpu, r->scratch.ids, 0, tile->samples * 4, SPL_NOTHING);
+    if (group == SPL_SUMS_ID) { /* only now: occlusion used the memory */
+        spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
         spl_gpu_barrier(r->gpu);
     }
     if (group == SPL_SUMS_COLOR)
@@ -96,4 +92,18 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     return rc;
 }
 
-const struct spl_method_ops spl_method_splat = {.name = "splat", .record = record};
+const struct spl_method_row spl_method_splat = {
+    .info = {.name = "splat",
+             .help = "oriented discs, blended within a margin behind the first surface; specks closed",
+             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms),
+             .textures = true,
+             .needs_surface = true,
+             .stand_in = SPL_METHOD_FILL},
+    .discs = true,
+    .sums = true,
+    .apron = 1, /* specks look at the samples beside them */
+    .record = record,
+    .resolve = SPL_RESOLVED_SUMS,
+    .guesses = {{2, 0.25, 5, 30, 21.1}, {1, 0.25, 5, 42, 22.1}, {2, 0.5, 6, 72, 22.6}, {1, 0.5, 8, 90, 23.42},
+                {2, 1, 8, 180, 23.6}, {1, 1, 10, 250, 24.4}, {1, 2, 20, 900, 25.1}},
+};

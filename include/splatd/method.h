@@ -1,0 +1,116 @@
+/* The methods that splats are drawn by, and the parameters that they take. This is their table: names, parsing, checks,
+ * HTTP parameters, options of commands, help, cache keys and the planner are made from it and from each method's row in
+ * src/render/methods/. A new method is a line here, and its parameters, where it has any, a struct and lines. */
+#ifndef SPLATD_METHOD_H
+#define SPLATD_METHOD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <splatd/dataset.h>
+#include <splatd/error.h>
+
+/* METHOD(NAME, name); the first is drawn where none is asked for. src/render/methods/name.c has its row. */
+#define SPL_METHODS(METHOD)                                                                                            \
+    METHOD(SPLAT, splat)                                                                                               \
+    METHOD(POINTS, points)                                                                                             \
+    METHOD(FILL, fill)                                                                                                 \
+    METHOD(NEAREST, nearest)
+
+enum spl_method {
+#define SPL_METHOD_VALUE(NAME, name) SPL_METHOD_##NAME,
+    SPL_METHODS(SPL_METHOD_VALUE)
+#undef SPL_METHOD_VALUE
+    SPL_METHOD_COUNT
+};
+#define SPL_METHOD_DEFAULT ((enum spl_method)0)
+#define SPL_METHOD_RAW SPL_METHOD_POINTS /* shows each splat in the one sample it falls on: what measuring looks through */
+
+/* Discs. */
+struct spl_disc_params {
+    double margin;  /* blend margin, multiple of the splat radius */
+    uint32_t atoms; /* of a splat's texture that are drawn at most; 0 = its mean colour */
+};
+
+/* Screen-space filling: which points are removed as hidden, and how holes are found. */
+enum spl_visibility {
+    SPL_VISIBILITY_ADAPTIVE, /* as far as the points lie apart on the image, in proportion to inverse depth */
+    SPL_VISIBILITY_CONSTANT, /* as far as the kernel everywhere, every pixel of it: the earlier work, slow */
+    SPL_VISIBILITY_NONE,     /* no point is removed; holes as adaptive finds them */
+    SPL_VISIBILITY_COUNT
+};
+const char *spl_visibility_name(enum spl_visibility visibility);
+int spl_visibility_from_name(const char *name); /* -1 for an unknown name */
+
+struct spl_fill_params {
+    enum spl_visibility visibility;
+    double kernel;    /* side of the visibility kernel where it is largest, pixels; 0 = from the points' spacing on the
+                         image */
+    double threshold; /* share of the eight sectors that must be open where a point is visible */
+    uint32_t pyramid; /* levels of the pyramid that holes are filled from; 0 = from the kernel */
+};
+
+/* Every parameter of a method, in the order of --help:
+ *   REAL, COUNT(name, field of struct spl_view, least, most, default, shapes, help): a number, a whole number; the default may
+ *   lie outside of what else is allowed
+ *   CHOICE(name, field, prefix, default, shapes, help): one of the names of spl_PREFIX_name()
+ * shapes: 1 = it changes what is seen where, 0 = colours alone. */
+#define SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)                                                                         \
+    REAL(margin, disc.margin, 0, 16, 1, 1, "depth behind the first surface that is blended, in splat radii")           \
+    COUNT(atoms, disc.atoms, 0, 8, 8, 0, "of a splat's texture at most; 0 = its mean colour")                          \
+    CHOICE(visibility, fill.visibility, visibility, SPL_VISIBILITY_ADAPTIVE, 1,                                        \
+           "which points are hidden; constant: the whole kernel everywhere, slow; none: removes none")                 \
+    REAL(kernel, fill.kernel, 3, 129, 0, 1,                                                                            \
+         "side of the visibility kernel where it is largest, pixels; 0: six times the points' spacing where they are " \
+         "sparsest")                                                                                                   \
+    REAL(threshold, fill.threshold, 0, 1, 0.38, 1, "share of the sectors that is open where a point is visible")       \
+    COUNT(pyramid, fill.pyramid, 0, 8, 0, 1, "levels that holes are filled from; 0: as the kernel needs")
+
+enum spl_method_param {
+#define SPL_PARAM_VALUE(name, ...) SPL_PARAM_##name,
+    SPL_METHOD_PARAMS(SPL_PARAM_VALUE, SPL_PARAM_VALUE, SPL_PARAM_VALUE)
+#undef SPL_PARAM_VALUE
+    SPL_PARAM_COUNT
+};
+#define SPL_PARAM_BIT(name) (1u << SPL_PARAM_##name)
+
+enum spl_param_kind { SPL_PARAM_REAL, SPL_PARAM_WHOLE, SPL_PARAM_CHOICE };
+
+struct spl_method_param_info {
+    const char *name, *help;
+    enum spl_param_kind kind;
+    double least, most, otherwise; /* otherwise: the default, which is always allowed */
+    bool shapes;
+    const char *(*choice_name)(int choice); /* CHOICE, as the next; choices are 0 … most */
+    int (*choice_from_name)(const char *name);
+};
+const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static */
+int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
+/* Is `value` within the parameter's range? SPL_E_USAGE names it. */
+int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);
+
+/* What everyone may know of a method; static. */
+struct spl_method_info {
+    const char *name;
+    const char *help; /* what it draws, in a line */
+    uint32_t params;  /* SPL_PARAM_BIT() of those that it takes */
+    bool textures;    /* draws them where there are any; else their mean colours */
+    bool needs_surface;           /* of a dataset; where it has none, `stand_in` is drawn */
+    enum spl_method stand_in;
+    bool finds_normals;           /* also where a dataset has none */
+};
+const struct spl_method_info *spl_method_get(enum spl_method method);
+
+const char *spl_method_name(enum spl_method method); /* "unknown" for none */
+int spl_method_from_name(const char *name);          /* -1 for an unknown name */
+const char *spl_method_names(void);                  /* "splat, points, …"; static */
+bool spl_method_has_textures(enum spl_method method);
+
+/* What is drawn of a dataset where `method` is asked for. */
+enum spl_method spl_method_for(enum spl_method method, const struct spl_dataset_info *dataset);
+/* Has what is drawn normals? */
+bool spl_method_has_normals(enum spl_method method, const struct spl_dataset_info *dataset);
+/* The parameters that `method` takes, or what stands in for it. */
+uint32_t spl_method_get_params(enum spl_method method);
+
+#endif

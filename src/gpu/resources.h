@@ -1,0 +1,26 @@
+/* What kernels bind, by what it holds. A dispatch is given memory by these names; which of them a kernel reads or
+ * writes, and under which number, says its row in shaders/meson.build. No two of them share a number or a buffer but as
+ * src/render/scratch.c says. */
+#ifndef SPL_GPU_RESOURCES_H
+#define SPL_GPU_RESOURCES_H
+
+enum spl_resource {
+    SPL_RESOURCE_FRAME,     /* struct spl_frame_params */
+    SPL_RESOURCE_ENTRIES,   /* uint[], draw-list entries of this dispatch's page, front to back */
+    SPL_RESOURCE_CHUNKS,    /* struct spl_draw_chunk[] */
+    SPL_RESOURCE_BOUNDS,    /* struct spl_chunk_bounds[], parallel to the chunks */
+    SPL_RESOURCE_LINES,     /* struct spl_draw_line[] */
+    SPL_RESOURCE_PAGE,      /* uint[], one page of the dataset as it lies in the file */
+    SPL_RESOURCE_TEXTURES,  /* uint[], one page's section TEXP as it lies in the file */
+    SPL_RESOURCE_ATOMS,     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
+    SPL_RESOURCE_DEPTH,     /* uint[] or uint64[], one a sample */
+    SPL_RESOURCE_SUMS,      /* uint[], four words a sample, see splat_shade.comp */
+    SPL_RESOURCE_PLANES,    /* uint[], of the screen-space filter, see fill.c */
+    SPL_RESOURCE_IDS,       /* uint[], id or payload of the nearest splat, one a sample */
+    SPL_RESOURCE_OCCLUDERS, /* uint[], greatest depth word of every tile of SPL_OCCLUSION_TILE samples a side */
+    SPL_RESOURCE_SUMMED,    /* uint[], sums of atoms, texels as in the dictionary */
+    SPL_RESOURCE_OUTPUT,    /* uint[], requested layers one after the other, one word a pixel */
+    SPL_RESOURCE_COUNT
+};
+
+#endif

@@ -1,0 +1,54 @@
+/* Method nearest: each sample keeps one disc, the nearest by a depth that is bent into a cone (shaders/nearest.comp), and
+ * no sums: with 64 bit atomics one pass instead of two. Resolving smooths colours over the samples around. Chunks that
+ * the nearer half hides are dropped, as of splats that blend. */
+#include "render/method.h"
+#include "render/renderer.h"
+
+/* Draws the chunks of `phases` by the kernel of `group` and `pass`. */
+static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_phase phases, struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    struct spl_gpu_kernel *kernel;
+    struct spl_dispatch what = {.phases = phases};
+    struct spl_kernel_key key = {"nearest", true, {group, pass}};
+    int rc = spl_tile_get_disc_kernels(tile, key, &kernel, &what.clipped, err);
+    if (rc)
+        return rc;
+    spl_tile_dispatch_splats(tile, kernel, &what);
+    spl_gpu_barrier(r->gpu);
+    return SPL_OK;
+}
+
+static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
+{
+    (void)first; /* the payload of another group shares the word with the depth: every group starts anew */
+    struct spl_renderer *r = tile->renderer;
+    bool wide = spl_gpu_get_limits(r->gpu)->atomics_64;
+    spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * (wide ? 8 : 4), SPL_NOTHING);
+    spl_gpu_barrier(r->gpu);
+    spl_tile_stamp(tile, SPL_STAGE_CLEAR);
+    int rc = draw(tile, group, 0, SPL_PHASE_FRONT, err);
+    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, wide, err);
+    rc = rc ? rc : draw(tile, group, 0, SPL_PHASE_BACK, err);
+    spl_tile_stamp(tile, SPL_STAGE_DEPTH);
+    if (rc || wide)
+        return rc;
+    rc = spl_tile_dispatch_occlusion(tile, 0, wide, err);
+    spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
+    spl_gpu_barrier(r->gpu);
+    rc = rc ? rc : draw(tile, group, 1, SPL_PHASE_BOTH, err);
+    spl_tile_stamp(tile, SPL_STAGE_SHADE);
+    return rc;
+}
+
+const struct spl_method_row spl_method_nearest = {
+    .info = {.name = "nearest",
+             .help = "oriented discs, the nearest alone, colours smoothed over the samples around",
+             .params = SPL_PARAM_BIT(margin),
+             .needs_surface = true,
+             .stand_in = SPL_METHOD_FILL},
+    .discs = true,
+    .apron = 1, /* smoothing looks at the samples beside it */
+    .record = record,
+    .resolve = SPL_RESOLVED_BENT,
+};
