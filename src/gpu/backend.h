@@ -5,11 +5,8 @@
 
 #include "gpu/gpu.h"
 
-/* How long a wait of our own (a third list, close) may take before the device counts as lost. */
+/* How long a wait of our own (a next list, close) may take before the device counts as lost. */
 #define SPL_GPU_PATIENCE_NS (10 * SPL_NS_PER_S)
-
-/* Submissions that may be in flight, the one being recorded included. */
-enum { SPL_GPU_SLOTS = 2 };
 
 enum { SPL_GPU_BOUND_MAX = 8 }; /* of either kind: OpenGL may have as many image units */
 
@@ -80,8 +77,8 @@ struct spl_gpu_backend {
                          size_t constant_count, struct spl_gpu_kernel **out, struct spl_error *err);
     void (*kernel_destroy)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel);
 
-    /* The slot's previous submission has ended. */
-    int (*begin)(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
+    /* The previous submission has ended. */
+    int (*begin)(struct spl_gpu *gpu, struct spl_error *err);
     /* `counts`: as of spl_gpu_dispatch_indirect(), NULL: `workgroups`. */
     void (*dispatch)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
                      uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
@@ -92,9 +89,9 @@ struct spl_gpu_backend {
     void (*timestamp)(struct spl_gpu *gpu, uint32_t slot);
     /* Any failure means that the device is lost. */
     int (*submit)(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err);
-    /* 0 done; SPL_E_TIMEOUT; SPL_E_DEVICE_LOST. With timeout 0 it only looks. */
+    /* 0 done; SPL_E_TIMEOUT; SPL_E_DEVICE_LOST. */
     int (*wait)(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err);
-    void (*read_timestamps)(struct spl_gpu *gpu, uint64_t ticket); /* of an ended submission */
+    void (*read_timestamps)(struct spl_gpu *gpu); /* of the last submission, which has ended */
 };
 
 extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;

@@ -166,10 +166,10 @@ int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err)
     if (gpu->lost)
         return lost(gpu, err);
     int code = 0;
-    if (gpu->tickets >= SPL_GPU_SLOTS)
-        code = wait_for(gpu, gpu->tickets + 1 - SPL_GPU_SLOTS, SPL_GPU_PATIENCE_NS, err);
+    if (gpu->tickets)
+        code = wait_for(gpu, gpu->tickets, SPL_GPU_PATIENCE_NS, err);
     if (code >= 0)
-        code = gpu->backend->begin(gpu, gpu->tickets % SPL_GPU_SLOTS, err);
+        code = gpu->backend->begin(gpu, err);
     if (code < 0) {
         gpu->lost = true;
         return code;
@@ -280,17 +280,6 @@ int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
     return 0;
 }
 
-bool spl_gpu_poll(struct spl_gpu *gpu, uint64_t ticket)
-{
-    spl_assert(ticket > 0 && ticket <= gpu->tickets);
-    if (gpu->lost)
-        return true;
-    int code = gpu->backend->wait(gpu, ticket, 0, NULL);
-    if (code < 0 && code != SPL_E_TIMEOUT)
-        gpu->lost = true;
-    return code != SPL_E_TIMEOUT;
-}
-
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err)
 {
     spl_assert(ticket > 0 && ticket <= gpu->tickets);
@@ -300,9 +289,9 @@ int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, str
     if (code < 0)
         return code;
     memset(gpu->timestamps_ns, 0, sizeof gpu->timestamps_ns);
-    /* A slot's results are overwritten once its next list begins. */
-    if (gpu->limits.timestamps && ticket + SPL_GPU_SLOTS > gpu->tickets + gpu->recording)
-        gpu->backend->read_timestamps(gpu, ticket);
+    /* They are overwritten once the next list begins. */
+    if (gpu->limits.timestamps && ticket == gpu->tickets && !gpu->recording)
+        gpu->backend->read_timestamps(gpu);
     return 0;
 }
 

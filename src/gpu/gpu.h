@@ -83,7 +83,7 @@ struct spl_gpu_binding {
     uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
 };
 
-/* Recording. One list at a time: begin … submit. Lists run in order, each seeing all that the one before wrote. Errors
+/* Recording. One list at a time: begin … submit. Lists run one after the other, each seeing all that the one before wrote. Errors
  * of recording (bad ranges are our bugs: assertions) surface at submit. */
 int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
 /* Runs `kernel` over what it binds of `bindings`; the others are ignored. */
@@ -101,9 +101,8 @@ void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t o
 enum { SPL_GPU_TIMESTAMPS_MAX = 32 };
 void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot); /* no effect without limits.timestamps */
 
-/* Ends recording and starts it. One submission may be in flight while the next is recorded; a third begin waits. */
+/* Ends recording and starts it; the next begin waits for its end. */
 int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);
-bool spl_gpu_poll(struct spl_gpu *gpu, uint64_t ticket);    /* done? never blocks; true once the device is lost */
 /* SPL_E_TIMEOUT once deadline_ns has passed, which also marks the device lost. */
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err);
 /* Nanoseconds of slot `slot` in the last waited submission, on the device's own clock; 0 where it was not written. */

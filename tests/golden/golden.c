@@ -2,8 +2,8 @@
  *
  *   golden vulkan|egl    that backend against images/; then one request a hundred times, for the same bytes
  *   golden backends      Vulkan against EGL, every view and layer
- *   golden --self-test   the comparison finds what was planted
- *   golden --update      writes images/ anew (Vulkan); look at them before they are committed
+ *   golden --self-test   the comparison finds what was planted; every method has a view
+ *   golden --update NAME…  writes these images anew (Vulkan), "all": all; look at them before they are committed
  *
  * Verdicts: bytes equal (the file), pixels equal (what it decodes to), perceptually equal (within the view's
  * tolerance). Anything else fails and leaves NAME-BACKEND.png and NAME-BACKEND-difference.png in the working folder. */
@@ -195,7 +195,7 @@ static bool against_goldens(struct spl_renderer *renderer, const struct spl_data
         spl_encoded_finish(&wanted);
     }
     if (!good)
-        printf("  Where the change is meant: 'golden --update', look at tests/golden/images, commit them with the "
+        printf("  Where the change is meant: 'golden --update NAME', look at tests/golden/images, commit them with the "
                "change.\n");
     return good;
 }
@@ -279,9 +279,37 @@ static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const
     return good;
 }
 
-static bool update(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+static int find(const char *name)
+{
+    int i = 0;
+    while (i < GOLDEN_COUNT && strcmp(goldens[i].name, name))
+        i++;
+    return i;
+}
+
+/* Are `names` names of goldens, or "all"? */
+static bool check_names(char **names, int count)
+{
+    bool known = count > 0;
+    for (int i = 0; i < count; i++)
+        known = known && (!strcmp(names[i], "all") || find(names[i]) < GOLDEN_COUNT);
+    if (!known) {
+        fprintf(stderr, "--update takes names of images, or all:");
+        for (int i = 0; i < GOLDEN_COUNT; i++)
+            fprintf(stderr, " %s", goldens[i].name);
+        fprintf(stderr, "\n");
+    }
+    return known;
+}
+
+static bool update(struct spl_renderer *renderer, const struct spl_dataset *dataset, char **names, int count)
 {
     for (int i = 0; i < GOLDEN_COUNT; i++) {
+        bool wanted = false;
+        for (int n = 0; n < count; n++)
+            wanted = wanted || !strcmp(names[n], "all") || !strcmp(names[n], goldens[i].name);
+        if (!wanted)
+            continue;
         struct spl_view view = make_view(&goldens[i]);
         struct spl_encoded png;
         char path[512];
@@ -315,6 +343,16 @@ static bool self_test(void)
     made = made && !spl_image_encode(&image, &options, &shifted, NULL);
     if (!made)
         return false;
+    bool good = true;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        int i = 0;
+        while (i < GOLDEN_COUNT && (int)goldens[i].method != method)
+            i++;
+        if (i == GOLDEN_COUNT) {
+            printf("no view of tests/golden/views.h is drawn by method %s\n", spl_method_name((enum spl_method)method));
+            good = false;
+        }
+    }
     const struct tolerance none = {0, 0}, level = {1, 0}, two_pixels = {0, 0.01};
     const bool as_wanted[] = {
         judge("self-equal", "test", &original, &original, none),
@@ -324,7 +362,6 @@ static bool self_test(void)
         !judge("self-shifted", "test", &shifted, &original, (struct tolerance){16, 0.004}),
         !judge("self-size", "test", &small, &original, level),
     };
-    bool good = true;
     for (size_t i = 0; i < sizeof as_wanted / sizeof *as_wanted; i++)
         good = good && as_wanted[i];
     spl_encoded_finish(&original);
@@ -336,14 +373,16 @@ static bool self_test(void)
 
 int main(int argc, char **argv)
 {
-    const char *mode = argc == 2 ? argv[1] : "";
+    const char *mode = argc > 1 ? argv[1] : "";
     if (!strcmp(mode, "--self-test"))
         return !self_test();
     bool both = !strcmp(mode, "backends"), updating = !strcmp(mode, "--update");
-    if (!both && !updating && strcmp(mode, "vulkan") && strcmp(mode, "egl")) {
-        fprintf(stderr, "usage: golden vulkan|egl|backends|--self-test|--update\n");
+    if ((!updating && argc > 2) || (!both && !updating && strcmp(mode, "vulkan") && strcmp(mode, "egl"))) {
+        fprintf(stderr, "usage: golden vulkan|egl|backends|--self-test|--update NAME…\n");
         return 2;
     }
+    if (updating && !check_names(argv + 2, argc - 2))
+        return 2;
     struct spl_dataset *dataset = make_courtyard();
     if (!dataset)
         return 1;
@@ -352,7 +391,7 @@ int main(int argc, char **argv)
     if (first && both)
         second = open_backend("egl", dataset);
     if (updating && first)
-        rc = !update(first, dataset);
+        rc = !update(first, dataset, argv + 2, argc - 2);
     else if (both && second)
         rc = !backends_agree(first, second, dataset);
     else if (!both && first)

@@ -34,6 +34,9 @@ static const struct golden goldens[] = {
     /* points lie up to eight pixels apart: what is hidden, what is a hole, and what closes it */
     {"wall-fill", {1.2, 4.5, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_FILL, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}},
+    /* discs that meet without blending; a pixel's winner may be lost to rounding, and its neighbours' smoothing with it */
+    {"wall-nearest", {1.2, 4.5, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.004}},
     /* millimetres, so 1 level is 1e-4 of the nearest depth here: rounding to the scale */
     {"overview-depth", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_DEPTH, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}},

@@ -62,7 +62,7 @@ def test_datasets_are_described():
         assert re.fullmatch("[0-9a-f]{16}", full["version"])
         low, high = full["bounds"]["min"], full["bounds"]["max"]
         assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
-        assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill"]
+        assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill", "nearest"]
         assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
@@ -340,6 +340,17 @@ def test_openapi_knows_every_parameter_and_route():
                re.findall(r"^    (ViewRequest|Camera):\n(.*?)(?=^    \w|\Z)", text, re.M | re.S)}
     table = "".join((ROOT / name).read_text() for name in ("src/geom/camera_params.def", "src/service/request/view_params.def"))
     rows = re.findall(r'^PARAM\((\w+), "(\w*)", \w+, ([A-Z_| ]+),', table, re.M)
+    methods = (ROOT / "include/splatd/method.h").read_text()
+    params = [[cell.strip() for cell in row.replace("\\\n", " ").split(",")] for row in
+              re.findall(r"^    (?:REAL|COUNT|CHOICE)\(([^\"]+?),[\s\\\\]*\"", methods, re.M)]
+    assert len(params) >= 6
+    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] == "1" else "")) for row in params]
+    document = openapi.DOCUMENT["components"]["schemas"]
+    assert document["Method"]["enum"] == re.findall(r"^    METHOD\(\w+, (\w+)\)", methods, re.M)
+    for name, *_, least, most, value, _ in (row for row in params if len(row) == 6 and row[3][0].isdigit()):
+        schema = document[name.capitalize()]
+        assert schema["default"] == float(value) and schema["maximum"] == float(most), name
+        assert schema["minimum"] == min(float(least), float(value)), name
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
     camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in

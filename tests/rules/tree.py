@@ -18,6 +18,9 @@ OUTSIDE = [(re.compile(r"^(vulkan|GL|GLES\d?|EGL|KHR)/"), "gpu"), (re.compile(r"
 # A public header includes public headers and these.
 PLAIN_C = {"stdbool.h", "stddef.h", "stdint.h", "stdio.h", "math.h"}
 LONGEST = 800
+# A method's name stands in its own file, in the table and in tests; everyone else asks the table.
+METHODS = pathlib.PurePath("include/splatd/method.h")
+METHOD_FILES = pathlib.PurePath("src/render/methods")
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
@@ -43,7 +46,20 @@ def check_include(path, parts, bracket, header):
     return None
 
 
+def check_methods(relative, line, names):
+    """The method that `line` names where nobody but its own file and the table may, or None."""
+    if relative == METHODS or relative.parent == METHOD_FILES or relative.parts[0] not in ("src", "include", "shaders"):
+        return None
+    found = re.search(r"\bSPL_METHOD_(%s)\b" % "|".join(names), line) if names else None
+    return f"names method {found[1].lower()}; ask its row (include/splatd/method.h)" if found else None
+
+
 def violations(root):
+    table = root / METHODS
+    rows = re.findall(r"^    METHOD\((\w+), (\w+)\)", table.read_text(encoding="utf-8"), re.M) if table.exists() else []
+    for _, name in rows:
+        if not (root / METHOD_FILES / f"{name}.c").exists():
+            yield f"{METHODS}:1: method {name} has no file {METHOD_FILES}/{name}.c"
     for path in sorted(p for top in ("include", "src", "shaders", "tests", "deploy") for p in (root / top).rglob("*")):
         relative = path.relative_to(root)
         parts = relative.parts
@@ -62,6 +78,7 @@ def violations(root):
                 yield f"{relative}:{number}: left open: {line.strip()}"
             found = INCLUDE.match(line) if source else None
             wrong = check_include(relative, parts, *found.groups()) if found else None
+            wrong = wrong or (check_methods(relative, line, [name for name, _ in rows]) if source else None)
             if wrong:
                 yield f"{relative}:{number}: {wrong}"
 
@@ -79,6 +96,10 @@ PLANTED = {  # file: (content, the start of what must be said; None = nothing)
     "include/splatd/deep.h": ('#include "base/error.h"\n', "a public header includes base/error.h"),
     "shaders/long.comp": ("// line\n" * (LONGEST + 1), "longer than"),
     "tests/unit/later.c": ("/* TODO: test this */\n", "left open"),
+    "include/splatd/method.h": ("#define SPL_METHODS(METHOD) \\\n    METHOD(DOTS, dots) \\\n    METHOD(FOG, fog)\n",
+                                "method fog has no file"),
+    "src/render/methods/dots.c": ("enum spl_method own = SPL_METHOD_DOTS;\n", None),
+    "src/measure/dots.c": ("bool is = method == SPL_METHOD_DOTS || SPL_METHOD_COUNT;\n", "names method dots"),
     "src/service/good.c": ('#include <uv.h>\n#include <splatd/render.h>\n#include "render/frame.h"\n', None),
     "src/gpu/vulkan/good.c": ('#include <vulkan/vulkan.h>\n#include "gpu/gpu.h"\n#include "shared.h"\n', None),
     "src/cloud/good.c": ('#include "geom/morton.h"\n#include "base/error.h"\n', None),

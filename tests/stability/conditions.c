@@ -171,7 +171,7 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
         bool strip = view->camera.width > 64 * view->camera.height || view->camera.height > 64 * view->camera.width;
         row.method = drawings[i].name;
         row.whole |= strip && drawings[i].method == SPL_METHOD_FILL;
-        if (row.whole && !c->suite->whole)
+        if ((row.whole && !c->suite->whole) || (c->method && strcmp(c->method, row.method)))
             continue;
         views[0].method = views[1].method = drawings[i].method;
         views[0].disc.atoms = views[1].disc.atoms = drawings[i].atoms;

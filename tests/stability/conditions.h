@@ -9,6 +9,7 @@ struct conditions {
     struct suite *suite; /* .renderer writes the table, .other (may be NULL) is held against it */
     struct table *table;
     const char *only;     /* how the conditions that are measured begin; may be NULL */
+    const char *method;   /* whose rows alone are measured; may be NULL */
     const char *pictures; /* a folder for a picture of each row; may be NULL */
     bool update;
 };

@@ -3,7 +3,8 @@
  *   stability invariants vulkan|egl [THEME…]    limits from the truth and from arithmetic; all themes or these
  *   stability drivers [--whole]                 Vulkan against EGL
  *   stability conditions [--whole]              measures what degrades and compares it with table.json, either way
- *   stability conditions --update [--whole]     writes the table anew; read it before it is committed
+ *   stability conditions [NAME] [--method METHOD] --update [--whole]   writes the table's rows anew, those of the
+ *                                               conditions that begin so and of the method; read it before it is committed
  *   stability plant half-pixel|margin-0|pop     a planted fault: exits 0 only where the check meant for it catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
@@ -108,10 +109,11 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     conditions_of_views(conditions);
     conditions_of_shapes(conditions);
     conditions_of_photographs(conditions);
-    if (!conditions->only && !(conditions->update && suite->whole))
+    bool all = !conditions->only && !conditions->method;
+    if (all && !(conditions->update && suite->whole))
         table_find_stale(conditions->table, &suite->report, suite->whole);
     if (conditions->update)
-        table_save(conditions->table, suite->whole && !conditions->only);
+        table_save(conditions->table, suite->whole && all);
     table_close(conditions->table);
     return report_finish(&suite->report);
 }
@@ -129,6 +131,8 @@ int main(int argc, char **argv)
             suite.report.verbose = true;
         else if (!strcmp(argv[i], "--update"))
             conditions.update = true;
+        else if (!strcmp(argv[i], "--method") && i + 1 < argc)
+            conditions.method = argv[++i];
         else if (!strcmp(argv[i], "--pictures") && i + 1 < argc)
             conditions.pictures = argv[++i];
         else if (count < 7)
@@ -143,7 +147,7 @@ int main(int argc, char **argv)
     else if (!strcmp(words[0], "plant"))
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
-        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [--update] | plant "
+        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME] [--method METHOD] [--update] | plant "
                         "half-pixel|margin-0|pop [--whole]\n");
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);

@@ -1,7 +1,7 @@
 """The stability table for people: what table.json holds, as Markdown between two marks in tests/bench/RESULTS.md.
 
-usage: table.py --update STABILITY [NAME] [--whole]   measures anew with that program, then writes both files; NAME: only
-                                               the conditions whose names begin so
+usage: table.py --update STABILITY [NAME] [--method METHOD] [--whole]   measures anew with that program, then writes both
+                                               files; only the conditions whose names begin so, only the method's rows
        table.py --write                        writes RESULTS.md from table.json as it is
        table.py --check                        exit 1 where RESULTS.md does not hold what table.json does
 """
@@ -22,6 +22,8 @@ POINTS = [("psnr", "points: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_thro
           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
 FILL = [("psnr", "fill: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
         ("depth_beyond", "beyond", 100, 1), ("halo", "halo", 100, 1), ("flicker", "flicker", 1, 1)]
+NEAREST = [("psnr", "nearest: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
+           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
 BEGIN_TEXTURES, END_TEXTURES = "<!-- table.py: textures begin -->\n", "<!-- table.py: textures end -->\n"
 COLOURED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
 TEXTURED = [("psnr", "textures: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
@@ -65,8 +67,10 @@ def main(arguments):
         sys.exit(__doc__)
     text = RESULTS.read_text(encoding="utf-8")
     new = text
-    for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL}),
-                              (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
+    for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL, "nearest": NEAREST}),
+                              (NEAREST = [("psnr", "nearest: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
+           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
+BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
         if text.count(begin) != 1 or text.count(end) != 1:
             sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")
         head, rest = new.split(begin)

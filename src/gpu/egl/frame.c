@@ -5,16 +5,13 @@
 void gl_frames_init(struct gl_gpu *gpu)
 {
     if (gpu->base.limits.timestamps)
-        for (int i = 0; i < SPL_GPU_SLOTS; i++)
-            gpu->gl.CreateQueries(GL_TIMESTAMP, SPL_GPU_TIMESTAMPS_MAX, gpu->slots[i].queries);
+        gpu->gl.CreateQueries(GL_TIMESTAMP, SPL_GPU_TIMESTAMPS_MAX, gpu->list.queries);
 }
 
 void gl_frames_finish(struct gl_gpu *gpu)
 {
-    for (int i = 0; i < SPL_GPU_SLOTS; i++) {
-        gpu->gl.DeleteQueries(SPL_GPU_TIMESTAMPS_MAX, gpu->slots[i].queries);
-        gpu->gl.DeleteSync(gpu->slots[i].sync);
-    }
+    gpu->gl.DeleteQueries(SPL_GPU_TIMESTAMPS_MAX, gpu->list.queries);
+    gpu->gl.DeleteSync(gpu->list.sync);
 }
 
 static int check(struct gl_gpu *gpu, struct spl_error *err)
@@ -30,14 +27,13 @@ static int check(struct gl_gpu *gpu, struct spl_error *err)
     return 0;
 }
 
-int gl_begin(struct spl_gpu *base, uint32_t index, struct spl_error *err)
+int gl_begin(struct spl_gpu *base, struct spl_error *err)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_use(gpu);
-    gpu->slot = &gpu->slots[index];
-    gpu->gl.DeleteSync(gpu->slot->sync);
-    gpu->slot->sync = NULL;
-    gpu->slot->written = 0;
+    gpu->gl.DeleteSync(gpu->list.sync);
+    gpu->list.sync = NULL;
+    gpu->list.written = 0;
     return check(gpu, err);
 }
 
@@ -90,11 +86,11 @@ void gl_fill(struct spl_gpu *base, struct spl_gpu_buffer *buffer, uint64_t offse
 void gl_timestamp(struct spl_gpu *base, uint32_t slot)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
-    if (gpu->slot->written >> slot & 1)
+    if (gpu->list.written >> slot & 1)
         return; /* as in Vulkan, the first stays */
-    gpu->slot->written |= 1u << slot;
+    gpu->list.written |= 1u << slot;
     gl_use(gpu);
-    gpu->gl.QueryCounter(gpu->slot->queries[slot], GL_TIMESTAMP);
+    gpu->gl.QueryCounter(gpu->list.queries[slot], GL_TIMESTAMP);
 }
 
 int gl_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
@@ -102,10 +98,10 @@ int gl_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
     (void)ticket;
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_barrier(base);
-    gpu->slot->sync = gpu->gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gpu->list.sync = gpu->gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     gpu->gl.Flush();
     int code = check(gpu, err);
-    return code < 0 || gpu->slot->sync ? code : spl_fail(err, SPL_E_DEVICE_LOST, "egl: no fence");
+    return code < 0 || gpu->list.sync ? code : spl_fail(err, SPL_E_DEVICE_LOST, "egl: no fence");
 }
 
 int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
@@ -113,10 +109,9 @@ int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct s
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     if (ticket <= gpu->ended)
         return 0;
-    GLsync sync = gpu->slots[(ticket - 1) % SPL_GPU_SLOTS].sync;
     GLenum result = GL_WAIT_FAILED;
     if (gl_use(gpu))
-        result = gpu->gl.ClientWaitSync(sync, GL_SYNC_FLUSH_COMMANDS_BIT,
+        result = gpu->gl.ClientWaitSync(gpu->list.sync, GL_SYNC_FLUSH_COMMANDS_BIT,
                                         timeout_ns < INT64_MAX ? timeout_ns : INT64_MAX);
     if (result == GL_TIMEOUT_EXPIRED)
         return spl_fail(err, SPL_E_TIMEOUT, "device '%s' did not end its work in time", base->info.name);
@@ -128,15 +123,15 @@ int gl_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct s
     return 0;
 }
 
-void gl_read_timestamps(struct spl_gpu *base, uint64_t ticket)
+void gl_read_timestamps(struct spl_gpu *base)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
-    const struct gl_slot *slot = &gpu->slots[(ticket - 1) % SPL_GPU_SLOTS];
+    const struct gl_list *list = &gpu->list;
     gl_use(gpu);
     for (uint32_t i = 0; i < SPL_GPU_TIMESTAMPS_MAX; i++) {
         GLuint64 ns = 0;
-        if (slot->written >> i & 1)
-            gpu->gl.GetQueryObjectui64v(slot->queries[i], GL_QUERY_RESULT, &ns);
+        if (list->written >> i & 1)
+            gpu->gl.GetQueryObjectui64v(list->queries[i], GL_QUERY_RESULT, &ns);
         base->timestamps_ns[i] = ns;
     }
 }

@@ -65,8 +65,8 @@ struct gl_functions {
     PFNGLSPECIALIZESHADERPROC SpecializeShader; /* of GL_ARB_gl_spirv */
 };
 
-struct gl_slot {
-    GLsync sync;                  /* of the slot's last list, NULL once it is known to have ended */
+struct gl_list {
+    GLsync sync;                  /* of the last list, NULL once it is known to have ended */
     GLuint queries[SPL_GPU_TIMESTAMPS_MAX];
     uint32_t written;             /* bit per timestamp slot */
 };
@@ -76,8 +76,7 @@ struct gl_gpu {
     struct gl_functions gl;
     EGLDisplay display;           /* lives as long as the process: EGL hands out one per device */
     EGLContext context;
-    struct gl_slot slots[SPL_GPU_SLOTS];
-    struct gl_slot *slot;         /* being recorded */
+    struct gl_list list;          /* being recorded, or running */
     uint64_t ended;               /* largest ticket known to have ended */
     bool ready;                   /* there is something to finish */
 };
@@ -115,7 +114,7 @@ void gl_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel);
 /* frame.c */
 void gl_frames_init(struct gl_gpu *gpu);
 void gl_frames_finish(struct gl_gpu *gpu);
-int gl_begin(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
+int gl_begin(struct spl_gpu *gpu, struct spl_error *err);
 void gl_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
                  uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
 void gl_barrier(struct spl_gpu *gpu);
@@ -125,6 +124,6 @@ void gl_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t offset
 void gl_timestamp(struct spl_gpu *gpu, uint32_t slot);
 int gl_submit(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err);
 int gl_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err);
-void gl_read_timestamps(struct spl_gpu *gpu, uint64_t ticket);
+void gl_read_timestamps(struct spl_gpu *gpu);
 
 #endif

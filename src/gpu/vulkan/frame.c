@@ -1,5 +1,5 @@
-/* Recording, submission and waiting. Two command buffers take turns; a timeline semaphore carries the ticket of the
- * last list that ended, so polling and waiting need no other state. Owned by the device's thread. */
+/* Recording, submission and waiting. A timeline semaphore carries the ticket of the last list that ended, so waiting
+ * needs no other state. Owned by the device's thread. */
 #include "gpu/vulkan/vk.h"
 
 int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err)
@@ -11,35 +11,32 @@ int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err)
                                      .sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO,
                                      .semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE}},
         NULL, &gpu->timeline);
-    for (int i = 0; i < SPL_GPU_SLOTS && result >= 0; i++) {
-        struct vk_slot *slot = &gpu->slots[i];
+    struct vk_list *list = &gpu->list;
+    if (result >= 0)
         result = vkCreateCommandPool(gpu->device,
                                      &(VkCommandPoolCreateInfo){.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
                                                                 .queueFamilyIndex = gpu->family},
-                                     NULL, &slot->pool);
-        if (result >= 0)
-            result = vkAllocateCommandBuffers(
-                gpu->device,
-                &(VkCommandBufferAllocateInfo){.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-                                               .commandPool = slot->pool,
-                                               .commandBufferCount = 1},
-                &slot->commands);
-        if (result >= 0 && gpu->base.limits.timestamps)
-            result = vkCreateQueryPool(gpu->device,
-                                       &(VkQueryPoolCreateInfo){.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
-                                                                .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                                                                .queryCount = SPL_GPU_TIMESTAMPS_MAX},
-                                       NULL, &slot->queries);
-    }
+                                     NULL, &list->pool);
+    if (result >= 0)
+        result = vkAllocateCommandBuffers(
+            gpu->device,
+            &(VkCommandBufferAllocateInfo){.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                                           .commandPool = list->pool,
+                                           .commandBufferCount = 1},
+            &list->commands);
+    if (result >= 0 && gpu->base.limits.timestamps)
+        result = vkCreateQueryPool(gpu->device,
+                                   &(VkQueryPoolCreateInfo){.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                                            .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                                            .queryCount = SPL_GPU_TIMESTAMPS_MAX},
+                                   NULL, &list->queries);
     return result < 0 ? vk_fail(err, SPL_E_NO_DEVICE, result, "no command buffers") : 0;
 }
 
 void vk_frames_finish(struct vk_gpu *gpu)
 {
-    for (int i = 0; i < SPL_GPU_SLOTS; i++) {
-        vkDestroyCommandPool(gpu->device, gpu->slots[i].pool, NULL);
-        vkDestroyQueryPool(gpu->device, gpu->slots[i].queries, NULL);
-    }
+    vkDestroyCommandPool(gpu->device, gpu->list.pool, NULL);
+    vkDestroyQueryPool(gpu->device, gpu->list.queries, NULL);
     vkDestroySemaphore(gpu->device, gpu->timeline, NULL);
 }
 
@@ -54,25 +51,25 @@ void vk_barrier(struct spl_gpu *base)
         .dstStageMask = work | VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT | VK_PIPELINE_STAGE_2_HOST_BIT,
         .dstAccessMask = VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
     };
-    vkCmdPipelineBarrier2(gpu->slot->commands, &(VkDependencyInfo){.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
+    vkCmdPipelineBarrier2(gpu->list.commands, &(VkDependencyInfo){.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
                                                                    .memoryBarrierCount = 1,
                                                                    .pMemoryBarriers = &barrier});
 }
 
-int vk_begin(struct spl_gpu *base, uint32_t index, struct spl_error *err)
+int vk_begin(struct spl_gpu *base, struct spl_error *err)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
-    struct vk_slot *slot = gpu->slot = &gpu->slots[index];
-    VkResult result = vkResetCommandPool(gpu->device, slot->pool, 0);
+    struct vk_list *list = &gpu->list;
+    VkResult result = vkResetCommandPool(gpu->device, list->pool, 0);
     if (result >= 0)
-        result = vkBeginCommandBuffer(slot->commands, &(VkCommandBufferBeginInfo){
+        result = vkBeginCommandBuffer(list->commands, &(VkCommandBufferBeginInfo){
                                                           .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
                                                           .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT});
     if (result < 0)
         return vk_fail(err, SPL_E_DEVICE_LOST, result, "a command buffer cannot begin");
-    slot->written = 0;
-    if (slot->queries)
-        vkCmdResetQueryPool(slot->commands, slot->queries, 0, SPL_GPU_TIMESTAMPS_MAX);
+    list->written = 0;
+    if (list->queries)
+        vkCmdResetQueryPool(list->commands, list->queries, 0, SPL_GPU_TIMESTAMPS_MAX);
     vk_barrier(base); /* behind the list before */
     return 0;
 }
@@ -83,7 +80,7 @@ void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *base_kernel, const
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     const struct vk_kernel *kernel = (const struct vk_kernel *)base_kernel;
     const struct spl_gpu_code *code = kernel->base.code;
-    VkCommandBuffer commands = gpu->slot->commands;
+    VkCommandBuffer commands = gpu->list.commands;
     VkDescriptorBufferInfo ranges[SPL_GPU_BOUND_MAX];
     VkBufferView views[SPL_GPU_BOUND_MAX];
     VkWriteDescriptorSet writes[2 * SPL_GPU_BOUND_MAX];
@@ -121,30 +118,30 @@ void vk_copy(struct spl_gpu *base, struct spl_gpu_buffer *from, uint64_t from_of
              uint64_t to_offset, uint64_t bytes)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
-    vkCmdCopyBuffer(gpu->slot->commands, ((struct vk_buffer *)from)->buffer, ((struct vk_buffer *)to)->buffer, 1,
+    vkCmdCopyBuffer(gpu->list.commands, ((struct vk_buffer *)from)->buffer, ((struct vk_buffer *)to)->buffer, 1,
                     &(VkBufferCopy){from_offset, to_offset, bytes});
 }
 
 void vk_fill(struct spl_gpu *base, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes, uint32_t word)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
-    vkCmdFillBuffer(gpu->slot->commands, ((struct vk_buffer *)buffer)->buffer, offset, bytes, word);
+    vkCmdFillBuffer(gpu->list.commands, ((struct vk_buffer *)buffer)->buffer, offset, bytes, word);
 }
 
 void vk_timestamp(struct spl_gpu *base, uint32_t slot)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
-    if (gpu->slot->written >> slot & 1)
+    if (gpu->list.written >> slot & 1)
         return; /* a query may be written once between resets; the first stays */
-    gpu->slot->written |= 1u << slot;
-    vkCmdWriteTimestamp2(gpu->slot->commands, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, gpu->slot->queries, slot);
+    gpu->list.written |= 1u << slot;
+    vkCmdWriteTimestamp2(gpu->list.commands, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, gpu->list.queries, slot);
 }
 
 int vk_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     vk_barrier(base);
-    VkResult result = vkEndCommandBuffer(gpu->slot->commands);
+    VkResult result = vkEndCommandBuffer(gpu->list.commands);
     if (result >= 0)
         result = vkQueueSubmit2(
             gpu->queue, 1,
@@ -153,7 +150,7 @@ int vk_submit(struct spl_gpu *base, uint64_t ticket, struct spl_error *err)
                 .commandBufferInfoCount = 1,
                 .pCommandBufferInfos =
                     &(VkCommandBufferSubmitInfo){.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO,
-                                                 .commandBuffer = gpu->slot->commands},
+                                                 .commandBuffer = gpu->list.commands},
                 .signalSemaphoreInfoCount = 1,
                 .pSignalSemaphoreInfos =
                     &(VkSemaphoreSubmitInfo){.sType = VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO,
@@ -178,14 +175,14 @@ int vk_wait(struct spl_gpu *base, uint64_t ticket, uint64_t timeout_ns, struct s
     return result < 0 ? vk_fail(err, SPL_E_DEVICE_LOST, result, "waiting failed") : 0;
 }
 
-void vk_read_timestamps(struct spl_gpu *base, uint64_t ticket)
+void vk_read_timestamps(struct spl_gpu *base)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
-    const struct vk_slot *slot = &gpu->slots[(ticket - 1) % SPL_GPU_SLOTS];
+    const struct vk_list *list = &gpu->list;
     for (uint32_t i = 0; i < SPL_GPU_TIMESTAMPS_MAX; i++) {
         uint64_t ticks = 0;
-        if (slot->written >> i & 1 &&
-            vkGetQueryPoolResults(gpu->device, slot->queries, i, 1, sizeof ticks, &ticks, sizeof ticks,
+        if (list->written >> i & 1 &&
+            vkGetQueryPoolResults(gpu->device, list->queries, i, 1, sizeof ticks, &ticks, sizeof ticks,
                                   VK_QUERY_RESULT_64_BIT) == VK_SUCCESS)
             base->timestamps_ns[i] = (uint64_t)((double)(ticks & gpu->timestamp_mask) * gpu->timestamp_period_ns);
     }

@@ -7,7 +7,7 @@
 #include "base/clock.h"
 #include "gpu/backend.h"
 
-struct vk_slot {                   /* one list: recorded while the other may run */
+struct vk_list {
     VkCommandPool pool;
     VkCommandBuffer commands;
     VkQueryPool queries;
@@ -25,8 +25,7 @@ struct vk_gpu {
     char cache_path[4096];         /* "" = none */
     size_t cache_loaded;           /* bytes that came from disk */
     VkSemaphore timeline;          /* its value is the last ended ticket */
-    struct vk_slot slots[SPL_GPU_SLOTS];
-    struct vk_slot *slot;          /* being recorded */
+    struct vk_list list;           /* being recorded, or running */
     double timestamp_period_ns;
     uint64_t timestamp_mask;
     PFN_vkCmdPushDescriptorSetKHR push_descriptors;
@@ -74,7 +73,7 @@ void vk_cache_save(struct vk_gpu *gpu);
 /* frame.c */
 int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err);
 void vk_frames_finish(struct vk_gpu *gpu);
-int vk_begin(struct spl_gpu *gpu, uint32_t slot, struct spl_error *err);
+int vk_begin(struct spl_gpu *gpu, struct spl_error *err);
 void vk_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
                  uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
 void vk_barrier(struct spl_gpu *gpu);
@@ -84,6 +83,6 @@ void vk_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t offset
 void vk_timestamp(struct spl_gpu *gpu, uint32_t slot);
 int vk_submit(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err);
 int vk_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err);
-void vk_read_timestamps(struct spl_gpu *gpu, uint64_t ticket);
+void vk_read_timestamps(struct spl_gpu *gpu);
 
 #endif
