@@ -209,6 +209,18 @@ static void print_colors(const json_t *colors, uint64_t kept)
     }
 }
 
+/* ", name (unit, where it comes from)" */
+static void print_stream(const struct spl_stream_info *stream)
+{
+    const char *about = NULL, *unit = stream->unit;
+    for (int k = 0; k < SPL_STREAM_KNOWN_COUNT; k++)
+        if (!strcmp(spl_streams_known[k].name, stream->name))
+            about = spl_streams_known[k].about;
+    printf(", %s", stream->name);
+    if (about || *unit)
+        printf(" (%s%s%s)", unit, about && *unit ? ", " : "", about ? about : "");
+}
+
 static void print_table(const struct report *report)
 {
     const struct spl_dataset_info *info = report->info;
@@ -224,8 +236,7 @@ static void print_table(const struct report *report)
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
     printf("  attributes    %s", info->has_color ? "color" : "no color");
     for (uint32_t s = 0; s < info->stream_count; s++)
-        printf(", %s%s%s%s", info->streams[s].name, *info->streams[s].unit ? " (" : "", info->streams[s].unit,
-               *info->streams[s].unit ? ")" : "");
+        print_stream(&info->streams[s]);
     printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");

@@ -12,7 +12,8 @@ enum { half_octave_bits_max = 5 };
 
 const struct spl_stream spl_streams_known[SPL_STREAM_KNOWN_COUNT] = {
     [SPL_STREAM_CLASS] = {.name = "class", .type = "uint", .unit = ""},
-    [SPL_STREAM_UNCERTAINTY] = {.name = "uncertainty", .type = "half-octaves", .unit = ""}, /* that of coordinates */
+    [SPL_STREAM_UNCERTAINTY] = {.name = "uncertainty", .type = "half-octaves", .unit = "", /* coordinates' */
+                               .about = "derived from the points"},
 };
 
 static unsigned bits_for_count(uint32_t largest)

@@ -29,6 +29,7 @@ struct spl_stream_code {
 /* A stream of a dataset: what it is, and its codes of every chunk. */
 struct spl_stream {
     const char *name, *type, *unit; /* as in the file, borrowed; unit "" = none */
+    const char *about;    // may be NULL: where it comes from, of those that we know
     const uint32_t *base; /* by chunk, borrowed */
     const uint8_t *width;
 };

@@ -28,46 +28,6 @@ struct scratch { /* of one worker, for the largest node */
     float *radii;
 };
 
-/* What an attribute of the dataset is of a point, and of an inner node's splat. */
-static double class_of_point(const struct spl_points *points, size_t i)
-{
-    return points->color_class[i] >> 24;
-}
-
-static double class_of_inner(const struct spl_inner_splat *splat)
-{
-    return splat->color_class >> 24;
-}
-
-static double uncertainty_of_point(const struct spl_points *points, size_t i)
-{
-    return (double)points->uncertainty[i];
-}
-
-static double uncertainty_of_inner(const struct spl_inner_splat *splat)
-{
-    return (double)splat->uncertainty;
-}
-
-static bool has_class(const struct spl_points *points)
-{
-    return points->has_class;
-}
-
-static bool has_surface(const struct spl_points *points)
-{
-    return !points->no_surface;
-}
-
-static const struct attribute {
-    bool (*has)(const struct spl_points *points);
-    double (*of_point)(const struct spl_points *points, size_t i);
-    double (*of_inner)(const struct spl_inner_splat *splat);
-} attributes[SPL_STREAM_KNOWN_COUNT] = {
-    [SPL_STREAM_CLASS] = {has_class, class_of_point, class_of_inner},
-    [SPL_STREAM_UNCERTAINTY] = {has_surface, uncertainty_of_point, uncertainty_of_inner},
-};
-
 struct emit {
     const struct spl_tree *tree;
     const struct spl_points *points;
@@ -76,7 +36,6 @@ struct emit {
     struct scratch *scratch;
     struct encoded *batch;
     struct spl_node *nodes;
-    const struct attribute *attributes[SPL_STREAM_KNOWN_COUNT]; /* of each stream of `out` */
     const struct spl_emitted *out;
     size_t first; /* node of the batch's first element */
     atomic_bool failed;
@@ -141,22 +100,6 @@ static void level_radii(struct spl_splat *splats, uint32_t count)
         splats[i].radius = (float)(sum / count);
 }
 
-/* The codes of a chunk's optional attributes, stream by stream; returns their words. */
-static uint32_t encode_streams(const struct emit *e, const struct spl_tree_node *node, const struct spl_cut *items,
-                               uint32_t count, struct spl_stream_code *codes, uint32_t *words)
-{
-    uint32_t used = 0;
-    for (uint32_t s = 0; s < e->out->stream_count; s++) {
-        double values[SPL_CHUNK_SPLATS];
-        for (uint32_t i = 0; i < count; i++)
-            values[i] = node->child_count ? e->attributes[s]->of_inner(&node->splats[items[i].index])
-                                          : e->attributes[s]->of_point(e->points, node->begin + items[i].index);
-        used += spl_stream_encode(spl_stream_type_from_name(e->out->streams[s].type), values, count, &codes[s],
-                                  words + used);
-    }
-    return used;
-}
-
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
 {
     const struct spl_tree_node *node = &e->tree->nodes[index];
@@ -208,7 +151,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
-        out->word_count += encode_streams(e, node, w->items + first, used, out->codes[c], w->words + out->word_count);
+        out->word_count += spl_emitted_streams_encode(&e->out->streams, p, node, w->items + first, used,
+                                                      out->codes[c], w->words + out->word_count);
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }
@@ -241,32 +185,10 @@ static int reserve(struct spl_emitted *out, size_t wanted, size_t *capacity, str
     if (!chunks)
         return SPL_E_NOMEM;
     out->chunks = chunks;
-    for (uint32_t s = 0; s < out->stream_count; s++) {
-        uint32_t *bases = spl_realloc(out->bases[s], wanted, sizeof *bases, err);
-        if (!bases)
-            return SPL_E_NOMEM;
-        out->bases[s] = bases;
-        uint8_t *widths = spl_realloc(out->widths[s], wanted, sizeof *widths, err);
-        if (!widths)
-            return SPL_E_NOMEM;
-        out->widths[s] = widths;
-    }
-    *capacity = wanted;
-    return SPL_OK;
-}
-
-static void keep_codes(const struct encoded *encoded, struct spl_emitted *out)
-{
-    for (uint32_t c = 0; c < encoded->chunk_count; c++)
-        for (uint32_t s = 0; s < out->stream_count; s++) {
-            struct spl_stream_code code = encoded->codes[c][s];
-            uint64_t words = spl_stream_words(code.width, encoded->chunks[c].count);
-            uint64_t bits = (uint64_t)code.width * encoded->chunks[c].count;
-            out->bases[s][out->chunk_count + c] = code.base;
-            out->widths[s][out->chunk_count + c] = code.width;
-            out->stream_bits[s] += bits;
-            out->bits[SPL_ATTRIBUTE_CHUNK] += 32 * words - bits + 8 * SPL_STREAM_CHUNK_BYTES;
-        }
+    int rc = spl_emitted_streams_reserve(&out->streams, wanted, err);
+    if (!rc)
+        *capacity = wanted;
+    return rc;
 }
 
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
@@ -288,7 +210,8 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
                                          encoded->chunk_count, &node->page, err);
     if (rc)
         return rc;
-    keep_codes(encoded, out);
+    spl_emitted_streams_keep(&out->streams, out->chunk_count, encoded->chunks, encoded->codes, encoded->chunk_count,
+                             &out->bits[SPL_ATTRIBUTE_CHUNK]);
     memcpy(out->chunks + out->chunk_count, encoded->chunks, encoded->chunk_count * sizeof *out->chunks);
     for (int c = 0; c < 3; c++)
         node->origin[c] = from->origin[c];
@@ -337,7 +260,7 @@ static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *e
         struct scratch *w = &e->scratch[t];
         w->items = spl_alloc_raw(largest, sizeof *w->items, err);
         w->radii = spl_alloc_raw(largest, sizeof *w->radii, err);
-        size_t words = SPL_CHUNK_WORDS_MAX + out->stream_count * SPL_STREAM_WORDS_MAX; /* of a chunk */
+        size_t words = SPL_CHUNK_WORDS_MAX + out->streams.count * SPL_STREAM_WORDS_MAX; /* of a chunk */
         w->words = spl_alloc_raw(chunks, words * sizeof *w->words, err);
         if (!w->items || !w->radii || !w->words)
             return SPL_E_NOMEM;
@@ -363,11 +286,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
     spl_stage_begin(stage, "encoding", "splats", splats);
-    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++)
-        if (attributes[s].has(points)) {
-            e.attributes[out->stream_count] = &attributes[s];
-            out->streams[out->stream_count++] = spl_streams_known[s];
-        }
+    spl_emitted_streams_init(&out->streams, points);
     int rc = allocate(&e, out, err);
     for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
         size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;
@@ -381,11 +300,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     if (!rc) {
         unite_boxes(out->nodes, tree->count);
         out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * sizeof *out->nodes * 8;
-        for (uint32_t s = 0; s < out->stream_count; s++) {
-            out->streams[s].base = out->bases[s];
-            out->streams[s].width = out->widths[s];
-        }
-        spl_dataset_writer_set_streams(writer, out->streams, out->stream_count);
+        spl_dataset_writer_set_streams(writer, out->streams.list, out->streams.count);
         spl_stage_end(stage);
     }
     for (unsigned t = 0; e.scratch && t < stage->threads; t++) {
@@ -404,9 +319,6 @@ void spl_emitted_finish(struct spl_emitted *emitted)
 {
     free(emitted->nodes);
     free(emitted->chunks);
-    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
-        free(emitted->bases[s]);
-        free(emitted->widths[s]);
-    }
+    spl_emitted_streams_finish(&emitted->streams);
     *emitted = (struct spl_emitted){0};
 }

@@ -4,6 +4,7 @@
 
 #include "dataset/chunk.h"
 #include "dataset/writer.h"
+#include "pack/emit_streams.h"
 #include "pack/tree.h"
 
 struct spl_emitted {
@@ -13,11 +14,7 @@ struct spl_emitted {
     uint32_t pages;
     uint64_t splats;
     uint64_t bits[SPL_ATTRIBUTE_COUNT];
-    struct spl_stream streams[SPL_STREAM_KNOWN_COUNT]; /* the attributes that the points have */
-    uint32_t stream_count;
-    uint64_t stream_bits[SPL_STREAM_KNOWN_COUNT];
-    uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk, what `streams` look at */
-    uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
+    struct spl_emitted_streams streams;
     struct spl_chunk_error error; /* sums over all splats */
 };
 

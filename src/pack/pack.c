@@ -93,8 +93,8 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
     json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
-    for (uint32_t s = 0; s < p->emitted.stream_count; s++)
-        json_object_set_new(bits, p->emitted.streams[s].name, json_integer((json_int_t)p->emitted.stream_bits[s]));
+    for (uint32_t s = 0; s < p->emitted.streams.count; s++)
+        json_object_set_new(bits, p->emitted.streams.list[s].name, json_integer((json_int_t)p->emitted.streams.bits[s]));
     for (size_t i = 0; i < p->scans.count; i++)
         json_array_append_new(sources, json_string_nocheck(p->scans.list[i].name));
     for (uint32_t s = 0; s < points->station_count; s++) {
@@ -159,10 +159,10 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
     for (size_t i = 0; p->points.linear && i < p->points.count; i++)
         report->linear += p->points.linear[i];
     memcpy(report->attribute_bits, p->emitted.bits, sizeof report->attribute_bits);
-    report->stream_count = p->emitted.stream_count;
+    report->stream_count = p->emitted.streams.count;
     for (uint32_t s = 0; s < report->stream_count; s++) {
-        snprintf(report->streams[s].name, SPL_STREAM_TEXT_MAX, "%s", p->emitted.streams[s].name);
-        report->streams[s].bits = p->emitted.stream_bits[s];
+        snprintf(report->streams[s].name, SPL_STREAM_TEXT_MAX, "%s", p->emitted.streams.list[s].name);
+        report->streams[s].bits = p->emitted.streams.bits[s];
     }
 }
 

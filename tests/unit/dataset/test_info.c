@@ -121,7 +121,7 @@ static void test_table(void **state)
     assert_non_null(strstr(output, "linear        400 points on wires, poles and cables (10.00 %)"));
     assert_non_null(strstr(output, "clip lines    500 splats (11.11 %)"));
     assert_non_null(strstr(output, "surface       normals and radii"));
-    assert_non_null(strstr(output, "attributes    color, class, uncertainty\n"));
+    assert_non_null(strstr(output, "attributes    color, class, uncertainty (derived from the points)\n"));
     assert_non_null(strstr(output, "unit          us-ft"));
     assert_non_null(strstr(output, "crs           EPSG:2263"));
 }
