@@ -12,48 +12,11 @@
 #include <jansson.h>
 
 #include "cmd/dictionary.h"
+#include "cmd/info_report.h"
 #include "cmd/output.h"
-#include "dataset/chunk_clip.h"
-#include "dataset/dataset.h"
-#include "dataset/texture.h"
-
-enum { width_max = 32, levels_max = 64 };
-
-/* Fixed-width codes whose widths each chunk chose. */
-static const struct {
-    const char *name; /* as in JSON */
-    const char *label;
-    enum spl_attribute attribute;
-    unsigned shifts[3], shift_count, bits;
-} codes[] = {
-    {"position_axis",
-     "position, an axis",
-     SPL_ATTRIBUTE_POSITION,
-     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z},
-     3,
-     5},
-    {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
-    {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
-    {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
-};
-enum { code_count = sizeof codes / sizeof *codes };
 
 static const char bar[] = "########################################";
 enum { bar_max = sizeof bar - 1 };
-
-struct report {
-    const struct spl_dataset *dataset;
-    const struct spl_dataset_info *info;
-    struct level {
-        uint64_t nodes, chunks, splats;
-        double spacing;   /* mean over the splats */
-    } levels[levels_max]; /* deeper ones are counted with the last */
-    uint32_t level_count;
-    double widths[code_count + SPL_STREAMS_MAX][width_max + 1]; /* shares of the codes; streams last */
-    uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
-    uint64_t linear;                          /* points on wires, poles and cables */
-    uint64_t clips;                           /* splats that end at a clip line */
-};
 
 static void usage(FILE *out)
 {
@@ -75,83 +38,6 @@ static void usage(FILE *out)
             "      --no-verify  trust the pages; everything else is always checked\n");
 }
 
-static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attribute)
-{
-    return attribute == SPL_ATTRIBUTE_COLOR ? chunk->color_bits : chunk->geometry_bits;
-}
-
-static void gather_widths(struct report *report)
-{
-    uint64_t chunk_count;
-    uint32_t stream_count;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(report->dataset, &chunk_count);
-    const struct spl_stream *streams = spl_dataset_get_streams(report->dataset, &stream_count);
-    for (uint64_t c = 0; c < chunk_count; c++) {
-        double share = chunks[c].count / (double)report->info->splats;
-        for (int k = 0; k < code_count; k++)
-            for (unsigned s = 0; s < codes[k].shift_count; s++) {
-                uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
-                report->widths[k][width & ((1u << codes[k].bits) - 1)] += share / codes[k].shift_count;
-            }
-        for (uint32_t s = 0; s < stream_count; s++)
-            report->widths[code_count + s][streams[s].width[c]] += share;
-    }
-}
-
-static int gather(struct report *report, const struct spl_dataset *dataset, struct spl_error *err)
-{
-    uint64_t node_count, chunk_count;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    *report = (struct report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
-    for (uint64_t n = 0; n < node_count; n++) {
-        uint32_t depth = nodes[n].depth < levels_max ? nodes[n].depth : levels_max - 1;
-        struct level *level = &report->levels[depth];
-        report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
-        level->nodes++;
-        level->chunks += nodes[n].chunk_count;
-        for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
-            uint32_t splats = chunks[nodes[n].first_chunk + c].count;
-            level->splats += splats;
-            level->spacing += (double)nodes[n].spacing * splats;
-        }
-    }
-    for (uint32_t i = 0; i < report->level_count; i++)
-        report->levels[i].spacing /= (double)report->levels[i].splats;
-    for (uint64_t c = 0; c < chunk_count; c++)
-        report->clips += spl_clip_count(&chunks[c]);
-    gather_widths(report);
-    int rc = spl_dataset_count_linear(dataset, &report->linear, err);
-    return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
-}
-
-/* What is counted, by name: the attributes that every dataset has, then its own. */
-static const char *name_of(const struct spl_dataset_info *info, int attribute)
-{
-    return attribute < SPL_ATTRIBUTE_COUNT ? spl_attribute_name((enum spl_attribute)attribute)
-                                           : info->streams[attribute - SPL_ATTRIBUTE_COUNT].name;
-}
-
-static int count_of(const struct spl_dataset_info *info)
-{
-    return SPL_ATTRIBUTE_COUNT + (int)info->stream_count;
-}
-
-static double bytes_per_splat(const struct spl_dataset_info *info, int attribute)
-{
-    uint64_t bits = attribute < SPL_ATTRIBUTE_COUNT ? info->attribute_bits[attribute]
-                                                    : info->streams[attribute - SPL_ATTRIBUTE_COUNT].bits;
-    return (double)bits / 8 / (double)info->splats;
-}
-
-static double total_bytes_per_splat(const struct spl_dataset_info *info)
-{
-    double total = 0;
-    for (int a = 0; a < count_of(info); a++)
-        total += bytes_per_splat(info, a);
-    return total;
-}
-
 /* 1234567 -> "1,234,567" */
 static const char *grouped(uint64_t value, char text[32])
 {
@@ -167,7 +53,7 @@ static const char *grouped(uint64_t value, char text[32])
 }
 
 /* As figure 9 of the sparse-coding paper. A bar's full length is the largest share. */
-static void print_atoms(const struct report *report)
+static void print_atoms(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
     char text[32];
@@ -221,7 +107,7 @@ static void print_stream(const struct spl_stream_info *stream)
         printf(" (%s%s%s)", unit, about && *unit ? ", " : "", about ? about : "");
 }
 
-static void print_table(const struct report *report)
+static void print_table(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
     const json_t *sources = json_object_get(spl_dataset_get_meta(report->dataset), "sources"), *source;
@@ -258,19 +144,19 @@ static void print_table(const struct report *report)
 
     printf("  %-6s%12s%14s%16s%12s\n", "level", "nodes", "chunks", "splats", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
-        const struct level *l = &report->levels[level];
+        const struct spl_info_level *l = &report->levels[level];
         printf("  %-6u%12s%14s%16s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b), grouped(l->splats, d),
                l->spacing);
     }
     printf("\n  bytes a splat\n");
-    for (int attribute = 0; attribute < count_of(info); attribute++)
+    for (int attribute = 0; attribute < spl_info_count(info); attribute++)
         if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
-            printf("  %-14s%6.2f\n", name_of(info, attribute), bytes_per_splat(info, attribute));
+            printf("  %-14s%6.2f\n", spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute));
     printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
-           total_bytes_per_splat(info));
-    for (int k = 0; k < code_count + (int)info->stream_count; k++) {
-        printf("  %-22s", k < code_count ? codes[k].label : info->streams[k - code_count].name);
-        for (int width = 0; width <= width_max; width++)
+           spl_info_total_bytes_per_splat(info));
+    for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
+        printf("  %-22s", k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name);
+        for (int width = 0; width <= SPL_INFO_WIDTH_MAX; width++)
             if (report->widths[k][width] > 0)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
@@ -280,71 +166,9 @@ static void print_table(const struct report *report)
     print_atoms(report);
 }
 
-static json_t *vector(const double v[3])
+static int print_json(const struct spl_info_report *report, struct spl_error *err)
 {
-    return json_pack("[f,f,f]", v[0], v[1], v[2]);
-}
-
-/* null where there are none; NULL when memory is refused. */
-static json_t *textures_to_json(const struct report *report)
-{
-    const struct spl_dataset_info *info = report->info;
-    json_t *counts = info->atoms ? json_array() : NULL;
-    if (!info->atoms)
-        return json_null();
-    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
-        json_array_append_new(counts, json_integer((json_int_t)report->atoms[count]));
-    return json_pack("{s:I, s:I, s:I, s:o}", "size", (json_int_t)info->texture_size, "atoms", (json_int_t)info->atoms,
-                     "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
-}
-
-/* NULL when memory is refused: json_pack passes it on. */
-static json_t *to_json(const struct report *report)
-{
-    const struct spl_dataset_info *info = report->info;
-    json_t *bytes = json_pack("{s:f}", "total", total_bytes_per_splat(info));
-    for (int a = 0; a < count_of(info); a++)
-        json_object_set_new(bytes, name_of(info, a), json_real(bytes_per_splat(info, a)));
-    json_t *levels = json_array();
-    for (uint32_t i = 0; i < report->level_count; i++) {
-        const struct level *l = &report->levels[i];
-        json_array_append_new(levels,
-                              json_pack("{s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing", l->spacing));
-    }
-    json_t *widths = json_object();
-    for (int k = 0; k < code_count + (int)info->stream_count; k++) {
-        json_t *histogram = json_object();
-        for (int width = 0; width <= width_max; width++) {
-            char key[16];
-            snprintf(key, sizeof key, "%d", width);
-            if (report->widths[k][width] > 0)
-                json_object_set_new(histogram, key, json_real(report->widths[k][width]));
-        }
-        json_object_set_new(widths, k < code_count ? codes[k].name : info->streams[k - code_count].name, histogram);
-    }
-    return json_pack(
-        "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?}",
-        "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
-        (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
-        "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
-        (json_int_t)info->chunks, "pages", (json_int_t)info->pages, "bounds", "min", vector(info->bounds_min), "max",
-        vector(info->bounds_max), "default_view", "eye", vector(info->default_eye), "target",
-        vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
-        info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
-        (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
-        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
-        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
-        json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
-        json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
-        json_object_get(spl_dataset_get_meta(report->dataset), "crs"));
-}
-
-static int print_json(const struct report *report, struct spl_error *err)
-{
-    json_t *json = to_json(report);
+    json_t *json = spl_info_to_json(report);
     char *text = json ? json_dumps(json, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
     json_decref(json);
     if (!text)
@@ -403,10 +227,10 @@ int spl_cmd_info(int argc, char **argv)
     for (int i = optind; i < argc; i++) {
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
-        struct report report;
+        struct spl_info_report report;
         int rc = spl_dataset_open(argv[i], verify, &dataset, &err);
         if (!rc)
-            rc = gather(&report, dataset, &err);
+            rc = spl_info_gather(&report, dataset, &err);
         if (!rc && json)
             rc = print_json(&report, &err);
         else if (!rc)

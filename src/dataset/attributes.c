@@ -1,6 +1,6 @@
 /* The optional attributes of a dataset: META's list of streams, the sections STRM with each chunk's base and width, and
- * values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening on
- * the opener's thread, the rest on any. */
+ * values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
+ * on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
 #include <math.h>
@@ -69,18 +69,17 @@ int spl_dataset_check_streams(struct spl_dataset *dataset, struct spl_error *err
         const uint8_t *width = (const uint8_t *)(base + info->chunks);
         dataset->streams[s].base = base;
         dataset->streams[s].width = width;
+        uint64_t at, bits = 0, words = 0;
+        const char *what = spl_stream_judge(dataset->stream_types[s], base, width, info->chunks, &at);
+        if (what)
+            return spl_fail(err, SPL_E_CORRUPT, "%s: section STRM %u: chunk %llu %s; pack the dataset again",
+                            dataset->name, s, (unsigned long long)at, what);
         for (uint64_t c = 0; c < info->chunks; c++) {
-            struct spl_stream_code code = {base[c], width[c]};
-            const char *what = spl_stream_judge(dataset->stream_types[s], code);
-            if (what)
-                return spl_fail(err, SPL_E_CORRUPT, "%s: section STRM %u: chunk %llu %s; pack the dataset again",
-                                dataset->name, s, (unsigned long long)c, what);
-            info->streams[s].bits += (uint64_t)width[c] * dataset->chunks[c].count;
-            info->attribute_bits[SPL_ATTRIBUTE_CHUNK] +=
-                32ull * spl_stream_words(width[c], dataset->chunks[c].count) -
-                (uint64_t)width[c] * dataset->chunks[c].count;
+            bits += (uint64_t)width[c] * dataset->chunks[c].count;
+            words += spl_stream_words(width[c], dataset->chunks[c].count);
         }
-        info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 8 * bytes;
+        info->streams[s].bits = bits;
+        info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 32 * words - bits + 8 * bytes;
     }
     return SPL_OK;
 }
@@ -93,10 +92,7 @@ const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *datas
 
 uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk)
 {
-    uint32_t words = 0;
-    for (uint32_t s = 0; s < streams; s++)
-        words += spl_stream_words(dataset->streams[s].width[chunk], dataset->chunks[chunk].count);
-    return words;
+    return spl_streams_words(dataset->streams, streams, chunk, dataset->chunks[chunk].count);
 }
 
 int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)

@@ -30,8 +30,9 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 /* Bytes of page `index` (< info.pages). */
 size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index);
 
-/* Reads page `index` (< info.pages) to `out`, which has room for its bytes, and holds it against its checksum where the dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or
- * overwritten in place since. Any thread; blocks on disk. What a daemon reads pages with. */
+/* Reads page `index` (< info.pages) to `out`, which has room for its bytes, and holds it against its checksum where the
+ * dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or overwritten in place since. Any thread;
+ * blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
 /* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, the words of CTEX (one a
@@ -79,8 +80,8 @@ uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
  *   bool (optional, true)}, "streams" [{"name": string, "type": string, "unit": string}] (optional; the writer's),
- *   "unit" "m" | "ft" | "us-ft" | "unknown" (optional), "crs" string or null (optional), "sources" [string], "pack" {...} (optional, free: settings,
- * statistics), "stations"
+ *   "unit" "m" | "ft" | "us-ft" | "unknown" (optional), "crs" string or null (optional), "sources" [string], "pack"
+ * {...} (optional, free: settings, statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |
  *   "constant" | "photographs", "points": int}] (optional): where colours come from; those from photographs have taken
  *   the place of the others, whose points are all that were read. */

@@ -34,7 +34,7 @@ struct spl_dataset {
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
-    bool verified; /* every page had its checksum when the dataset was opened */
+    bool verified;                /* every page had its checksum when the dataset was opened */
     struct spl_section *sections;
     uint32_t section_count;
     void **copies; /* by section: its bytes, of the kinds that are kept in memory; NULL of the others */
@@ -82,8 +82,8 @@ int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_er
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err);
 
-/* Section `index` of a kind in memory, behind the room that the kind asks for, and its length; NULL and 0 where there is
- * none. */
+/* Section `index` of a kind in memory, behind the room that the kind asks for, and its length; NULL and 0 where there
+ * is none. */
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
                                  uint64_t *bytes);
 

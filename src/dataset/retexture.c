@@ -38,7 +38,8 @@ static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
 static uint32_t copy_chunk(struct pass *p, uint64_t index, uint32_t *words)
 {
     struct spl_chunk from = p->chunks[index];
-    uint32_t own = spl_chunk_words(&from), streams = spl_dataset_get_stream_words(p->what->from, p->stream_count, index);
+    uint32_t own = spl_chunk_words(&from),
+             streams = spl_dataset_get_stream_words(p->what->from, p->stream_count, index);
     const uint32_t *page = p->page + from.geometry_word;
     if (!p->what->colors) {
         memcpy(words, page, (own + streams) * sizeof *words);
@@ -98,7 +99,8 @@ static int allocate(struct pass *p, uint64_t node_count, uint64_t chunk_count, s
     size_t texture_words = p->what->dictionary ? most * SPL_TEXTURE_WORDS_MAX : 1;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(p->what->from, &chunk_count);
     p->chunks = spl_alloc_raw(chunk_count, sizeof *p->chunks, err);
-    p->words = spl_alloc_raw(most * (SPL_CHUNK_WORDS_MAX + p->stream_count * SPL_STREAM_WORDS_MAX), sizeof *p->words, err);
+    p->words =
+        spl_alloc_raw(most * (SPL_CHUNK_WORDS_MAX + p->stream_count * SPL_STREAM_WORDS_MAX), sizeof *p->words, err);
     p->texture_words = spl_alloc_raw(texture_words, sizeof *p->texture_words, err);
     p->chunk_texture = spl_alloc_raw(most, sizeof *p->chunk_texture, err);
     if (!p->chunks || !p->words || !p->texture_words || !p->chunk_texture)

@@ -21,11 +21,11 @@ static const struct kind {
     uint32_t type;
     enum { ONCE, BY_PAGE, BY_STREAM } number; /* in a file, or one for each page or stream, in their order */
     bool required;
-    bool kept;     /* in memory, from open to close */
-    bool texture;  /* a file has all of these kinds or none */
+    bool kept;    /* in memory, from open to close */
+    bool texture; /* a file has all of these kinds or none */
     uint32_t alignment, item_bytes;
-    uint32_t room_bytes; /* of an item in memory, where that is more: items lie at the end of their copy, so that a check
-                            can lay them out anew from its start */
+    uint32_t room_bytes; /* of an item in memory, where that is more: items lie at the end of their copy, so that a
+                            check can lay them out anew from its start */
     uint64_t bytes_min, bytes_max;
     const char *wrong_size;
     int (*check)(struct spl_dataset *dataset, struct spl_error *err); // may be NULL: nothing more than the checksum
@@ -48,8 +48,8 @@ static const struct kind {
                           .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_streams},
     [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
                         .item_bytes = sizeof(struct spl_node), .bytes_min = sizeof(struct spl_node),
-                        .bytes_max = UINT64_MAX,
-                        .wrong_size = "is not a whole number of nodes", .check = spl_dataset_check_nodes},
+                        .bytes_max = UINT64_MAX, .wrong_size = "is not a whole number of nodes",
+                        .check = spl_dataset_check_nodes},
     [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .alignment = SPL_FILE_ALIGNMENT,
                         .item_bytes = sizeof(uint32_t), .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t),
                         .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have"},
@@ -100,12 +100,13 @@ static int not_a_dataset(const struct spl_dataset *dataset, const char first[8],
 {
     static const struct {
         const char *start, *kind;
-    } others[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
+    } others[] = {
+        {"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         if (dataset->source.size > strlen(others[i].start) && !memcmp(first, others[i].start, strlen(others[i].start)))
             return spl_fail(err, SPL_E_INPUT,
-                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one",
-                            dataset->name, others[i].kind);
+                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one", dataset->name,
+                            others[i].kind);
     size_t letters = dataset->source.size < 4 ? (size_t)dataset->source.size : 4;
     if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
@@ -130,8 +131,8 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
                         sizeof *header - bytes, sizeof *header);
     if (header->version != SPL_FILE_VERSION)
         return spl_fail(err, SPL_E_UNSUPPORTED,
-                        "%s: header says format version %u, this splatd reads version %u; pack it again",
-                        dataset->name, header->version, SPL_FILE_VERSION);
+                        "%s: header says format version %u, this splatd reads version %u; pack it again", dataset->name,
+                        header->version, SPL_FILE_VERSION);
     if (header->header_hash != XXH3_64bits(header, offsetof(struct spl_file_header, header_hash)))
         return corrupt(dataset, err, "header", "fails its checksum");
     if (header->header_bytes != sizeof *header || header->reserved)

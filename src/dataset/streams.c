@@ -1,5 +1,5 @@
-/* Values of an attribute as codes above a chunk's base, in as many bits as the largest needs; see streams.h. A type is a
- * row of the table below. Pure functions; any thread. */
+/* Values of an attribute as codes above a chunk's base, in as many bits as the largest needs; see streams.h. A type is
+ * a row of the table below. Pure functions; any thread. */
 #include "dataset/streams.h"
 
 #include <math.h>
@@ -12,8 +12,10 @@ enum { half_octave_bits_max = 5 };
 
 const struct spl_stream spl_streams_known[SPL_STREAM_KNOWN_COUNT] = {
     [SPL_STREAM_CLASS] = {.name = "class", .type = "uint", .unit = ""},
-    [SPL_STREAM_UNCERTAINTY] = {.name = "uncertainty", .type = "half-octaves", .unit = "", /* coordinates' */
-                               .about = "derived from the points"},
+    [SPL_STREAM_UNCERTAINTY] = {.name = "uncertainty",
+                                .type = "half-octaves",
+                                .unit = "", /* coordinates' */
+                                .about = "derived from the points"},
 };
 
 static unsigned bits_for_count(uint32_t largest)
@@ -79,19 +81,22 @@ static double value_of_half_octaves(struct spl_stream_code code, uint32_t number
     return zero ? 0 : (double)(base_of_half_octaves(code) * exp2f(-0.5f * (float)number));
 }
 
-static const char *judge_half_octaves(struct spl_stream_code code)
+static const char *judge_half_octaves(const uint32_t *base, const uint8_t *width, uint64_t count, uint64_t *at)
 {
-    float largest = base_of_half_octaves(code);
-    return largest >= 0 && isfinite(largest) && code.width <= half_octave_bits_max
-               ? NULL
-               : "has a largest value that is negative or not finite, or codes of more than 5 bits";
+    for (*at = 0; *at < count; ++*at) {
+        float largest = base_of_half_octaves((struct spl_stream_code){base[*at], width[*at]});
+        if (!(largest >= 0 && isfinite(largest)) || width[*at] > half_octave_bits_max)
+            return "has a largest value that is negative or not finite, or codes of more than 5 bits";
+    }
+    return NULL;
 }
 
 static const struct {
     const char *name;
     void (*quantise)(const double *values, uint32_t count, struct spl_stream_code *code, uint32_t *codes);
     double (*value_of)(struct spl_stream_code code, uint32_t number);
-    const char *(*judge)(struct spl_stream_code code); // may be NULL: every code decodes
+    const char *(*judge)(const uint32_t *base, const uint8_t *width, uint64_t count,
+                         uint64_t *at); // may be NULL: every code of up to 32 bits decodes
 } types[SPL_STREAM_UNKNOWN] = {
     [SPL_STREAM_UINT] = {"uint", quantise_uint, value_of_uint, NULL},
     [SPL_STREAM_HALF_OCTAVES] = {"half-octaves", quantise_half_octaves, value_of_half_octaves, judge_half_octaves},
@@ -118,16 +123,17 @@ uint32_t spl_stream_encode(enum spl_stream_type type, const double *values, uint
     return writer.used;
 }
 
-const char *spl_stream_judge(enum spl_stream_type type, struct spl_stream_code code)
+const char *spl_stream_judge(enum spl_stream_type type, const uint32_t *base, const uint8_t *width, uint64_t count,
+                             uint64_t *at)
 {
-    if (code.width > 32)
-        return "has codes of more than 32 bits";
-    return type < SPL_STREAM_UNKNOWN && types[type].judge ? types[type].judge(code) : NULL;
+    for (*at = 0; *at < count; ++*at)
+        if (width[*at] > 32)
+            return "has codes of more than 32 bits";
+    return type < SPL_STREAM_UNKNOWN && types[type].judge ? types[type].judge(base, width, count, at) : NULL;
 }
 
 double spl_stream_decode(enum spl_stream_type type, struct spl_stream_code code, const uint32_t *words, uint32_t i)
 {
-    return type < SPL_STREAM_UNKNOWN
-               ? types[type].value_of(code, spl_bits_get(words, i * code.width, code.width))
-               : (double)NAN;
+    return type < SPL_STREAM_UNKNOWN ? types[type].value_of(code, spl_bits_get(words, i * code.width, code.width))
+                                     : (double)NAN;
 }

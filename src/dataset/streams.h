@@ -29,8 +29,8 @@ struct spl_stream_code {
 /* A stream of a dataset: what it is, and its codes of every chunk. */
 struct spl_stream {
     const char *name, *type, *unit; /* as in the file, borrowed; unit "" = none */
-    const char *about;    // may be NULL: where it comes from, of those that we know
-    const uint32_t *base; /* by chunk, borrowed */
+    const char *about;              // may be NULL: where it comes from, of those that we know
+    const uint32_t *base;           /* by chunk, borrowed */
     const uint8_t *width;
 };
 
@@ -49,17 +49,29 @@ static inline uint32_t spl_stream_words(uint32_t width, uint32_t count)
     return (count * width + 31) / 32;
 }
 
+/* Words of the first `count` streams of chunk `chunk`, which has so many splats. */
+static inline uint32_t spl_streams_words(const struct spl_stream *streams, uint32_t count, uint64_t chunk,
+                                         uint32_t splats)
+{
+    uint32_t words = 0;
+    for (uint32_t s = 0; s < count; s++)
+        words += spl_stream_words(streams[s].width[chunk], splats);
+    return words;
+}
+
 /* Chooses base and width for `count` (1..SPL_CHUNK_SPLATS) values, writes `words` (room for SPL_STREAM_WORDS_MAX) and
  * returns how many it wrote. Of SPL_STREAM_UINT values are whole and fit 32 bits, of SPL_STREAM_HALF_OCTAVES they are
  * floats, >= 0; these come back within 19 %, or as 0 below 2^-15 of the chunk's largest. */
 uint32_t spl_stream_encode(enum spl_stream_type type, const double *values, uint32_t count,
                            struct spl_stream_code *code, uint32_t *words);
 
-/* What is wrong with a chunk's base and width, or NULL: then every code decodes to a finite number. */
-const char *spl_stream_judge(enum spl_stream_type type, struct spl_stream_code code);
+/* What is wrong with the first base and width of `count` chunks that are not right, and *at, which that is; NULL where
+ * all are: then every code decodes to a finite number. */
+const char *spl_stream_judge(enum spl_stream_type type, const uint32_t *base, const uint8_t *width, uint64_t count,
+                             uint64_t *at);
 
-/* The value of splat `i`, whose chunk's codes of this stream are `words` (and a word more, which is not used). NaN of an
- * unknown type. */
+/* The value of splat `i`, whose chunk's codes of this stream are `words` (and a word more, which is not used). NaN of
+ * an unknown type. */
 double spl_stream_decode(enum spl_stream_type type, struct spl_stream_code code, const uint32_t *words, uint32_t i);
 
 #endif

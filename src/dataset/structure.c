@@ -138,7 +138,8 @@ static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *cl
         const struct spl_chunk *chunk = &dataset->chunks[i];
         if (claimed[i])
             return wrong(dataset, err, "NODE", "node", index, "shares a chunk with another node");
-        uint32_t words = spl_chunk_words(chunk) + spl_dataset_get_stream_words(dataset, dataset->info.stream_count, i);
+        uint32_t words =
+            spl_chunk_words(chunk) + spl_streams_words(dataset->streams, dataset->info.stream_count, i, chunk->count);
         if (chunk->geometry_word > page_words || words > page_words - chunk->geometry_word)
             return wrong(dataset, err, "CHNK", "chunk", i, "reaches beyond the end of its page");
         claimed[i] = 1;

@@ -162,8 +162,8 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
     size_t larger = word_count > textures->word_count ? word_count : textures->word_count;
     if (larger > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) ||
         page_bytes(larger, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES_MAX)
-        return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)", writer->file.path,
-                        larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
+        return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)",
+                        writer->file.path, larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
     if (to->used &&
         (page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > SPL_PAGE_BYTES ||
          page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES)) {
@@ -219,8 +219,8 @@ static char *describe(const struct spl_dataset_writer *writer, const json_t *met
     json_t *whole = json_copy((json_t *)meta), *streams = json_array();
     for (uint32_t s = 0; s < writer->stream_count; s++) {
         const struct spl_stream *stream = &writer->streams[s];
-        json_array_append_new(streams, json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit",
-                                                 stream->unit));
+        json_array_append_new(
+            streams, json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit", stream->unit));
     }
     bool failed = json_array_size(streams) != writer->stream_count;
     failed |= json_object_set_new(whole, "streams", streams) != 0;

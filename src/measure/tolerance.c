@@ -87,7 +87,8 @@ static double drawn_radius(const struct job *job, uint64_t index, uint32_t id, d
     const struct spl_node *node = spl_dataset_get_nodes(t->dataset, &node_count) + t->nodes[index];
     size_t bytes;
     struct spl_splat splat;
-    spl_chunk_decode(chunk, spl_dataset_get_page(t->dataset, node->page, &bytes), id - (uint32_t)chunk->first_id, &splat);
+    spl_chunk_decode(chunk, spl_dataset_get_page(t->dataset, node->page, &bytes), id - (uint32_t)chunk->first_id,
+                     &splat);
     const struct spl_camera *camera = &job->view->camera;
     double focal = fmax(camera->fx, camera->fy) * job->view->supersample, lod = job->view->lod;
     double share = (double)chunk->radius_mean / SPL_RADIUS_SPACING * focal / fmax(z, camera->near) / lod;

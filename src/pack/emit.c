@@ -151,8 +151,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
-        out->word_count += spl_emitted_streams_encode(&e->out->streams, p, node, w->items + first, used,
-                                                      out->codes[c], w->words + out->word_count);
+        out->word_count += spl_emitted_streams_encode(&e->out->streams, p, node, w->items + first, used, out->codes[c],
+                                                      w->words + out->word_count);
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }
@@ -202,8 +202,10 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
         spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
     if (from->depth > UINT8_MAX)
-        return spl_fail(err, SPL_E_LIMIT, "more than %d levels; points lie closer together than the scan is wide by more"
-                        " than floats can say", UINT8_MAX + 1);
+        return spl_fail(err, SPL_E_LIMIT,
+                        "more than %d levels; points lie closer together than the scan is wide by more"
+                        " than floats can say",
+                        UINT8_MAX + 1);
     int rc = reserve(out, out->chunk_count + encoded->chunk_count, chunk_capacity, err);
     if (!rc)
         rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,

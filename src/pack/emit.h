@@ -18,7 +18,8 @@ struct spl_emitted {
     struct spl_chunk_error error; /* sums over all splats */
 };
 
-/* Encodes and writes every node, breadth first, and tells the writer of the streams, which `out` keeps. On failure too, `out` is finished by the caller. */
+/* Encodes and writes every node, breadth first, and tells the writer of the streams, which `out` keeps. On failure too,
+ * `out` is finished by the caller. */
 int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
              struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out,
              struct spl_error *err);

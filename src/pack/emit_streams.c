@@ -76,8 +76,8 @@ uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, c
         for (uint32_t i = 0; i < count; i++)
             values[i] = node->child_count ? attribute->of_inner(&node->splats[items[i].index])
                                           : attribute->of_point(points, node->begin + items[i].index);
-        used += spl_stream_encode(spl_stream_type_from_name(streams->list[s].type), values, count, &codes[s],
-                                  words + used);
+        used +=
+            spl_stream_encode(spl_stream_type_from_name(streams->list[s].type), values, count, &codes[s], words + used);
     }
     return used;
 }

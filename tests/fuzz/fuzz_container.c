@@ -40,9 +40,9 @@ static void rehash(struct head *head, size_t table_bytes)
 static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches, unsigned patch_count,
                         size_t *length)
 {
-    static const uint32_t all[section_count] = {
-        SPL_SECTION_PAGE,   SPL_SECTION_META,  SPL_SECTION_NODES,          SPL_SECTION_CHUNKS,  SPL_SECTION_STREAM,
-        SPL_SECTION_STREAM, SPL_SECTION_ATOMS, SPL_SECTION_CHUNK_TEXTURES, SPL_SECTION_TEXTURES};
+    static const uint32_t all[section_count] = {SPL_SECTION_PAGE,   SPL_SECTION_META,           SPL_SECTION_NODES,
+                                                SPL_SECTION_CHUNKS, SPL_SECTION_STREAM,         SPL_SECTION_STREAM,
+                                                SPL_SECTION_ATOMS,  SPL_SECTION_CHUNK_TEXTURES, SPL_SECTION_TEXTURES};
     uint32_t types[section_count];
     int count = 0;
     for (int i = 0; i < section_count; i++)
@@ -74,8 +74,11 @@ static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const 
     uint64_t offset = SPL_FILE_ALIGNMENT;
     for (int i = 0; i < count; i++) {
         int from = i < plain_sections ? (i + 3) % plain_sections : i; /* the input has the page behind CHNK */
-        head.table[i] = (struct spl_section){
-            .type = types[i], .index = i > 0 && types[i] == types[i - 1], .offset = offset, .bytes = wanted[from], .hash = XXH3_64bits(part[from], wanted[from])};
+        head.table[i] = (struct spl_section){.type = types[i],
+                                             .index = i > 0 && types[i] == types[i - 1],
+                                             .offset = offset,
+                                             .bytes = wanted[from],
+                                             .hash = XXH3_64bits(part[from], wanted[from])};
         offset = (offset + wanted[from] + 63) / 64 * 64;
     }
     head.header.table_offset = offset;
@@ -134,8 +137,8 @@ static void decode_streams(const struct spl_dataset *dataset, const struct spl_c
     for (uint32_t s = 0; s < count; s++) {
         struct spl_stream_code code = {streams[s].base[index], streams[s].width[index]};
         enum spl_stream_type type = spl_stream_type_from_name(streams[s].type);
-        const uint32_t *words = page + chunk->geometry_word + spl_chunk_words(chunk) +
-                                spl_dataset_get_stream_words(dataset, s, index);
+        const uint32_t *words =
+            page + chunk->geometry_word + spl_chunk_words(chunk) + spl_dataset_get_stream_words(dataset, s, index);
         for (uint32_t i = 0; i < chunk->count; i++) {
             double value = spl_stream_decode(type, code, words, i), found = -1;
             spl_assert(type == SPL_STREAM_UNKNOWN ? isnan(value) : value >= 0 && isfinite(value));

@@ -19,7 +19,8 @@ static struct spl_stream_code through(enum spl_stream_type type, const double *v
     assert_int_equal(used, spl_stream_words(code.width, count));
     for (size_t i = used; i < sizeof words / sizeof *words; i++)
         assert_int_equal(words[i], 0xa5a5a5a5u);
-    assert_null(spl_stream_judge(type, code));
+    uint64_t at;
+    assert_null(spl_stream_judge(type, &code.base, &code.width, 1, &at));
     for (uint32_t i = 0; i < count; i++)
         out[i] = spl_stream_decode(type, code, words, i);
     return code;
@@ -56,12 +57,8 @@ static void test_half_octaves(void **state)
         double in[3], out[3];
         unsigned bits;
     } rows[] = {
-        {{0, 0, 0}, {0, 0, 0}, 0},
-        {{0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}, 0},
-        {{0, 1, 1}, {0, 1, 1}, 1},
-        {{0.5, 1, 0}, {0.5, 1, 0}, 2},
-        {{0x1p-15, 1, 0}, {0x1p-15, 1, 0}, 5},
-        {{1e-30, 1, 1}, {0, 1, 1}, 1},
+        {{0, 0, 0}, {0, 0, 0}, 0},     {{0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}, 0}, {{0, 1, 1}, {0, 1, 1}, 1},
+        {{0.5, 1, 0}, {0.5, 1, 0}, 2}, {{0x1p-15, 1, 0}, {0x1p-15, 1, 0}, 5},       {{1e-30, 1, 1}, {0, 1, 1}, 1},
     };
     double out[SPL_CHUNK_SPLATS], in[SPL_CHUNK_SPLATS];
     for (size_t row = 0; row < sizeof rows / sizeof *rows; row++) {
@@ -96,9 +93,14 @@ static void test_bad_codes(void **state)
         {SPL_STREAM_UNKNOWN, {0x7fc00000, 32}, true},
         {SPL_STREAM_UNKNOWN, {0, 33}, false},
     };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        if (!spl_stream_judge(rows[i].type, rows[i].code) != rows[i].good)
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        uint32_t bases[3] = {0x3f800000, 0x3f800000, rows[i].code.base};
+        uint8_t widths[3] = {0, 1, rows[i].code.width};
+        uint64_t at;
+        const char *what = spl_stream_judge(rows[i].type, bases, widths, 3, &at);
+        if (!what != rows[i].good || (what && at != 2))
             fail_msg("row %zu", i);
+    }
     assert_true(isnan(spl_stream_decode(SPL_STREAM_UNKNOWN, (struct spl_stream_code){0, 0}, NULL, 0)));
     assert_int_equal(spl_stream_type_from_name("uint"), SPL_STREAM_UINT);
     assert_int_equal(spl_stream_type_from_name("half-octaves"), SPL_STREAM_HALF_OCTAVES);

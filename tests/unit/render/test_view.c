@@ -38,7 +38,8 @@ static void test_ids_have_32_bits(void **state)
     (void)state;
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         assert_string_equal(refusal((enum spl_method)method, SPL_LAYER_ID, true, UINT32_MAX), "");
-        assert_non_null(strstr(refusal((enum spl_method)method, SPL_LAYER_ID, true, 1ull << 32), "has 4294967296 splats"));
+        assert_non_null(
+            strstr(refusal((enum spl_method)method, SPL_LAYER_ID, true, 1ull << 32), "has 4294967296 splats"));
         assert_non_null(strstr(refusal((enum spl_method)method, SPL_LAYER_ID, true, 10000000000), "32 bits"));
         assert_string_equal(refusal((enum spl_method)method, SPL_LAYER_DEPTH, true, 10000000000), "");
     }
