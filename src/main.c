@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "cmd/cmd.h"
+#include "cmd/options.h"
 
 static const struct {
     const char *name;
@@ -13,6 +14,12 @@ static const struct {
 #include "cmd/commands.def"
 #undef COMMAND
 };
+
+static const char *const names[] = {
+#define COMMAND(name, help) #name,
+#include "cmd/commands.def"
+#undef COMMAND
+    NULL};
 
 static void usage(FILE *out)
 {
@@ -41,6 +48,8 @@ int main(int argc, char **argv)
         puts("splatd " SPLATD_VERSION);
         return 0;
     }
-    fprintf(stderr, "splatd: unknown command '%s'; 'splatd --help' lists them\n", argv[1]);
+    const char *near = spl_cmd_find_nearest(argv[1], names);
+    fprintf(stderr, "splatd: unknown command '%s'; %s%s%s'splatd --help' lists them\n", argv[1],
+            near ? "did you mean " : "", near ? near : "", near ? "? " : "");
     return 2;
 }

@@ -5,7 +5,7 @@
 
 #include <stdlib.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 static const struct spl_colmap_camera *find(const struct spl_colmap *model, unsigned long id)
 {
@@ -25,14 +25,8 @@ int spl_colmap_add_camera(struct spl_colmap *model, const struct spl_colmap_came
         return spl_fail_field(err, SPL_E_INPUT, "CAMERA_ID", "camera %lu is there twice", camera->id);
     if (model->count == SPL_COLMAP_CAMERAS_MAX)
         return spl_fail(err, SPL_E_LIMIT, "more than %d cameras", SPL_COLMAP_CAMERAS_MAX);
-    if (model->count == model->capacity) {
-        size_t capacity = model->capacity ? 2 * model->capacity : 16;
-        struct spl_colmap_camera *grown = spl_realloc(model->cameras, capacity, sizeof *grown, err);
-        if (!grown)
-            return SPL_E_NOMEM;
-        model->cameras = grown;
-        model->capacity = capacity;
-    }
+    if (spl_array_reserve(model->cameras, model->capacity, model->count + 1, err))
+        return SPL_E_NOMEM;
     model->cameras[model->count++] = *camera;
     return SPL_OK;
 }

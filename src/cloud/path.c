@@ -53,13 +53,7 @@ int spl_path_set_fov(const struct spl_path_reader *reader, double fov, struct sp
 
 int spl_path_take(struct spl_path_reader *reader, struct spl_camera *camera, double time, struct spl_error *err)
 {
-    double x = (double)reader->width / camera->width, y = (double)reader->height / camera->height;
-    camera->fx *= x;
-    camera->cx *= x;
-    camera->fy *= y;
-    camera->cy *= y;
-    camera->width = reader->width;
-    camera->height = reader->height;
+    spl_camera_resize(camera, reader->width, reader->height);
     int rc = spl_camera_check(camera, err);
     return rc ? rc : spl_camera_path_add(reader->path, camera, time, err);
 }

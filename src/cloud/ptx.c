@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "cloud/fields.h"
 #include "cloud/reader.h"
@@ -83,14 +84,8 @@ static int add_station(struct spl_cloud *cloud, struct spl_error *err)
     struct spl_cloud_info *info = &cloud->info;
     if (info->station_count == UINT16_MAX)
         return spl_source_fail(&cloud->source, SPL_E_LIMIT, "stations", err, "has more than %d stations", UINT16_MAX);
-    if (info->station_count == ptx->station_capacity) {
-        size_t capacity = ptx->station_capacity ? 2 * ptx->station_capacity : 8;
-        void *grown = spl_realloc(info->stations, capacity, sizeof *info->stations, err);
-        if (!grown)
-            return SPL_E_NOMEM;
-        info->stations = grown;
-        ptx->station_capacity = capacity;
-    }
+    if (spl_array_reserve(info->stations, ptx->station_capacity, (size_t)info->station_count + 1, err))
+        return SPL_E_NOMEM;
     memcpy(info->stations[info->station_count++], ptx->pose, sizeof ptx->pose);
     return SPL_OK;
 }

@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "cloud/view_list.h"
 
@@ -50,13 +51,8 @@ int spl_view_list_add(struct spl_view_list *list, const char *path, const char *
             path, name, SPL_VIEW_NAME_MAX);
     if (list->count == SPL_VIEW_LIST_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "views", "%s: more than %d views", path, SPL_VIEW_LIST_MAX);
-    if (!(list->count & (list->count - 1))) { /* room for the next power of two */
-        struct spl_named_view *grown =
-            spl_realloc(list->views, list->count ? 2 * list->count : 1, sizeof *list->views, err);
-        if (!grown)
-            return SPL_E_NOMEM;
-        list->views = grown;
-    }
+    if (spl_array_reserve(list->views, list->capacity, list->count + 1, err))
+        return SPL_E_NOMEM;
     struct spl_named_view *view = &list->views[list->count];
     *view = (struct spl_named_view){.camera = *camera};
     list->count++;

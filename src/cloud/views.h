@@ -44,7 +44,7 @@ struct spl_named_view {
 
 struct spl_view_list {
     struct spl_named_view *views;
-    size_t count;
+    size_t count, capacity;
 };
 
 /* Reads `path`: a folder is a COLMAP model, anything else our JSON. Fills `list` on success, which

@@ -4,6 +4,7 @@
 #ifndef SPL_CMD_BENCH_H
 #define SPL_CMD_BENCH_H
 
+#include "cmd/table.h"
 #include "measure/bench.h"
 #include "measure/sweep.h"
 
@@ -45,16 +46,20 @@ struct spl_cmd_bench_arguments {
 };
 
 /* Fills zeroed `arguments` from the command line and opens the datasets, which the caller closes on failure too; lists
- * point into `argv`. SPL_E_USAGE, and what opening fails with. */
+ * point into `argv`. SPL_CMD_DONE after --help, SPL_E_USAGE, and what opening fails with. */
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *arguments, int argc, char **argv, struct spl_error *err);
 
 /* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */
 int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* splatd bench --textures, argv[0] being that option: coders of the textures in a file beside each other. */
+/* splatd bench --textures, argv[0] being that option: coders of the textures in a file beside each other. SPL_CMD_DONE
+ * after --help, as below. */
 int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err);
 
 /* splatd bench --left-out, argv[0] being that option: renders against photographs that packing did not have. */
 int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err);
+
+/* The options of each. */
+extern const struct spl_cmd_table spl_cmd_bench_table, spl_cmd_bench_textures_table, spl_cmd_bench_left_out_table;
 
 #endif

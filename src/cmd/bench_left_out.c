@@ -10,8 +10,8 @@
 
 #include "cmd/bench.h"
 #include "cmd/cmd.h"
-#include "cmd/options.h"
 #include "cmd/output.h"
+#include "cmd/table.h"
 #include "image/load.h"
 #include "measure/left_out.h"
 
@@ -145,27 +145,38 @@ done:
     return rc;
 }
 
+static int take_output(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    (void)option;
+    ((struct arguments *)arguments)->folder = text;
+    return spl_cmd_check_folder("-o", text, "a folder", err);
+}
+
+static const struct spl_cmd_option options[] = {
+    {"cameras", "MODEL", "poses of the photographs that were left out", SPL_CMD_TEXT(struct arguments, cameras)},
+    {"images", "DIR", "where they lie", .otherwise = "where MODEL says", SPL_CMD_TEXT(struct arguments, images)},
+    {"lod", "L", "pixels a splat", .fallback = "1", SPL_CMD_REAL(struct arguments, lod, 0, 1024)},
+    {"device", "D", "'splatd devices' lists them", .otherwise = "auto", SPL_CMD_TEXT(struct arguments, device)},
+    {"output", "OUT", "a folder for the photograph and both renders of each", .letter = 'o', .take = take_output},
+};
+
+const struct spl_cmd_table spl_cmd_bench_left_out_table = {
+    .command = "bench --left-out",
+    .before =
+        "usage: splatd bench --left-out NAME.spld --cameras MODEL [--images DIR] [--lod L] [--device D] [-o OUT]\n\n"
+        "Photographs that packing did not have: renders from their poses, with textures and without, by the width of\n"
+        "splats: as they are, with exposure matched, with the means of blocks of 16x16 pixels made equal, and with "
+        "each\n"
+        "block moved by up to 2 pixels to where it fits best.\n"
+        "  splatd bench --left-out hall.spld --cameras colmap/left-out -o hall-left-out\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
+
 int spl_cmd_bench_left_out(int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {
-        {"cameras", required_argument, NULL, 'c'}, {"images", required_argument, NULL, 'i'},
-        {"output", required_argument, NULL, 'o'},  {"lod", required_argument, NULL, 'l'},
-        {"device", required_argument, NULL, 'd'},  {NULL, 0, NULL, 0}};
-    struct arguments a = {.lod = 1};
-    int option, rc = 0;
-    while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
-        if (option == 'c')
-            a.cameras = optarg;
-        else if (option == 'i')
-            a.images = optarg;
-        else if (option == 'o')
-            rc = spl_cmd_check_folder("-o", a.folder = optarg, "a folder", err);
-        else if (option == 'd')
-            a.device = optarg;
-        else if (option == 'l')
-            rc = spl_cmd_parse_real("--lod", optarg, 0, 1024, &a.lod, err);
-        else
-            rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
+    struct arguments a = {0};
+    int rc = spl_cmd_table_parse(&spl_cmd_bench_left_out_table, argc, argv, &a, err);
     if (!rc && (argc - optind != 1 || !a.cameras))
         rc = spl_fail(err, SPL_E_USAGE, "bench --left-out takes one NAME.spld and --cameras MODEL; %s",
                       a.cameras ? "give one NAME.spld" : "--cameras is missing");

@@ -7,6 +7,7 @@
 
 #include "cmd/options.h"
 #include "cmd/output.h"
+#include "cmd/table.h"
 #include "geom/size.h"
 #include "shared.h"
 
@@ -67,98 +68,126 @@ static int take_atoms(struct spl_cmd_bench_arguments *a, const char *text, struc
     return status;
 }
 
-/* Options that only mean something with -o. */
-static int take_sweep_option(struct spl_cmd_bench_arguments *a, int option, struct spl_error *err)
+/* What a list is given anew replaces what stood there before. */
+static int take_devices(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    uint64_t count = 0;
-    int status = 0;
-    switch (option) {
-    case 'o':
-        a->sweep.output = optarg;
-        status = spl_cmd_check_folder("-o", optarg, "a folder", err);
-        break;
-    case 'r':
-        a->sweep.sweep.reference = (struct spl_reference){.kind = SPL_REFERENCE_EXACT, .folder = optarg};
-        break;
-    case 'p':
-        a->sweep.sweep.reference = (struct spl_reference){.kind = SPL_REFERENCE_PHOTOGRAPHS};
-        break;
-    case 'x':
-        a->supersample_count = 0;
-        a->listed[2] = true;
-        status = each("--supersample", optarg, take_supersample, a, err);
-        break;
-    case 'a':
-        a->atom_count = 0;
-        a->listed[3] = true;
-        status = each("--atoms", optarg, take_atoms, a, err);
-        break;
-    case 'e':
-        status = spl_cmd_parse_count("--repeats", optarg, 1, SPL_SWEEP_REPEATS_MAX, &count, err);
-        a->sweep.sweep.repeats = (uint32_t)count;
-        break;
-    case 'P':
-        a->sweep.peers = optarg;
-        break;
-    case 'f':
-        a->sweep.profile = optarg;
-        break;
-    case 'F':
-        a->sweep.no_profile = true;
-        break;
-    case 'R':
-        a->sweep.sweep.restart = true;
-        break;
-    default:
-        status = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
-    }
-    return status;
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->bench.device_count = 0;
+    return each(option, text, take_device, a, err);
 }
 
-static int take_option(struct spl_cmd_bench_arguments *a, int option, struct spl_error *err)
+static int take_methods(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    uint64_t count = 0;
-    int status = 0;
-    switch (option) {
-    case 'v':
-        a->views = optarg;
-        break;
-    case 's':
-        a->set = optarg;
-        break;
-    case 'j':
-        a->json = true;
-        break;
-    case 'n':
-        status = spl_cmd_parse_count("--frames", optarg, 2, 100000, &count, err);
-        a->bench.frames = (uint32_t)count;
-        break;
-    case 'z':
-        a->size[0] = a->size[1] = 0;
-        status = spl_cmd_parse_size("--size", optarg, &a->size[0], &a->size[1], err);
-        break;
-    case 'b':
-        status = spl_cmd_parse_bytes("--memory-limit", optarg, 1 << 20, 1, 1u << 24, &a->bench.memory_limit, err);
-        break;
-    case 'd':
-        a->bench.device_count = 0;
-        status = each("--device", optarg, take_device, a, err);
-        break;
-    case 'm':
-        a->bench.method_count = 0;
-        a->listed[0] = true;
-        status = each("--method", optarg, take_method, a, err);
-        break;
-    case 'l':
-        a->bench.lod_count = 0;
-        a->listed[1] = true;
-        status = each("--lod", optarg, take_lod, a, err);
-        break;
-    default:
-        status = take_sweep_option(a, option, err);
-    }
-    return status;
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->bench.method_count = 0;
+    a->listed[0] = true;
+    return each(option, text, take_method, a, err);
 }
+
+static int take_lods(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->bench.lod_count = 0;
+    a->listed[1] = true;
+    return each(option, text, take_lod, a, err);
+}
+
+static int take_supersamples(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->supersample_count = 0;
+    a->listed[2] = true;
+    return each(option, text, take_supersample, a, err);
+}
+
+static int take_atom_counts(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->atom_count = 0;
+    a->listed[3] = true;
+    return each(option, text, take_atoms, a, err);
+}
+
+static int take_size(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->size[0] = a->size[1] = 0;
+    return spl_cmd_parse_size(option, text, &a->size[0], &a->size[1], err);
+}
+
+static int take_output(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    (void)option;
+    ((struct spl_cmd_bench_arguments *)arguments)->sweep.output = text;
+    return spl_cmd_check_folder("-o", text, "a folder", err);
+}
+
+static int take_reference(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    (void)option, (void)err;
+    struct spl_sweep_options *sweep = &((struct spl_cmd_bench_arguments *)arguments)->sweep.sweep;
+    sweep->reference = (struct spl_reference){.kind = text ? SPL_REFERENCE_EXACT : SPL_REFERENCE_PHOTOGRAPHS,
+                                              .folder = text};
+    return SPL_OK;
+}
+
+static const struct spl_cmd_option options[] = {
+    {"views", "FILE",
+     "with --set a path, from the view 'overview' to the view 'close' of an entry of this JSON file, {\"NAME\": "
+     "{\"overview\": {\"eye\": [x, y, z], \"target\": […], \"up\": […], \"vfov_deg\": 40, \"near\": 0.1, \"far\": "
+     "50}, \"close\": {…}}}; with -o and without --set the views themselves, as JSON or a COLMAP text model",
+     .otherwise = "round the dataset's default view, closing in", SPL_CMD_TEXT(struct spl_cmd_bench_arguments, views)},
+    {"set", "NAME", "which entry", SPL_CMD_TEXT(struct spl_cmd_bench_arguments, set)},
+    {"frames", "N", "places on the path", .otherwise = "20; 8 with -o",
+     SPL_CMD_COUNT_32(struct spl_cmd_bench_arguments, bench.frames, 2, 100000)},
+    {"size", "WxH", "W or xH alone: at 16:9", .otherwise = "1280x720", .take = take_size},
+    {"device", "LIST", "such as vulkan,egl; 'splatd devices' lists them", .otherwise = "auto", .take = take_devices},
+    {"method", "LIST", "such as splat,points,fill", .otherwise = "splat; all with -o", .take = take_methods},
+    {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
+    {"memory-limit", "MIB", "device memory, or 2G and such; less than the dataset needs measures paging",
+     SPL_CMD_MIB(struct spl_cmd_bench_arguments, bench.memory_limit, 1, 1u << 24)},
+    {"json", NULL, "everything, quartiles too, as one JSON object", SPL_CMD_FLAG(struct spl_cmd_bench_arguments, json)},
+    {.help = "With -o:"},
+    {"output", "OUT", "the folder", .letter = 'o', .take = take_output},
+    {"reference", "DIR",
+     "exact images VIEW.color.png, VIEW.depth.npy, VIEW.normal.npy, VIEW.coverage.npy, as 'splatd synth SCENE --views' "
+     "writes them",
+     .otherwise = "the dataset's own render with every splat and 4x4 samples a pixel", .take = take_reference},
+    {"photographs", NULL, "the views' photographs are the reference", .take = take_reference},
+    {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,2,4", .otherwise = "0.25,0.5,1,2",
+     .take = take_supersamples},
+    {"atoms", "LIST", "of a splat's texture at most, where the dataset has textures", .otherwise = "0,2,8",
+     .take = take_atom_counts},
+    {"repeats", "N", "times each view and setting is timed", .fallback = "5",
+     SPL_CMD_COUNT_32(struct spl_cmd_bench_arguments, sweep.sweep.repeats, 1, SPL_SWEEP_REPEATS_MAX)},
+    {"peers", "FILE.csv", "rows name,ms,psnr of other programs, for the same chart",
+     SPL_CMD_TEXT(struct spl_cmd_bench_arguments, sweep.peers)},
+    {"profile", "FILE", "what each setting costs", .otherwise = "NAME.profile.json, from which 'splatd serve' chooses",
+     SPL_CMD_TEXT(struct spl_cmd_bench_arguments, sweep.profile)},
+    {"no-profile", NULL, "do not write it", SPL_CMD_FLAG(struct spl_cmd_bench_arguments, sweep.no_profile)},
+    {"restart", NULL, "forget what OUT/state.jsonl holds",
+     SPL_CMD_FLAG(struct spl_cmd_bench_arguments, sweep.sweep.restart)},
+};
+
+const struct spl_cmd_table spl_cmd_bench_table = {
+    .command = "bench",
+    .before =
+        "usage: splatd bench NAME.spld… [OPTION…]\n\n"
+        "Measures frame times of datasets on this machine: each combination of dataset, device, method and level of\n"
+        "detail renders the same camera path, all in turn. Beside them runs a calibrator in plain C (5 M points, two\n"
+        "threads); 'units' are multiples of its time, which compare between machines and days, milliseconds do not.\n\n"
+        "With -o, accuracy against time: every view under every setting of one dataset, compared with a reference and\n"
+        "timed in turn. OUT gets bench.json, bench.csv, chart.svg, index.html (open it in a browser) and state.jsonl,\n"
+        "from which the same command goes on when it was stopped.\n\n"
+        "  splatd bench hall.spld\n"
+        "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
+        "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
+        "  splatd bench hall.spld -o hall-bench\n"
+        "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
+        "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 /* With -o some defaults are others, and one dataset on one device is compared. */
 static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err)
@@ -212,28 +241,6 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
 
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {
-        {"views", required_argument, NULL, 'v'},
-        {"set", required_argument, NULL, 's'},
-        {"frames", required_argument, NULL, 'n'},
-        {"size", required_argument, NULL, 'z'},
-        {"device", required_argument, NULL, 'd'},
-        {"method", required_argument, NULL, 'm'},
-        {"lod", required_argument, NULL, 'l'},
-        {"memory-limit", required_argument, NULL, 'b'},
-        {"json", no_argument, NULL, 'j'},
-        {"output", required_argument, NULL, 'o'},
-        {"reference", required_argument, NULL, 'r'},
-        {"photographs", no_argument, NULL, 'p'},
-        {"supersample", required_argument, NULL, 'x'},
-        {"atoms", required_argument, NULL, 'a'},
-        {"repeats", required_argument, NULL, 'e'},
-        {"peers", required_argument, NULL, 'P'},
-        {"profile", required_argument, NULL, 'f'},
-        {"no-profile", no_argument, NULL, 'F'},
-        {"restart", no_argument, NULL, 'R'},
-        {NULL, 0, NULL, 0},
-    };
     a->devices[0] = "auto";
     a->methods[0] = SPL_METHOD_DEFAULT;
     a->lods[0] = 1;
@@ -246,10 +253,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
         .lods = a->lods,
         .lod_count = 1,
     };
-    a->sweep.sweep.repeats = 5;
-    int option, status = 0;
-    while (!status && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
-        status = take_option(a, option, err);
+    int status = spl_cmd_table_parse(&spl_cmd_bench_table, argc, argv, a, err);
     double size[2] = {a->size[0], a->size[1]};
     spl_size_follow(size, (const double[]){SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT});
     a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);

@@ -12,7 +12,6 @@
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "geom/size.h"
-#include "measure/page.h"
 #include "measure/peers.h"
 #include "measure/report.h"
 #include "shared.h"
@@ -72,13 +71,7 @@ static void resize(struct spl_view_list *list, uint32_t width, uint32_t height)
         struct spl_camera *c = &list->views[i].camera;
         double size[2] = {width, height};
         spl_size_follow(size, (const double[]){c->width, c->height});
-        double x = size[0] / c->width, y = size[1] / c->height;
-        c->fx *= x;
-        c->cx *= x;
-        c->fy *= y;
-        c->cy *= y;
-        c->width = (uint32_t)fmin(size[0], UINT32_MAX);
-        c->height = (uint32_t)fmin(size[1], UINT32_MAX);
+        spl_camera_resize(c, (uint32_t)fmin(size[0], UINT32_MAX), (uint32_t)fmin(size[1], UINT32_MAX));
     }
 }
 

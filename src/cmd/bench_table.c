@@ -36,16 +36,24 @@ static json_t *summary_json(const struct spl_summary *s)
                      s->max);
 }
 
+static json_t *passes_json(const struct spl_bench_row *row)
+{
+    json_t *passes = json_object();
+#define STAGE(name) json_object_set_new(passes, #name, json_real(row->name));
+#include "render/stages.def"
+#undef STAGE
+    return passes;
+}
+
 static json_t *row_json(const struct spl_bench_row *row)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(row->dataset);
     return json_pack(
-        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f}, s:f, s:f, s:i, s:I}",
+        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:i, s:I}",
         "dataset", info->id, "leaf_splats", (json_int_t)info->leaf_splats, "backend", row->device.backend, "device",
         row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
         "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
-        "select", row->select, "upload", row->upload, "clear", row->clear, "depth", row->depth, "shade", row->shade,
-        "resolve", row->resolve, "readback", row->readback, "splats_drawn", row->splats, "chunks_drawn", row->chunks,
+        passes_json(row), "splats_drawn", row->splats, "chunks_drawn", row->chunks,
         "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
 }
 

@@ -9,8 +9,8 @@
 
 #include "cmd/bench.h"
 #include "cmd/bench_textures.h"
-#include "cmd/options.h"
 #include "cmd/output.h"
+#include "cmd/table.h"
 #include "image/load.h"
 
 static void show_epoch(void *context, const char *what, const struct spl_train_progress *epoch)
@@ -37,12 +37,19 @@ static int get_size(const char *path, uint32_t *width, uint32_t *height, struct 
 
 struct arguments {
     const char *textures, *dataset, *folder, *cameras, *images, *device;
-    uint64_t epochs, sample, threads, memory_bytes, views, rounds;
-    uint32_t width, height;
+    uint64_t sample, memory_bytes;
+    uint32_t epochs, threads, views, rounds, size[2];
     unsigned runs;
 };
 
-static int parse_runs(char *text, unsigned *runs, struct spl_error *err)
+static int take_output(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    (void)option;
+    ((struct arguments *)arguments)->folder = text;
+    return spl_cmd_check_folder("-o", text, "a folder", err);
+}
+
+static int take_codings(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     static const struct {
         const char *name;
@@ -50,6 +57,7 @@ static int parse_runs(char *text, unsigned *runs, struct spl_error *err)
     } names[] = {{"training", SPL_TEXTURES_RUN_TRAININGS}, {"D8W4", SPL_TEXTURES_RUN_D8W4},
                  {"D12W4", SPL_TEXTURES_RUN_D12W4},        {"D16W8", SPL_TEXTURES_RUN_D16W8},
                  {"adaptive", SPL_TEXTURES_RUN_ADAPTIVE},  {"none", 0}};
+    unsigned *runs = &((struct arguments *)arguments)->runs;
     *runs = 0;
     for (char *piece; (piece = strsep(&text, ","));) {
         size_t i = 0;
@@ -57,91 +65,71 @@ static int parse_runs(char *text, unsigned *runs, struct spl_error *err)
             i++;
         if (i == sizeof names / sizeof *names)
             return spl_fail(err, SPL_E_USAGE,
-                            "--codings takes a list of training, D8W4, D12W4, D16W8 and adaptive, or none, not '%.32s'",
+                            "%s takes a list of training, D8W4, D12W4, D16W8 and adaptive, or none, not '%.32s'", option,
                             piece);
         *runs |= names[i].runs;
     }
     return 0;
 }
 
+static const struct spl_cmd_option options[] = {
+    {"output", "OUT", "the folder", .letter = 'o', .take = take_output},
+    {"codings", "LIST", "of training (its chart), D8W4, D12W4, D16W8, adaptive; none: NAME.spld alone",
+     .otherwise = "all", .take = take_codings},
+    {"epochs", "N", "rounds of each training", .fallback = "12",
+     SPL_CMD_COUNT_32(struct arguments, epochs, 1, SPL_TEXTURES_EPOCHS_MAX)},
+    {"sample", "N", "textures that are trained on at most, and others coded", .otherwise = "all; D16W8: 196608, once",
+     SPL_CMD_COUNT(struct arguments, sample, 1, UINT64_MAX)},
+    {"cameras", "MODEL", "poses of photographs that are put straight onto the splats",
+     SPL_CMD_TEXT(struct arguments, cameras)},
+    {"images", "DIR", "where the photographs lie", .otherwise = "where MODEL says",
+     SPL_CMD_TEXT(struct arguments, images)},
+    {"views", "N", "compared at most, of either kind", .fallback = "8",
+     SPL_CMD_COUNT_32(struct arguments, views, 1, SPL_VIEW_LIST_MAX)},
+    {"repeats", "N", "times each pass is timed", .fallback = "9",
+     SPL_CMD_COUNT_32(struct arguments, rounds, 1, SPL_PASSES_ROUNDS_MAX)},
+    {"size", "WxH", "of the frames that are timed", .fallback = "1280x720", SPL_CMD_PIXELS(struct arguments, size)},
+    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, threads, 1, 64)},
+    {"memory", "MIB", "or 4G and such", .fallback = "2048",
+     SPL_CMD_MIB(struct arguments, memory_bytes, 1, 1u << 24)},
+    {"device", "NAME", "'splatd devices' lists them", .otherwise = "auto", SPL_CMD_TEXT(struct arguments, device)},
+};
+
+const struct spl_cmd_table spl_cmd_bench_textures_table = {
+    .command = "bench --textures",
+    .before =
+        "usage: splatd bench --textures FILE [NAME.spld [--cameras MODEL [--images DIR]]] -o OUT [OPTION…]\n\n"
+        "How dictionaries of textures are learned, and their bytes against quality, beside the sparse-coding paper's\n"
+        "settings (D8W4, D12W4, D16W8). FILE is what 'splatd pack --keep-textures' wrote, NAME.spld what it packed: "
+        "its\n"
+        "geometry is counted, its frames are timed by pass. With --cameras, photographs put straight onto the splats "
+        "are\n"
+        "measured too: whole, at half size, in BC7 and BC1; against the views that were packed, and against those of\n"
+        "MODEL that were left out. OUT gets textures.csv, training.csv, rate.svg and training.svg; half an hour for\n"
+        "500,000 textures.\n"
+        "  splatd bench --textures hall.textures hall.spld --cameras colmap/sparse -o hall-textures\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
+
+/* 0, SPL_CMD_DONE or an error. */
 static int parse(struct arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                            {"epochs", required_argument, NULL, 'e'},
-                                            {"codings", required_argument, NULL, 'C'},
-                                            {"sample", required_argument, NULL, 'S'},
-                                            {"threads", required_argument, NULL, 't'},
-                                            {"memory", required_argument, NULL, 'm'},
-                                            {"cameras", required_argument, NULL, 'c'},
-                                            {"images", required_argument, NULL, 'i'},
-                                            {"views", required_argument, NULL, 'v'},
-                                            {"repeats", required_argument, NULL, 'r'},
-                                            {"size", required_argument, NULL, 's'},
-                                            {"device", required_argument, NULL, 'd'},
-                                            {NULL, 0, NULL, 0}};
-    int option, rc = 0;
-    *a = (struct arguments){.epochs = 12,
-                            .memory_bytes = UINT64_C(2048) << 20,
-                            .views = 8,
-                            .rounds = 9,
-                            .width = 1280,
-                            .height = 720,
-                            .runs = SPL_TEXTURES_RUN_ALL};
-    while (!rc && (option = getopt_long(argc, argv, "o:", options, NULL)) != -1)
-        switch (option) {
-        case 'o':
-            a->folder = optarg;
-            rc = spl_cmd_check_folder("-o", optarg, "a folder", err);
-            break;
-        case 'e':
-            rc = spl_cmd_parse_count("--epochs", optarg, 1, SPL_TEXTURES_EPOCHS_MAX, &a->epochs, err);
-            break;
-        case 'S':
-            rc = spl_cmd_parse_count("--sample", optarg, 1, UINT64_MAX, &a->sample, err);
-            break;
-        case 'C':
-            rc = parse_runs(optarg, &a->runs, err);
-            break;
-        case 't':
-            rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a->threads, err);
-            break;
-        case 'm':
-            rc = spl_cmd_parse_bytes("--memory", optarg, 1 << 20, 1, 1u << 24, &a->memory_bytes, err);
-            break;
-        case 'c':
-            a->cameras = optarg;
-            break;
-        case 'i':
-            a->images = optarg;
-            break;
-        case 'v':
-            rc = spl_cmd_parse_count("--views", optarg, 1, SPL_VIEW_LIST_MAX, &a->views, err);
-            break;
-        case 'r':
-            rc = spl_cmd_parse_count("--repeats", optarg, 1, SPL_PASSES_ROUNDS_MAX, &a->rounds, err);
-            break;
-        case 's':
-            rc = spl_cmd_parse_size("--size", optarg, &a->width, &a->height, err);
-            break;
-        case 'd':
-            a->device = optarg;
-            break;
-        default:
-            rc = spl_fail(err, SPL_E_USAGE, "'splatd bench --help' shows how");
-        }
+    *a = (struct arguments){.runs = SPL_TEXTURES_RUN_ALL};
+    int rc = spl_cmd_table_parse(&spl_cmd_bench_textures_table, argc, argv, a, err);
     int files = argc - optind;
-    if (!rc && (files < 1 || files > 2 || !a->folder))
-        rc = spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures, its NAME.spld, and -o OUT; %s",
-                      a->folder ? "give one or two files" : "-o OUT is missing");
-    if (!rc && files == 1 && (a->cameras || a->device))
-        rc = spl_fail(err, SPL_E_USAGE, "--cameras and --device are about NAME.spld, which is missing");
-    if (!rc && a->images && !a->cameras)
-        rc = spl_fail(err, SPL_E_USAGE, "--images DIR goes with --cameras MODEL");
-    if (!rc) {
-        a->textures = argv[optind];
-        a->dataset = files == 2 ? argv[optind + 1] : NULL;
-    }
-    return rc;
+    if (rc)
+        return rc;
+    if (files < 1 || files > 2 || !a->folder)
+        return spl_fail(err, SPL_E_USAGE, "bench --textures takes one file of textures, its NAME.spld, and -o OUT; %s",
+                        a->folder ? "give one or two files" : "-o OUT is missing");
+    if (files == 1 && (a->cameras || a->device))
+        return spl_fail(err, SPL_E_USAGE, "--cameras and --device are about NAME.spld, which is missing");
+    if (a->images && !a->cameras)
+        return spl_fail(err, SPL_E_USAGE, "--images DIR goes with --cameras MODEL");
+    a->textures = argv[optind];
+    a->dataset = files == 2 ? argv[optind + 1] : NULL;
+    return SPL_OK;
 }
 
 struct bench {
@@ -165,7 +153,7 @@ static int render(struct bench *b, struct spl_error *err)
         rc = spl_renderer_add(renderer, b->dataset, err);
     if (!rc) {
         b->device = *spl_renderer_get_device(renderer);
-        rc = spl_passes_measure(renderer, b->dataset, b->a.width, b->a.height, (uint32_t)b->a.rounds, b->passes, err);
+        rc = spl_passes_measure(renderer, b->dataset, b->a.size[0], b->a.size[1], b->a.rounds, b->passes, err);
     }
     if (!rc && b->a.cameras) {
         const struct spl_projected_options projected = {.renderer = renderer,
@@ -173,9 +161,9 @@ static int render(struct bench *b, struct spl_error *err)
                                                         .origin = &b->file.origin,
                                                         .photographs = &b->cameras,
                                                         .texture_size = b->file.header.size,
-                                                        .views = (uint32_t)b->a.views,
+                                                        .views = b->a.views,
                                                         .memory_bytes = b->a.memory_bytes,
-                                                        .threads = (unsigned)b->a.threads,
+                                                        .threads = b->a.threads,
                                                         .progress = show_photograph};
         rc = spl_projected_measure(&projected, &b->projected, err);
     }
@@ -209,12 +197,12 @@ int spl_cmd_bench_textures(int argc, char **argv, struct spl_error *err)
                                              .origin = &b->file.origin,
                                              .dataset = b->dataset,
                                              .projected = b->a.cameras ? &b->projected : NULL,
-                                             .epochs = (uint32_t)b->a.epochs,
+                                             .epochs = b->a.epochs,
                                              .runs = b->a.runs,
                                              .sample = b->a.sample,
                                              .memory_bytes = b->a.memory_bytes,
                                              .seed = 1,
-                                             .threads = (unsigned)b->a.threads,
+                                             .threads = b->a.threads,
                                              .progress = show_epoch};
     rc = spl_textures_measure(&how, &b->report, err);
     if (rc)

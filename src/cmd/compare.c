@@ -10,24 +10,44 @@
 
 #include <jansson.h>
 
-#include "cmd/options.h"
 #include "cmd/output.h"
+#include "cmd/table.h"
 #include "image/load.h"
-#include "measure/error_map.h"
 #include "measure/metrics.h"
+#include "measure/pictures.h"
 
 struct arguments {
     const char *image, *truth, *map; /* map may be NULL */
     double tolerance;
-    uint64_t threads;
-    int layer; /* of a single file */
+    uint32_t threads;
+    int kind; /* place in `kinds` */
+    enum spl_layer layer; /* of a single file */
     bool json;
 };
 
-static void usage(FILE *out)
+static const enum spl_layer layers[] = {SPL_LAYER_COLOR, SPL_LAYER_DEPTH, SPL_LAYER_NORMAL, SPL_LAYER_COVERAGE};
+static const char *const kinds[] = {"color", "depth", "normal", "coverage", NULL};
+
+static int take_map(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    fprintf(
-        out,
+    ((struct arguments *)arguments)->map = text;
+    return spl_cmd_check_ending(option, text, "png", err);
+}
+
+static const struct spl_cmd_option options[] = {
+    {"tolerance", "D", "depth that may be off, the dataset's unit; the splat radius is apt", .fallback = "0",
+     SPL_CMD_REAL(struct arguments, tolerance, 0, 1e12)},
+    {"layer", "LAYER", "of single files: color, depth, normal or coverage", .fallback = "color",
+     SPL_CMD_CHOICE(struct arguments, kind, kinds)},
+    {"error-map", "FILE", "8 times the difference of the colours, as PNG", .take = take_map},
+    {"json", NULL, "one object, null where a figure is undefined; psnr is null for equal images, too",
+     SPL_CMD_FLAG(struct arguments, json)},
+    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, threads, 1, 64)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "compare",
+    .before =
         "usage: splatd compare IMAGE TRUTH [--tolerance D] [--error-map FILE.png] [--json]\n\n"
         "Says how far IMAGE is from TRUTH. Each is a file (PNG, JPEG, NPY), or a stem: the layers are then read from\n"
         "STEM.color.png (or .jpg), STEM.depth.npy (or .png), STEM.normal.npy and STEM.coverage.npy, as far as both\n"
@@ -37,14 +57,11 @@ static void usage(FILE *out)
         "All layers of a view against the exact ones, depth within 2 cm:\n"
         "  splatd compare out/east scan/truth/east --tolerance 0.02\n"
         "One depth image, for a script:\n"
-        "  splatd compare depth.npy truth.npy --layer depth --json\n\n"
-        "      --tolerance D      depth that may be off, the dataset's unit; the splat radius is apt (default 0)\n"
-        "      --layer LAYER      of single files: color (default), depth, normal or coverage\n"
-        "      --error-map FILE   8 times the difference of the colours, as PNG\n"
-        "      --json             one object, null where a figure is undefined; psnr is null for equal images, too\n"
-        "      --threads N        default: all cores\n\n"
-        "Figures go to stdout, messages to stderr. What each means: api/measures.md.\n");
-}
+        "  splatd compare depth.npy truth.npy --layer depth --json\n\n",
+    .after = "\nFigures go to stdout, messages to stderr. What each means: api/measures.md.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 static bool is_file(const char *path)
 {
@@ -66,7 +83,7 @@ static int load(const struct arguments *a, const char *path, struct spl_image im
     char name[4096];
     int found = 0, rc = SPL_OK;
     if (is_file(path))
-        return spl_image_load(path, (enum spl_layer)a->layer, &images[a->layer], err);
+        return spl_image_load(path, a->layer, &images[a->layer], err);
     for (size_t i = 0; !rc && i < sizeof places / sizeof *places; i++) {
         struct spl_image *image = &images[places[i].layer];
         int length = snprintf(name, sizeof name, "%s.%s.%s", path, spl_layer_name(places[i].layer), places[i].ending);
@@ -151,7 +168,6 @@ static int write_map(const struct arguments *a, const struct spl_image *image, c
 
 static int compare(const struct arguments *a, struct spl_error *err)
 {
-    static const enum spl_layer layers[] = {SPL_LAYER_COLOR, SPL_LAYER_DEPTH, SPL_LAYER_NORMAL, SPL_LAYER_COVERAGE};
     struct spl_image images[SPL_LAYER_COUNT] = {0}, truths[SPL_LAYER_COUNT] = {0};
     struct spl_metrics metrics;
     const struct spl_image *image[4], *truth[4];
@@ -172,7 +188,7 @@ static int compare(const struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = spl_metrics_compare(&(struct spl_picture){image[0], image[1], image[2], image[3]},
                                  &(struct spl_picture){truth[0], truth[1], truth[2], truth[3], NULL, a->tolerance},
-                                 (unsigned)a->threads, &metrics, err);
+                                 a->threads, &metrics, err);
     if (!rc && a->map)
         rc = write_map(a, &images[SPL_LAYER_COLOR], &truths[SPL_LAYER_COLOR], err);
     if (!rc && a->json)
@@ -186,65 +202,21 @@ static int compare(const struct arguments *a, struct spl_error *err)
     return rc;
 }
 
-static int parse_layer(const char *text, int *layer, struct spl_error *err)
-{
-    *layer = spl_layer_from_name(text);
-    bool good = *layer == SPL_LAYER_COLOR || *layer == SPL_LAYER_DEPTH || *layer == SPL_LAYER_NORMAL ||
-                *layer == SPL_LAYER_COVERAGE;
-    return good ? SPL_OK
-                : spl_fail(err, SPL_E_USAGE, "--layer takes color, depth, normal or coverage, not '%.32s'", text);
-}
-
 int spl_cmd_compare(int argc, char **argv)
 {
-    enum { opt_tolerance = 256, opt_layer, opt_map, opt_json, opt_threads };
-    static const struct option options[] = {
-        {"tolerance", required_argument, NULL, opt_tolerance},
-        {"layer", required_argument, NULL, opt_layer},
-        {"error-map", required_argument, NULL, opt_map},
-        {"json", no_argument, NULL, opt_json},
-        {"threads", required_argument, NULL, opt_threads},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-    };
-    struct arguments a = {.layer = SPL_LAYER_COLOR};
+    struct arguments a = {0};
     struct spl_error err = {0};
-    int rc = SPL_OK;
-    for (int c; (c = getopt_long(argc, argv, "h", options, NULL)) >= 0;) {
-        switch (c) {
-        case opt_tolerance:
-            rc = spl_cmd_parse_real("--tolerance", optarg, 0, 1e12, &a.tolerance, &err);
-            break;
-        case opt_layer:
-            rc = parse_layer(optarg, &a.layer, &err);
-            break;
-        case opt_map:
-            a.map = optarg;
-            rc = spl_cmd_check_ending("--error-map", optarg, "png", &err);
-            break;
-        case opt_json:
-            a.json = true;
-            break;
-        case opt_threads:
-            rc = spl_cmd_parse_count("--threads", optarg, 1, 64, &a.threads, &err);
-            break;
-        case 'h':
-            usage(stdout);
-            return 0;
-        default:
-            fprintf(stderr, "'splatd compare --help' shows how\n");
-            return 2;
-        }
-        if (rc)
-            return spl_cmd_fail(&err);
-    }
-    if (argc - optind != 2) {
-        fprintf(stderr,
-                "splatd: compare takes an IMAGE and a TRUTH%s: splatd compare view.png truth.png; "
-                "'splatd compare --help' shows more\n",
-                argc - optind == 1 ? ", which is missing" : "");
-        return 2;
-    }
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && argc - optind != 2)
+        rc = spl_fail(&err, SPL_E_USAGE,
+                      "compare takes an IMAGE and a TRUTH%s: splatd compare view.png truth.png; "
+                      "'splatd compare --help' shows more",
+                      argc - optind == 1 ? ", which is missing" : "");
+    if (rc)
+        return spl_cmd_fail(&err);
+    a.layer = layers[a.kind];
     a.image = argv[optind];
     a.truth = argv[optind + 1];
     if (compare(&a, &err))

@@ -10,24 +10,35 @@
 #include <splatd/render.h>
 
 #include "base/memory.h"
+#include "cmd/table.h"
 
 enum { UUID_TEXT = 37 };
 
-static void usage(FILE *out)
-{
-    fprintf(out,
-            "usage: splatd devices [--json]\n\n"
-            "Lists every Vulkan and EGL device that was found, GPUs and software renderers, a line each, unusable ones\n"
-            "with the reason.\n\n"
-            "Which devices are there:\n"
-            "  splatd devices\n"
-            "The first that renders, for a script:\n"
-            "  splatd devices --json | jq -r '[.[] | select(.usable)][0].device'\n"
-            "Every command that renders takes one of them, by backend, number, UUID or part of its name:\n"
-            "  splatd render --device vulkan:0 ...    splatd serve --device nvidia ...\n\n"
-            "      --json    an array of objects: device, backend, index, name, driver, uuid, software, usable, reason\n\n"
-            "Exit code 0 when at least one device is usable, else 1.\n");
-}
+struct arguments {
+    bool json;
+};
+
+static const struct spl_cmd_option options[] = {
+    {"json", NULL, "an array of objects: device, backend, index, name, driver, uuid, software, usable, reason",
+     SPL_CMD_FLAG(struct arguments, json)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "devices",
+    .before =
+        "usage: splatd devices [--json]\n\n"
+        "Lists every Vulkan and EGL device that was found, GPUs and software renderers, a line each, unusable ones\n"
+        "with the reason.\n\n"
+        "Which devices are there:\n"
+        "  splatd devices\n"
+        "The first that renders, for a script:\n"
+        "  splatd devices --json | jq -r '[.[] | select(.usable)][0].device'\n"
+        "Every command that renders takes one of them, by backend, number, UUID or part of its name:\n"
+        "  splatd render --device vulkan:0 ...    splatd serve --device nvidia ...\n\n",
+    .after = "\nExit code 0 when at least one device is usable, else 1.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 static void format_uuid(const uint8_t uuid[16], char text[UUID_TEXT])
 {
@@ -78,27 +89,16 @@ static void print_table(const struct spl_device_info *devices, size_t count)
 
 int spl_cmd_devices(int argc, char **argv)
 {
-    static const struct option options[] = {{"json", no_argument, NULL, 'j'}, {"help", no_argument, NULL, 'h'}, {0}};
+    struct arguments a = {0};
     struct spl_error err = {0};
-    bool json = false;
-    for (int c; (c = getopt_long(argc, argv, "h", options, NULL)) >= 0;) {
-        switch (c) {
-        case 'j':
-            json = true;
-            break;
-        case 'h':
-            usage(stdout);
-            return 0;
-        default:
-            fprintf(stderr, "'splatd devices --help' shows how\n");
-            return 2;
-        }
-    }
-    if (optind < argc) {
-        spl_fail(&err, SPL_E_USAGE, "devices takes no argument '%s'; 'splatd devices --help' shows examples",
-                 argv[optind]);
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && optind < argc)
+        rc = spl_fail(&err, SPL_E_USAGE, "devices takes no argument '%.80s'; 'splatd devices --help' shows examples",
+                      argv[optind]);
+    if (rc)
         return spl_cmd_fail(&err);
-    }
     size_t count = spl_device_list(NULL, 0), usable = 0;
     struct spl_device_info *devices = spl_alloc(count, sizeof *devices, &err);
     if (!devices)
@@ -108,7 +108,7 @@ int spl_cmd_devices(int argc, char **argv)
     for (size_t i = 0; i < count; i++)
         usable += !devices[i].unusable[0];
     int failed = 0;
-    if (json)
+    if (a.json)
         failed = print_json(devices, count);
     else
         print_table(devices, count);

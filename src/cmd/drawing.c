@@ -98,24 +98,6 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
     }
 }
 
-/* `text` behind column `column`, broken between words; `used` columns of the first line are taken. */
-static void print_wrapped(FILE *out, int used, int column, const char *text)
-{
-    enum { columns = 118 };
-    fprintf(out, "%*s", used < column ? column - used : 1, "");
-    used = used < column ? column : used + 1;
-    for (const char *word = text; *word;) {
-        int length = (int)strcspn(word, " ");
-        if (used + length > columns && used > column) {
-            fprintf(out, "\n%*s", column, "");
-            used = column;
-        }
-        used += fprintf(out, "%.*s%s", length, word, word[length] ? " " : "");
-        word += length + (word[length] == ' ');
-    }
-    fprintf(out, "\n");
-}
-
 static void print_param(FILE *out, enum spl_method_param param)
 {
     const struct spl_method_param_info *info = spl_method_param_get(param);
@@ -131,7 +113,7 @@ static void print_param(FILE *out, enum spl_method_param param)
     else
         snprintf(text, sizeof text, "%s; %s (%g)", info->help, range, info->otherwise);
     used = fprintf(out, "    --%s %s", info->name, info->kind == SPL_PARAM_CHOICE ? "NAME" : info->kind == SPL_PARAM_WHOLE ? "N" : "X");
-    print_wrapped(out, used, 27, text);
+    spl_cmd_print_wrapped(out, (size_t)used, 27, text);
 }
 
 void spl_cmd_drawing_help(FILE *out)
@@ -139,7 +121,7 @@ void spl_cmd_drawing_help(FILE *out)
     fprintf(out, "Methods, and what each takes:\n");
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         const struct spl_method_info *info = spl_method_get((enum spl_method)method);
-        print_wrapped(out, fprintf(out, "  --method %s", info->name), 27, info->help);
+        spl_cmd_print_wrapped(out, (size_t)fprintf(out, "  --method %s", info->name), 27, info->help);
         for (int i = 0; i < SPL_PARAM_COUNT; i++)
             if (info->params >> i & 1)
                 print_param(out, (enum spl_method_param)i);

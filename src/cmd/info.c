@@ -14,29 +14,48 @@
 #include "cmd/dictionary.h"
 #include "cmd/info_report.h"
 #include "cmd/output.h"
+#include "cmd/table.h"
 
 static const char bar[] = "########################################";
 enum { bar_max = sizeof bar - 1 };
 
-static void usage(FILE *out)
+struct arguments {
+    const char *picture; // may be NULL
+    bool json, no_verify;
+};
+
+static int take_verify(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    fprintf(out,
-            "usage: splatd info [--json] [--no-verify] [--dictionary PNG] NAME.spld…\n\n"
-            "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
-            "histogram of bits that the scene needed. Every section's checksum is verified first.\n\n"
-            "A table to read:\n"
-            "  splatd info courtyard.spld\n"
-            "Only check that files are whole (exit code 2 when one is not):\n"
-            "  splatd info *.spld >/dev/null\n"
-            "One line of JSON a dataset, for scripts:\n"
-            "  splatd info --json courtyard.spld | jq .bytes_per_splat.total\n"
-            "The atoms that textures are sums of, the most used first, as a picture:\n"
-            "  splatd info hall.spld --dictionary atoms.png\n\n"
-            "      --json       one JSON object a line\n"
-            "      --dictionary PNG  where the picture goes; one dataset with textures\n"
-            "      --verify     check the pages' checksums too (default)\n"
-            "      --no-verify  trust the pages; everything else is always checked\n");
+    (void)option, (void)text, (void)err;
+    ((struct arguments *)arguments)->no_verify = false;
+    return SPL_OK;
 }
+
+static const struct spl_cmd_option options[] = {
+    {"json", NULL, "one JSON object a line", SPL_CMD_FLAG(struct arguments, json)},
+    {"dictionary", "PNG", "where the picture goes; one dataset with textures", SPL_CMD_TEXT(struct arguments, picture)},
+    {"verify", NULL, "check the pages' checksums too (default)", .take = take_verify},
+    {"no-verify", NULL, "trust the pages; everything else is always checked",
+     SPL_CMD_FLAG(struct arguments, no_verify)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "info",
+    .before =
+        "usage: splatd info [--json] [--no-verify] [--dictionary PNG] NAME.spld…\n\n"
+        "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
+        "histogram of bits that the scene needed. Every section's checksum is verified first.\n\n"
+        "A table to read:\n"
+        "  splatd info courtyard.spld\n"
+        "Only check that files are whole (exit code 2 when one is not):\n"
+        "  splatd info *.spld >/dev/null\n"
+        "One line of JSON a dataset, for scripts:\n"
+        "  splatd info --json courtyard.spld | jq .bytes_per_splat.total\n"
+        "The atoms that textures are sums of, the most used first, as a picture:\n"
+        "  splatd info hall.spld --dictionary atoms.png\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 /* 1234567 -> "1,234,567" */
 static const char *grouped(uint64_t value, char text[32])
@@ -180,63 +199,34 @@ static int print_json(const struct spl_info_report *report, struct spl_error *er
 
 int spl_cmd_info(int argc, char **argv)
 {
-    enum { opt_json = 256, opt_verify, opt_no_verify, opt_dictionary };
-    static const struct option options[] = {
-        {"json", no_argument, NULL, opt_json},
-        {"verify", no_argument, NULL, opt_verify},
-        {"no-verify", no_argument, NULL, opt_no_verify},
-        {"dictionary", required_argument, NULL, opt_dictionary},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-    };
-    bool json = false, verify = true;
-    const char *picture = NULL;
-    for (int c; (c = getopt_long(argc, argv, "h", options, NULL)) >= 0;) {
-        switch (c) {
-        case opt_json:
-            json = true;
-            break;
-        case opt_verify:
-        case opt_no_verify:
-            verify = c == opt_verify;
-            break;
-        case opt_dictionary:
-            picture = optarg;
-            break;
-        case 'h':
-            usage(stdout);
-            return 0;
-        default:
-            fprintf(stderr, "'splatd info --help' shows how\n");
-            return 2;
-        }
-    }
-    if (optind == argc) {
-        fprintf(stderr, "splatd: info needs at least one dataset: splatd info hall.spld; "
-                        "'splatd info --help' shows more\n");
-        return 2;
-    }
-    if (picture && argc - optind > 1) {
-        fprintf(stderr, "splatd: --dictionary is the picture of one dataset, not of %d\n", argc - optind);
-        return 2;
-    }
+    struct arguments a = {0};
     struct spl_error wrong = {0};
-    if (picture && spl_cmd_check_ending("--dictionary", picture, "png", &wrong))
+    int parsed = spl_cmd_table_parse(&table, argc, argv, &a, &wrong);
+    if (parsed == SPL_CMD_DONE)
+        return 0;
+    if (!parsed && optind == argc)
+        parsed = spl_fail(&wrong, SPL_E_USAGE, "info needs at least one dataset: splatd info hall.spld; "
+                                               "'splatd info --help' shows more");
+    if (!parsed && a.picture && argc - optind > 1)
+        parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of one dataset, not of %d", argc - optind);
+    if (!parsed && a.picture)
+        parsed = spl_cmd_check_ending("--dictionary", a.picture, "png", &wrong);
+    if (parsed)
         return spl_cmd_fail(&wrong);
     int worst = 0; /* the remaining files are still told of */
     for (int i = optind; i < argc; i++) {
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
         struct spl_info_report report;
-        int rc = spl_dataset_open(argv[i], verify, &dataset, &err);
+        int rc = spl_dataset_open(argv[i], !a.no_verify, &dataset, &err);
         if (!rc)
             rc = spl_info_gather(&report, dataset, &err);
-        if (!rc && json)
+        if (!rc && a.json)
             rc = print_json(&report, &err);
         else if (!rc)
             print_table(&report);
-        if (!rc && picture)
-            rc = spl_cmd_write_dictionary(dataset, picture, &err);
+        if (!rc && a.picture)
+            rc = spl_cmd_write_dictionary(dataset, a.picture, &err);
         spl_dataset_close(dataset);
         int code = rc ? spl_cmd_fail(&err) : 0;
         worst = code > worst ? code : worst;

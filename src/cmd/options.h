@@ -2,7 +2,9 @@
 #ifndef SPL_CMD_OPTIONS_H
 #define SPL_CMD_OPTIONS_H
 
+#include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "base/error.h"
 
@@ -28,5 +30,15 @@ int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, ui
 
 /* As over HTTP: "white", "#rrggbb", "#rrggbbaa", "transparent". */
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err);
+
+enum { SPL_CMD_NAMES_MAX = 96 };
+
+/* Which of `names`, closed by NULL, was probably meant by `word`, whose dashes in front and argument behind '=' do not
+ * count: the one with the fewest letters to change, add, leave out or swap, where these are few. NULL: none. */
+const char *spl_cmd_find_nearest(const char *word, const char *const *names);
+
+/* Writes `text` from column `column` on, broken between words; `used` columns of the line are taken, on which it begins
+ * where they leave room. */
+void spl_cmd_print_wrapped(FILE *out, size_t used, size_t column, const char *text);
 
 #endif

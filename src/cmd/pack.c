@@ -16,57 +16,7 @@
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
-
-static void usage(FILE *out)
-{
-    fprintf(
-        out,
-        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--neighbours K]\n"
-        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
-        "                   [--no-clip-lines] [--threads N]\n"
-        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
-        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
-        "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
-        "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
-        "once.\n\n"
-        "One scan, and what came of it:\n"
-        "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
-        "Several scans of one place, in the same coordinates, into one dataset:\n"
-        "  splatd pack street-*.las -o street.spld\n"
-        "Text whose columns nothing names ('-' skips one):\n"
-        "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
-        "Colours and textures from photographs with poses, by COLMAP here:\n"
-        "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
-        "Points as they are, several times faster, to be rendered with method fill or points:\n"
-        "  splatd pack street.las --points-only -o street.spld\n"
-        "Half the default errors, for a few bits more a splat:\n"
-        "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n"
-        "  -o, --output NAME.spld   replaced in one step when everything has been written\n"
-        "      --columns LIST       of text inputs: x y z r g b intensity class nx ny nz -\n"
-        "      --intensity          grey from intensity where a scan has one, whatever colours it has\n"
-        "      --neighbours K       nearest points that a normal and a radius are made from, 3 to 64 (default 12)\n"
-        "      --position-error X   mean, as a share of the splat radius (default 0.016)\n"
-        "      --normal-error DEG   mean, degrees (default 1)\n"
-        "      --points-only        position, color and class alone: no normals and radii; method splat draws as fill\n"
-        "      --no-linear          do not look for wires, poles and cables, which method fill draws as they are\n"
-        "      --no-clip-lines      discs are not cut where surfaces end\n"
-        "      --cameras MODEL      poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a "
-        "folder\n"
-        "                           of poses, or a list of views; in the scan's coordinates\n"
-        "      --images DIR         where the photographs lie; default: where MODEL says\n"
-        "      --textures HOW       adaptive (default): as much as the photographs show; none: colours alone; D8W4, "
-        "D12W4,\n"
-        "                           D16W8: a fixed dictionary of 2^8, 2^12, 2^16 atoms, weights of 4, 4, 8 bits\n"
-        "      --texture-quality Q  draft, normal (default) or best: how long it takes and what comes of it; or the "
-        "dB\n"
-        "                           alone that textures are coded to, all together, 20 to 60 (normal: 40)\n"
-        "      --keep-going         photographs that cannot be used are named and left out\n"
-        "      --keep-textures FILE as they are before coding too, for 'splatd bench --textures FILE'\n"
-        "      --memory MIB         of the photographs' pass, or 4G and such (default 2048)\n"
-        "      --device D           that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name\n"
-        "      --threads N          default: all cores; the file does not depend on it\n\n"
-        "About 80 bytes of memory a point. Progress and the summary go to stderr.\n");
-}
+#include "cmd/table.h"
 
 static char
     part_paths[3][4096]; /* of the dataset; of the scan alone while photographs are put onto it, and its own part */
@@ -152,38 +102,10 @@ static void say_trained(void *context, uint32_t epoch, double seconds, double ps
             atoms_per_splat, atoms);
 }
 
-static int parse_textures(const char *text, enum spl_texture_coding *out, struct spl_error *err)
-{
-    static const char *const names[SPL_TEXTURES_COUNT] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
-    for (int i = 0; i < SPL_TEXTURES_COUNT; i++)
-        if (!strcmp(text, names[i])) {
-            *out = (enum spl_texture_coding)i;
-            return 0;
-        }
-    return spl_fail_field(err, SPL_E_USAGE, "textures",
-                          "--textures takes adaptive, none, D8W4, D12W4 or D16W8, not '%.32s'", text);
-}
-
 static void say_warning(void *context, const char *text)
 {
     spl_cmd_progress_finish(context);
     fprintf(stderr, "splatd: warning: %s\n", text);
-}
-
-/* A name sets everything, a number the decibels alone; both may be given. */
-static int parse_quality(const char *text, struct spl_photo_options *photos, struct spl_error *err)
-{
-    static const char *const names[SPL_TEXTURE_PRESET_COUNT] = {"normal", "draft", "best"};
-    for (int i = 0; i < SPL_TEXTURE_PRESET_COUNT; i++)
-        if (!strcmp(text, names[i])) {
-            photos->preset = (enum spl_texture_preset)i;
-            return 0;
-        }
-    if (text[0] >= 'a' && text[0] <= 'z')
-        return spl_fail_field(err, SPL_E_USAGE, "texture-quality",
-                              "--texture-quality takes draft, normal, best or decibels from 20 to 60, not '%.32s'",
-                              text);
-    return spl_cmd_parse_real("--texture-quality", text, 20, 60, &photos->texture_quality, err);
 }
 
 static void name_refused(void *context, const struct spl_error *why)
@@ -192,16 +114,116 @@ static void name_refused(void *context, const struct spl_error *why)
     fprintf(stderr, "splatd: left out: %s\n", why->message);
 }
 
-/* What contradicts itself among the options; NULL: nothing. */
-static const char *find_contradiction(const struct spl_pack_options *o, const struct spl_photo_options *photos,
-                                      bool textures, bool quality)
+struct arguments {
+    struct spl_pack_options pack;
+    struct spl_photo_options photos;
+    int textures;        /* enum spl_texture_coding; -1 = not given */
+    const char *quality; // may be NULL
+    bool keep_going;
+};
+
+static const char *const texture_names[SPL_TEXTURES_COUNT + 1] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
+
+/* A name sets everything, a number the decibels alone; both may be given. */
+static int take_quality(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    if (!photos->cameras && (photos->images || photos->refused || photos->memory_bytes || photos->device ||
-                             photos->keep_textures || quality || textures))
+    static const char *const names[SPL_TEXTURE_PRESET_COUNT] = {"normal", "draft", "best"};
+    struct arguments *a = arguments;
+    a->quality = text;
+    for (int i = 0; i < SPL_TEXTURE_PRESET_COUNT; i++)
+        if (!strcmp(text, names[i])) {
+            a->photos.preset = (enum spl_texture_preset)i;
+            return 0;
+        }
+    if (text[0] >= 'a' && text[0] <= 'z')
+        return spl_fail_field(err, SPL_E_USAGE, "texture-quality",
+                              "%s takes draft, normal, best or decibels from 20 to 60, not '%.32s'", option, text);
+    return spl_cmd_parse_real(option, text, 20, 60, &a->photos.texture_quality, err);
+}
+
+static const struct spl_cmd_option options[] = {
+    {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
+     SPL_CMD_TEXT(struct arguments, pack.output)},
+    {"columns", "LIST", "of text inputs: x y z r g b intensity class nx ny nz -",
+     SPL_CMD_TEXT(struct arguments, pack.columns)},
+    {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
+     SPL_CMD_FLAG(struct arguments, pack.intensity)},
+    {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
+     SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
+    {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
+     SPL_CMD_REAL(struct arguments, pack.position_error, 1e-6, 1)},
+    {"normal-error", "DEG", "mean, degrees", .otherwise = "1",
+     SPL_CMD_REAL(struct arguments, pack.normal_error, 0.01, 30)},
+    {"points-only", NULL, "position, color and class alone: no normals and radii; method splat draws as fill",
+     SPL_CMD_FLAG(struct arguments, pack.points_only)},
+    {"no-linear", NULL, "do not look for wires, poles and cables, which method fill draws as they are",
+     SPL_CMD_FLAG(struct arguments, pack.no_linear)},
+    {"no-clip-lines", NULL, "discs are not cut where surfaces end", SPL_CMD_FLAG(struct arguments, pack.no_clip_lines)},
+    {"cameras", "MODEL",
+     "poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a folder of poses, or a list of "
+     "views; in the scan's coordinates",
+     SPL_CMD_TEXT(struct arguments, photos.cameras)},
+    {"images", "DIR", "where the photographs lie", .otherwise = "where MODEL says",
+     SPL_CMD_TEXT(struct arguments, photos.images)},
+    {"textures", "HOW",
+     "adaptive: as much as the photographs show; none: colours alone; D8W4, D12W4, D16W8: a fixed dictionary of 2^8, "
+     "2^12, 2^16 atoms, weights of 4, 4, 8 bits",
+     .otherwise = "adaptive", SPL_CMD_CHOICE(struct arguments, textures, texture_names)},
+    {"texture-quality", "Q",
+     "draft, normal or best: how long it takes and what comes of it; or the dB alone that textures are coded to, all "
+     "together, 20 to 60 (normal: 40)",
+     .otherwise = "normal", .take = take_quality},
+    {"keep-going", NULL, "photographs that cannot be used are named and left out",
+     SPL_CMD_FLAG(struct arguments, keep_going)},
+    {"keep-textures", "FILE", "as they are before coding too, for 'splatd bench --textures FILE'",
+     SPL_CMD_TEXT(struct arguments, photos.keep_textures)},
+    {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
+     SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
+    {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
+     SPL_CMD_TEXT(struct arguments, photos.device)},
+    {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
+     SPL_CMD_COUNT_32(struct arguments, pack.threads, 1, 64)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "pack",
+    .before =
+        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--neighbours K]\n"
+        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
+        "                   [--no-clip-lines] [--threads N]\n"
+        "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
+        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
+        "Turns scans (PLY, LAS, PTX, PTS, XYZ and other text) into one dataset that splatd can serve and render:\n"
+        "normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
+        "once.\n\n"
+        "One scan, and what came of it:\n"
+        "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
+        "Several scans of one place, in the same coordinates, into one dataset:\n"
+        "  splatd pack street-*.las -o street.spld\n"
+        "Text whose columns nothing names ('-' skips one):\n"
+        "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
+        "Colours and textures from photographs with poses, by COLMAP here:\n"
+        "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
+        "Points as they are, several times faster, to be rendered with method fill or points:\n"
+        "  splatd pack street.las --points-only -o street.spld\n"
+        "Half the default errors, for a few bits more a splat:\n"
+        "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
+    .after = "\nAbout 80 bytes of memory a point. Progress and the summary go to stderr.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
+
+/* What contradicts itself among the options; NULL: nothing. */
+static const char *find_contradiction(const struct arguments *a)
+{
+    const struct spl_pack_options *o = &a->pack;
+    const struct spl_photo_options *photos = &a->photos;
+    if (!photos->cameras && (photos->images || a->keep_going || photos->memory_bytes || photos->device ||
+                             photos->keep_textures || a->quality || a->textures >= 0))
         return "photographs need their poses: --cameras MODEL";
-    if (photos->keep_textures && photos->textures == SPL_TEXTURES_NONE)
+    if (photos->keep_textures && a->textures == SPL_TEXTURES_NONE)
         return "--keep-textures with --textures none keeps nothing: leave one of them out";
-    if (quality && photos->textures == SPL_TEXTURES_NONE)
+    if (a->quality && a->textures == SPL_TEXTURES_NONE)
         return "--texture-quality with --textures none codes nothing: leave one of them out";
     if (o->points_only && (o->neighbours || o->normal_error > 0 || o->no_clip_lines))
         return "--points-only makes no normals, radii and clip lines: leave out --neighbours, --normal-error and "
@@ -216,159 +238,54 @@ static bool is_same_file(const char *a, const char *b)
     return !stat(a, &one) && !stat(b, &other) && one.st_dev == other.st_dev && one.st_ino == other.st_ino;
 }
 
+/* What is wrong with the whole, before a scan is opened. */
+static int check(const struct arguments *a, struct spl_error *err)
+{
+    const struct spl_pack_options *o = &a->pack;
+    if (!o->input_count)
+        return spl_fail(err, SPL_E_USAGE, "pack needs at least one scan: splatd pack scan.las -o scan.spld; "
+                                          "'splatd pack --help' shows more");
+    if (!o->output)
+        return spl_fail(err, SPL_E_USAGE, "pack needs a dataset to write: -o NAME.spld");
+    if (strcmp(spl_cmd_ending(o->output), "spld"))
+        return spl_fail(err, SPL_E_USAGE,
+                        "pack writes a dataset, whose name ends in .spld: -o NAME.spld, not '%.300s'", o->output);
+    const char *contradiction = find_contradiction(a);
+    if (contradiction)
+        return spl_fail(err, SPL_E_USAGE, "%s", contradiction);
+    for (size_t i = 0; i < o->input_count; i++)
+        if (is_same_file(o->output, o->inputs[i]))
+            return spl_fail(err, SPL_E_USAGE,
+                            "%.300s is a scan that is to be packed; write the dataset beside it: -o NAME.spld",
+                            o->output);
+    return SPL_OK;
+}
+
 int spl_cmd_pack(int argc, char **argv)
 {
-    enum {
-        opt_columns = 256,
-        opt_intensity,
-        opt_neighbours,
-        opt_position,
-        opt_normal,
-        opt_points_only,
-        opt_no_linear,
-        opt_threads,
-        opt_cameras,
-        opt_images,
-        opt_keep,
-        opt_memory,
-        opt_device,
-        opt_textures,
-        opt_quality,
-        opt_no_clip,
-        opt_keep_textures
-    };
-    static const struct option options[] = {
-        {"output", required_argument, NULL, 'o'},
-        {"columns", required_argument, NULL, opt_columns},
-        {"intensity", no_argument, NULL, opt_intensity},
-        {"neighbours", required_argument, NULL, opt_neighbours},
-        {"position-error", required_argument, NULL, opt_position},
-        {"normal-error", required_argument, NULL, opt_normal},
-        {"points-only", no_argument, NULL, opt_points_only},
-        {"no-linear", no_argument, NULL, opt_no_linear},
-        {"no-clip-lines", no_argument, NULL, opt_no_clip},
-        {"threads", required_argument, NULL, opt_threads},
-        {"cameras", required_argument, NULL, opt_cameras},
-        {"images", required_argument, NULL, opt_images},
-        {"keep-going", no_argument, NULL, opt_keep},
-        {"memory", required_argument, NULL, opt_memory},
-        {"device", required_argument, NULL, opt_device},
-        {"textures", required_argument, NULL, opt_textures},
-        {"texture-quality", required_argument, NULL, opt_quality},
-        {"keep-textures", required_argument, NULL, opt_keep_textures},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-    };
     struct spl_cmd_progress progress = {0};
-    struct spl_pack_options o = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress};
-    struct spl_photo_options photos = {.textures = SPL_TEXTURES_ADAPTIVE, .trained = say_trained, .context = &progress};
+    struct arguments a = {
+        .pack = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress},
+        .photos = {.trained = say_trained, .context = &progress},
+        .textures = -1,
+    };
     struct spl_pack_report report = {0};
     struct spl_error err = {0};
-    uint64_t number = 0;
-    bool textures = false, quality = false;
-    int result = 0;
-    for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
-        switch (c) {
-        case 'o':
-            o.output = optarg;
-            break;
-        case opt_columns:
-            o.columns = optarg;
-            break;
-        case opt_intensity:
-            o.intensity = true;
-            break;
-        case opt_neighbours:
-            result = spl_cmd_parse_count("--neighbours", optarg, 3, 64, &number, &err);
-            o.neighbours = (unsigned)number;
-            break;
-        case opt_position:
-            result = spl_cmd_parse_real("--position-error", optarg, 1e-6, 1, &o.position_error, &err);
-            break;
-        case opt_normal:
-            result = spl_cmd_parse_real("--normal-error", optarg, 0.01, 30, &o.normal_error, &err);
-            break;
-        case opt_points_only:
-            o.points_only = true;
-            break;
-        case opt_no_linear:
-            o.no_linear = true;
-            break;
-        case opt_no_clip:
-            o.no_clip_lines = true;
-            break;
-        case opt_threads:
-            result = spl_cmd_parse_count("--threads", optarg, 1, 64, &number, &err);
-            o.threads = (unsigned)number;
-            break;
-        case opt_cameras:
-            photos.cameras = optarg;
-            break;
-        case opt_images:
-            photos.images = optarg;
-            break;
-        case opt_keep:
-            photos.refused = name_refused;
-            break;
-        case opt_memory:
-            result = spl_cmd_parse_bytes("--memory", optarg, 1 << 20, 64, 1 << 20, &photos.memory_bytes, &err);
-            break;
-        case opt_textures:
-            result = parse_textures(optarg, &photos.textures, &err);
-            textures = true;
-            break;
-        case opt_quality:
-            result = parse_quality(optarg, &photos, &err);
-            quality = true;
-            break;
-        case opt_keep_textures:
-            photos.keep_textures = optarg;
-            break;
-        case opt_device:
-            photos.device = optarg;
-            break;
-        case 'h':
-            usage(stdout);
-            return 0;
-        default:
-            fprintf(stderr, "'splatd pack --help' shows how\n");
-            return 2;
-        }
-        if (result)
-            return spl_cmd_fail(&err);
-    }
-    if (optind == argc) {
-        fprintf(stderr, "splatd: pack needs at least one scan: splatd pack scan.las -o scan.spld; "
-                        "'splatd pack --help' shows more\n");
-        return 2;
-    }
-    if (!o.output) {
-        fprintf(stderr, "splatd: pack needs a dataset to write: -o NAME.spld\n");
-        return 2;
-    }
-    if (strcmp(spl_cmd_ending(o.output), "spld")) {
-        fprintf(stderr, "splatd: pack writes a dataset, whose name ends in .spld: -o NAME.spld, not '%s'\n", o.output);
-        return 2;
-    }
-    const char *contradiction = find_contradiction(&o, &photos, textures, quality);
-    if (contradiction) {
-        fprintf(stderr, "splatd: %s\n", contradiction);
-        return 2;
-    }
-    for (int i = optind; i < argc; i++)
-        if (is_same_file(o.output, argv[i])) {
-            fprintf(stderr, "splatd: %s is a scan that is to be packed; write the dataset beside it: -o NAME.spld\n",
-                    o.output);
-            return 2;
-        }
-    o.photos = photos.cameras ? &photos : NULL;
-    o.inputs = (const char *const *)&argv[optind];
-    o.input_count = (size_t)(argc - optind);
-    catch_signals(o.output);
-    result = spl_pack(&o, &report, &err);
-    spl_cmd_progress_finish(&progress);
-    if (result)
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    a.pack.inputs = (const char *const *)&argv[optind];
+    a.pack.input_count = (size_t)(argc - optind);
+    if (rc || (rc = check(&a, &err)))
         return spl_cmd_fail(&err);
-    print_summary(o.output, &report);
+    a.photos.refused = a.keep_going ? name_refused : NULL;
+    a.photos.textures = a.textures < 0 ? SPL_TEXTURES_ADAPTIVE : (enum spl_texture_coding)a.textures;
+    a.pack.photos = a.photos.cameras ? &a.photos : NULL;
+    catch_signals(a.pack.output);
+    rc = spl_pack(&a.pack, &report, &err);
+    spl_cmd_progress_finish(&progress);
+    if (rc)
+        return spl_cmd_fail(&err);
+    print_summary(a.pack.output, &report);
     return 0;
 }

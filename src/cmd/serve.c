@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "cmd/options.h"
 #include "service/service.h"
 
 static void usage(FILE *out)
@@ -86,6 +87,24 @@ static int set(struct spl_service_options *o, size_t index, const char *text, st
     return spl_service_options_set(o, index, text, SPL_FROM_FLAG, "--", err);
 }
 
+/* What getopt does not take; `text` of the command line. */
+static int refuse(int why, const char *text, struct spl_error *err)
+{
+    const char *names[SPL_PARAMETERS + 3], *near = NULL;
+    size_t count = 0;
+    for (int i = 0; i < SPL_PARAMETERS; i++)
+        names[count++] = spl_parameters[i].name;
+    names[count++] = "config";
+    names[count++] = "manual";
+    names[count] = NULL;
+    bool unknown = why == '?' && (!optopt || optopt < opt_manual);
+    if (unknown && !optopt)
+        near = spl_cmd_find_nearest(text, names);
+    return spl_fail(err, SPL_E_USAGE, "'%.80s' %s; %s%s%s'splatd serve --help' shows how", text,
+                    why == ':' ? "needs a value" : unknown ? "is no option of serve" : "takes no value",
+                    near ? "did you mean --" : "", near ? near : "", near ? "? " : "");
+}
+
 /* One flag of the command line, `text` of it. */
 static int apply(struct spl_service_options *o, int option, const char *text, struct spl_error *err)
 {
@@ -103,9 +122,7 @@ static int apply(struct spl_service_options *o, int option, const char *text, st
     case '?': // optopt: the letter, or what a known name stands for
         if (optopt && optopt < opt_manual)
             text = letter;
-        return spl_fail(err, SPL_E_USAGE, "'%.80s' %s; 'splatd serve --help' shows how", text,
-                        option == ':' ? "needs a value" : optopt && optopt >= opt_manual ? "takes no value"
-                                                                                          : "is no option of serve");
+        return refuse(option, text, err);
     default:
         return option >= first_no ? set(o, (size_t)(option - first_no), "false", err)
                                   : set(o, (size_t)(option - first_parameter), optarg ? optarg : "true", err);

@@ -10,32 +10,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "cmd/table.h"
 #include "service/access/sign.h"
-
-static void usage(FILE *out)
-{
-    fprintf(
-        out,
-        "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
-        "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
-        "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
-        "dataset, its profile, its views and picks can be signed, and the page /embed/ID: who has that URL may look at\n"
-        "this dataset from wherever they like until it expires, and do nothing else.\n\n"
-        "Make a key, once:\n"
-        "  openssl rand -hex 32 >url.key; chmod 600 url.key\n"
-        "A picture for a dashboard, for a day:\n"
-        "  splatd sign 'https://scans.example/v1/datasets/vault/view?eye=8,0,2&target=0,0,1' --key url.key "
-        "--expires 1d\n"
-        "The path alone will do, for a page on the same host:\n"
-        "  splatd sign '/v1/datasets/vault/view?width=640' --key url.key\n"
-        "A view to move in, for an <iframe>; camera and settings stand behind '#' and may be changed:\n"
-        "  splatd sign 'https://scans.example/embed/vault#eye=8,0,2&target=0,0,1' --key url.key --expires 7d\n\n"
-        "  -k, --key FILE        the key, 32 bytes or more; newlines at its end do not count\n"
-        "  -e, --expires TIME    from now, with s, m, h or d (default 1h)\n"
-        "  -h, --help\n\n"
-        "The signature is base64url(HMAC-SHA-256(key, path?query&exp=UNIX-SECONDS)), without padding, so any program\n"
-        "that knows the key can make such URLs; of a page it is /embed/ID?exp=UNIX-SECONDS, without the fragment.\n");
-}
 
 /* "90s", "15m", "1h", "7d" to seconds. */
 static int parse_expiry(const char *text, int64_t *seconds, struct spl_error *err)
@@ -53,6 +29,41 @@ static int parse_expiry(const char *text, int64_t *seconds, struct spl_error *er
     *seconds = count * factors[unit - units];
     return 0;
 }
+
+struct arguments {
+    const char *key, *expires;
+};
+
+static const struct spl_cmd_option options[] = {
+    {"key", "FILE", "the key, 32 bytes or more; newlines at its end do not count", .letter = 'k',
+     SPL_CMD_TEXT(struct arguments, key)},
+    {"expires", "TIME", "from now, with s, m, h or d", .letter = 'e', .fallback = "1h",
+     SPL_CMD_TEXT(struct arguments, expires)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "sign",
+    .before =
+        "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
+        "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
+        "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
+        "dataset, its profile, its views and picks can be signed, and the page /embed/ID: who has that URL may look at\n"
+        "this dataset from wherever they like until it expires, and do nothing else.\n\n"
+        "Make a key, once:\n"
+        "  openssl rand -hex 32 >url.key; chmod 600 url.key\n"
+        "A picture for a dashboard, for a day:\n"
+        "  splatd sign 'https://scans.example/v1/datasets/vault/view?eye=8,0,2&target=0,0,1' --key url.key "
+        "--expires 1d\n"
+        "The path alone will do, for a page on the same host:\n"
+        "  splatd sign '/v1/datasets/vault/view?width=640' --key url.key\n"
+        "A view to move in, for an <iframe>; camera and settings stand behind '#' and may be changed:\n"
+        "  splatd sign 'https://scans.example/embed/vault#eye=8,0,2&target=0,0,1' --key url.key --expires 7d\n\n",
+    .after =
+        "\nThe signature is base64url(HMAC-SHA-256(key, path?query&exp=UNIX-SECONDS)), without padding, so any program\n"
+        "that knows the key can make such URLs; of a page it is /embed/ID?exp=UNIX-SECONDS, without the fragment.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 static int sign(const char *url, const char *key_path, const char *expires, struct spl_error *err)
 {
@@ -73,31 +84,14 @@ static int sign(const char *url, const char *key_path, const char *expires, stru
 
 int spl_cmd_sign(int argc, char **argv)
 {
-    static const struct option options[] = {{"key", required_argument, NULL, 'k'},
-                                            {"expires", required_argument, NULL, 'e'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {0}};
-    const char *key = NULL, *expires = "1h";
+    struct arguments a = {0};
     struct spl_error err = {0};
-    for (int c; (c = getopt_long(argc, argv, "k:e:h", options, NULL)) >= 0;) {
-        switch (c) {
-        case 'k':
-            key = optarg;
-            break;
-        case 'e':
-            expires = optarg;
-            break;
-        case 'h':
-            usage(stdout);
-            return 0;
-        default:
-            fprintf(stderr, "'splatd sign --help' shows how\n");
-            return 2;
-        }
-    }
-    if (optind + 1 != argc || !key) {
-        spl_fail(&err, SPL_E_USAGE, "sign takes one URL and --key FILE; 'splatd sign --help' shows examples");
-        return spl_cmd_fail(&err);
-    }
-    return sign(argv[optind], key, expires, &err) ? spl_cmd_fail(&err) : 0;
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && (optind + 1 != argc || !a.key))
+        rc = spl_fail(&err, SPL_E_USAGE, "sign takes one URL and --key FILE; 'splatd sign --help' shows examples");
+    if (!rc)
+        rc = sign(argv[optind], a.key, a.expires, &err);
+    return rc ? spl_cmd_fail(&err) : 0;
 }

@@ -12,12 +12,90 @@
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
+#include "cmd/table.h"
 #include "synth/exact.h"
 #include "synth/pictures.h"
 
-static void usage(FILE *out)
+struct arguments {
+    struct spl_synth_options scan;
+    struct spl_pictures_options pictures;
+    const char *views;
+    uint64_t photos;
+    uint32_t size[2], photo_size[2];
+    int photo_format; /* place in photo_formats */
+    bool list, print_views, want_scan;
+};
+
+/* A whole number as "5000000" or "5e6"; its range is the library's. */
+static int take_points(void *arguments, const char *option, char *text, struct spl_error *err)
 {
-    fputs(
+    struct arguments *a = arguments;
+    double value = 0;
+    int rc = spl_cmd_parse_real(option, text, 0, 0x1p53, &value, err);
+    if (!rc && value != floor(value))
+        rc = spl_fail(err, SPL_E_USAGE, "%s takes a whole number such as 5000000 or 5e6, not '%s'", option, text);
+    a->scan.points = (uint64_t)value;
+    a->want_scan = true;
+    return rc;
+}
+
+static int take_output(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    (void)option;
+    ((struct arguments *)arguments)->scan.directory = text;
+    return spl_cmd_check_folder("-o", text, "a folder", err);
+}
+
+static const char *const photo_formats[] = {"png", "jpeg", NULL};
+
+static const struct spl_cmd_option options[] = {
+    {.help = "Scan:"},
+    {"points", "N", "returns over all passes, within 2 %; 1000 to 1e10", .letter = 'n', .otherwise = "1e6",
+     .take = take_points},
+    {"seed", "S", "of the noise, the faults and where photographs are taken", .letter = 's', .fallback = "1",
+     SPL_CMD_COUNT(struct arguments, scan.seed, 0, UINT64_MAX)},
+    {"noise", "SIGMA", "range noise, metres", .otherwise = "the scene's",
+     SPL_CMD_REAL(struct arguments, scan.noise, 0, 1)},
+    {"mixed", "SHARE", "of the pulses on an edge, whose point lies between both surfaces", .fallback = "0",
+     SPL_CMD_REAL(struct arguments, scan.mixed, 0, 1)},
+    {"dropout", "SHARE", "of the returns that are lost, more where it is dark, grazing, far", .fallback = "0",
+     SPL_CMD_REAL(struct arguments, scan.dropout, 0, 0.9)},
+    {"misregister", "M", "metres by which each station or pass is off its place", .fallback = "0",
+     SPL_CMD_REAL(struct arguments, scan.misregister, 0, 10)},
+    {"format", "LIST", "of ptx,ply,las", .otherwise = "ptx,ply from tripods, ply,las from what moves",
+     SPL_CMD_TEXT(struct arguments, scan.formats)},
+    {.help = "Exact pictures:"},
+    {"views", "FILE",
+     "JSON of named views, or the folder of a COLMAP text model: DIR/truth/VIEW.color.png (area-sampled in linear "
+     "light, alpha = coverage), .depth.npy (along the axis, NaN = sky), .normal.npy, .id.npy (the object), "
+     ".coverage.npy",
+     SPL_CMD_TEXT(struct arguments, views)},
+    {"photos", "N",
+     "photographs from N places: DIR/photos/images/0001.png and so on, poses as a COLMAP text model in "
+     "DIR/photos/sparse/0",
+     SPL_CMD_COUNT(struct arguments, photos, 1, SPL_PHOTOS_MAX)},
+    {"photo-size", "WxH", "their pixels", .fallback = "1024x768", SPL_CMD_PIXELS(struct arguments, photo_size)},
+    {"photo-format", "F", "png, alpha 0 = sky, or jpeg", .fallback = "png",
+     SPL_CMD_CHOICE(struct arguments, photo_format, photo_formats)},
+    {"panoramas", "W",
+     "equirectangular, W pixels wide (even), of each station, or of each sample camera's place where the scanner "
+     "moves: DIR/panoramas/NAME.color.png, NAME.range.npy, poses in panoramas.json",
+     SPL_CMD_COUNT_32(struct arguments, pictures.panorama_width, SPL_PANORAMA_WIDTH_MIN, SPL_PANORAMA_WIDTH_MAX)},
+    {"samples", "N", "up to N x N a pixel", .fallback = "16",
+     SPL_CMD_COUNT_32(struct arguments, pictures.samples, 1, SPL_EXACT_SAMPLES_MAX)},
+    {.help = "Both:"},
+    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, scan.threads, 1, 64)},
+    {"output", "DIR", "made when missing", .letter = 'o', .take = take_output},
+    {.help = "What there is:"},
+    {"print-views", NULL, "the scene's sample cameras as JSON, for bench, render and --views",
+     SPL_CMD_FLAG(struct arguments, print_views)},
+    {"size", "WxH", "of those, pixels", .fallback = "1280x720", SPL_CMD_PIXELS(struct arguments, size)},
+    {"list", NULL, "the scenes, a line each", SPL_CMD_FLAG(struct arguments, list)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "synth",
+    .before =
         "usage: splatd synth SCENE [SCAN OPTION…] [--views FILE] [--photos N] [--panoramas WIDTH] -o DIR\n"
         "       splatd synth SCENE --print-views [--size WxH]\n"
         "       splatd synth --list\n\n"
@@ -37,51 +115,11 @@ static void usage(FILE *out)
         "The truth that renders are compared with, at the scene's sample cameras:\n"
         "  splatd synth courtyard --print-views > cams.json && splatd synth courtyard --views cams.json -o scan\n"
         "A scan with photographs and panoramas whose poses are exact:\n"
-        "  splatd synth courtyard --points 1e6 --photos 40 --panoramas 2048 -o scan\n\n"
-        "Scan:\n"
-        "  -n, --points N      returns over all passes, within 2 % (1000 to 1e10; default 1e6)\n"
-        "  -s, --seed S        of the noise, the faults and where photographs are taken (default 1)\n"
-        "      --noise SIGMA   range noise, metres (default: the scene's)\n"
-        "      --mixed SHARE   of the pulses on an edge, 0 to 1, whose point lies between both surfaces (default 0)\n"
-        "      --dropout SHARE of the returns that are lost, 0 to 0.9; more where it is dark, grazing, far (default "
-        "0)\n"
-        "      --misregister M metres, 0 to 10, by which each station or pass is off its place (default 0)\n"
-        "      --format LIST   of ptx,ply,las (default: ptx,ply from tripods, ply,las from what moves)\n"
-        "Exact pictures:\n"
-        "      --views FILE    JSON of named views, or the folder of a COLMAP text model: DIR/truth/VIEW.color.png\n"
-        "                      (area-sampled in linear light, alpha = coverage), .depth.npy (along the axis, NaN = "
-        "sky),\n"
-        "                      .normal.npy, .id.npy (the object), .coverage.npy\n"
-        "      --photos N      photographs from N places, 1 to 9999: DIR/photos/images/0001.png and so on, poses as a\n"
-        "                      COLMAP text model in DIR/photos/sparse/0\n"
-        "      --photo-size WxH    their pixels (default 1024x768)\n"
-        "      --photo-format F    png, alpha 0 = sky (default), or jpeg\n"
-        "      --panoramas W   equirectangular, W pixels wide (even, 256 to 8192), of each station, or of each sample\n"
-        "                      camera's place where the scanner moves: DIR/panoramas/NAME.color.png, NAME.range.npy,\n"
-        "                      poses in panoramas.json\n"
-        "      --samples N     up to N x N a pixel (1 to 64; default 16)\n"
-        "Both:\n"
-        "      --threads N     default: all cores\n"
-        "  -o, --output DIR    made when missing\n"
-        "What there is:\n"
-        "      --print-views   the scene's sample cameras as JSON, for bench, render and --views\n"
-        "      --size WxH      of those, pixels (default 1280x720)\n"
-        "      --list          the scenes, a line each\n\n"
-        "The files' paths go to stdout, messages to stderr.\n",
-        out);
-}
-
-/* A whole number as "5000000" or "5e6"; its range is the library's. */
-static int parse_points(const char *text, uint64_t *points, struct spl_error *err)
-{
-    double value;
-    int result = spl_cmd_parse_real("--points", text, 0, 0x1p53, &value, err);
-    if (!result && value != floor(value))
-        return spl_fail(err, SPL_E_USAGE, "--points takes a whole number such as 5000000 or 5e6, not '%s'", text);
-    if (!result)
-        *points = (uint64_t)value;
-    return result;
-}
+        "  splatd synth courtyard --points 1e6 --photos 40 --panoramas 2048 -o scan\n\n",
+    .after = "\nThe files' paths go to stdout, messages to stderr.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 static void print_path(void *context, const char *path)
 {
@@ -98,114 +136,6 @@ static int print_views(const char *scene, const uint32_t size[2])
     fputs(json, stdout);
     free(json);
     return 0;
-}
-
-enum option_id {
-    OPT_NOISE = 256,
-    OPT_FORMAT,
-    OPT_THREADS,
-    OPT_LIST,
-    OPT_PRINT_VIEWS,
-    OPT_SIZE,
-    OPT_MIXED,
-    OPT_DROPOUT,
-    OPT_MISREGISTER,
-    OPT_VIEWS,
-    OPT_PHOTOS,
-    OPT_PHOTO_SIZE,
-    OPT_PHOTO_FORMAT,
-    OPT_PANORAMAS,
-    OPT_SAMPLES,
-};
-
-static const struct option options[] = {
-    {"points", required_argument, NULL, 'n'},
-    {"seed", required_argument, NULL, 's'},
-    {"noise", required_argument, NULL, OPT_NOISE},
-    {"mixed", required_argument, NULL, OPT_MIXED},
-    {"dropout", required_argument, NULL, OPT_DROPOUT},
-    {"misregister", required_argument, NULL, OPT_MISREGISTER},
-    {"format", required_argument, NULL, OPT_FORMAT},
-    {"views", required_argument, NULL, OPT_VIEWS},
-    {"photos", required_argument, NULL, OPT_PHOTOS},
-    {"photo-size", required_argument, NULL, OPT_PHOTO_SIZE},
-    {"photo-format", required_argument, NULL, OPT_PHOTO_FORMAT},
-    {"panoramas", required_argument, NULL, OPT_PANORAMAS},
-    {"samples", required_argument, NULL, OPT_SAMPLES},
-    {"threads", required_argument, NULL, OPT_THREADS},
-    {"output", required_argument, NULL, 'o'},
-    {"list", no_argument, NULL, OPT_LIST},
-    {"print-views", no_argument, NULL, OPT_PRINT_VIEWS},
-    {"size", required_argument, NULL, OPT_SIZE},
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-struct arguments {
-    struct spl_synth_options scan;
-    struct spl_pictures_options pictures;
-    const char *views;
-    uint32_t size[2];
-    bool print_views, want_scan;
-};
-
-static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
-{
-    int rc = 0;
-    uint64_t count = 0;
-    switch (id) {
-    case 'n':
-        a->want_scan = true;
-        return parse_points(text, &a->scan.points, err);
-    case 's':
-        return spl_cmd_parse_count("--seed", text, 0, UINT64_MAX, &a->scan.seed, err);
-    case OPT_NOISE:
-        return spl_cmd_parse_real("--noise", text, 0, 1, &a->scan.noise, err);
-    case OPT_MIXED:
-        return spl_cmd_parse_real("--mixed", text, 0, 1, &a->scan.mixed, err);
-    case OPT_DROPOUT:
-        return spl_cmd_parse_real("--dropout", text, 0, 0.9, &a->scan.dropout, err);
-    case OPT_MISREGISTER:
-        return spl_cmd_parse_real("--misregister", text, 0, 10, &a->scan.misregister, err);
-    case OPT_FORMAT:
-        a->scan.formats = text;
-        return 0;
-    case OPT_VIEWS:
-        a->views = text;
-        return 0;
-    case OPT_PHOTOS:
-        rc = spl_cmd_parse_count("--photos", text, 1, SPL_PHOTOS_MAX, &count, err);
-        a->pictures.photos = count;
-        return rc;
-    case OPT_PHOTO_SIZE:
-        return spl_cmd_parse_size("--photo-size", text, &a->pictures.photo_width, &a->pictures.photo_height, err);
-    case OPT_PHOTO_FORMAT:
-        rc = spl_format_from_name(text);
-        if (rc != SPL_FORMAT_PNG && rc != SPL_FORMAT_JPEG)
-            return spl_fail(err, SPL_E_USAGE, "--photo-format takes png or jpeg, not '%s'", text);
-        a->pictures.jpeg = rc == SPL_FORMAT_JPEG;
-        return 0;
-    case OPT_PANORAMAS:
-        rc = spl_cmd_parse_count("--panoramas", text, SPL_PANORAMA_WIDTH_MIN, SPL_PANORAMA_WIDTH_MAX, &count, err);
-        a->pictures.panorama_width = (uint32_t)count;
-        return rc;
-    case OPT_SAMPLES:
-        rc = spl_cmd_parse_count("--samples", text, 1, SPL_EXACT_SAMPLES_MAX, &count, err);
-        a->pictures.samples = (uint32_t)count;
-        return rc;
-    case OPT_THREADS:
-        rc = spl_cmd_parse_count("--threads", text, 1, 64, &count, err);
-        a->scan.threads = (unsigned)count;
-        return rc;
-    case OPT_SIZE:
-        return spl_cmd_parse_size("--size", text, &a->size[0], &a->size[1], err);
-    case OPT_PRINT_VIEWS:
-        a->print_views = true;
-        return 0;
-    default: /* 'o' */
-        a->scan.directory = text;
-        return spl_cmd_check_folder("-o", text, "a folder", err);
-    }
 }
 
 /* What can be refused without a scene is, before the scan, which may take hours. */
@@ -235,49 +165,37 @@ int spl_cmd_synth(int argc, char **argv)
     struct spl_cmd_progress progress = {0};
     struct arguments a = {
         .scan = {.points = 1000000,
-                 .seed = 1,
                  .noise = -1,
                  .progress = spl_cmd_progress,
                  .progress_context = &progress,
                  .file = print_path},
-        .pictures = {.photo_width = 1024,
-                     .photo_height = 768,
-                     .samples = 16,
-                     .progress = spl_cmd_progress,
-                     .progress_context = &progress,
-                     .file = print_path},
-        .size = {1280, 720},
+        .pictures = {.progress = spl_cmd_progress, .progress_context = &progress, .file = print_path},
     };
     struct spl_error err = {0};
-    for (int id; (id = getopt_long(argc, argv, "n:s:o:h", options, NULL)) >= 0;) {
-        switch (id) {
-        case OPT_LIST:
-            for (size_t i = 0; spl_synth_scene_name(i); i++)
-                printf("%-12s %s\n", spl_synth_scene_name(i), spl_synth_scene_help(i));
-            return 0;
-        case 'h':
-            usage(stdout);
-            return 0;
-        case '?':
-            fprintf(stderr, "'splatd synth --help' shows how\n");
-            return 2;
-        }
-        if (parse_option(id, optarg, &a, &err))
-            return spl_cmd_fail(&err);
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && a.list) {
+        for (size_t i = 0; spl_synth_scene_name(i); i++)
+            printf("%-12s %s\n", spl_synth_scene_name(i), spl_synth_scene_help(i));
+        return 0;
     }
-    if (argc - optind != 1) {
-        fprintf(stderr, "splatd: synth takes one SCENE: splatd synth courtyard -o scan; "
-                        "'splatd synth --list' names them\n");
-        return 2;
-    }
+    if (!rc && argc - optind != 1)
+        rc = spl_fail(&err, SPL_E_USAGE, "synth takes one SCENE: splatd synth courtyard -o scan; "
+                                         "'splatd synth --list' names them");
+    if (rc)
+        return spl_cmd_fail(&err);
     a.scan.scene = argv[optind];
     if (a.print_views)
         return print_views(a.scan.scene, a.size);
-    if (!a.scan.directory) {
-        fprintf(stderr, "splatd: synth needs a directory to write to: -o DIR\n");
-        return 2;
-    }
-    int rc = run(&a, &err);
+    if (!a.scan.directory)
+        return spl_cmd_fail(
+            (spl_fail(&err, SPL_E_USAGE, "synth needs a directory to write to: -o DIR"), &err));
+    a.pictures.photos = a.photos;
+    a.pictures.photo_width = a.photo_size[0];
+    a.pictures.photo_height = a.photo_size[1];
+    a.pictures.jpeg = a.photo_format == 1;
+    rc = run(&a, &err);
     spl_cmd_progress_finish(&progress);
     return rc ? spl_cmd_fail(&err) : 0;
 }

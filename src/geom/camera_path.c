@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 const char *const spl_path_positions_names[] = {"centripetal", "uniform", "linear", NULL};
 const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
@@ -26,18 +26,12 @@ void spl_camera_path_finish(struct spl_camera_path *path)
 
 static int grow(struct spl_camera_path *path, struct spl_error *err)
 {
-    size_t capacity = path->capacity ? 2 * path->capacity : 16;
-    struct spl_camera *cameras = spl_realloc(path->cameras, capacity, sizeof *cameras, err);
-    if (!cameras)
+    size_t cameras = path->capacity, times = path->capacity;
+    if (spl_array_reserve(path->cameras, cameras, path->count + 1, err))
         return SPL_E_NOMEM;
-    path->cameras = cameras;
-    if (path->times || !path->count) {
-        double *times = spl_realloc(path->times, capacity, sizeof *times, err);
-        if (!times)
-            return SPL_E_NOMEM;
-        path->times = times;
-    }
-    path->capacity = capacity;
+    if ((path->times || !path->count) && spl_array_reserve(path->times, times, path->count + 1, err))
+        return SPL_E_NOMEM;
+    path->capacity = cameras;
     return 0;
 }
 

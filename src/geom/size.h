@@ -1,8 +1,10 @@
-/* Sizes of images of which one side, or both, are left out. */
+/* Sizes of images: of which one side, or both, are left out, and of one that is made larger or smaller. */
 #ifndef SPL_GEOM_SIZE_H
 #define SPL_GEOM_SIZE_H
 
 #include <math.h>
+
+#include <splatd/camera.h>
 
 enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
 
@@ -15,6 +17,24 @@ static inline void spl_size_follow(double size[2], const double shape[2])
     for (int i = 0; i < 2; i++)
         if (given[i] == 0 && shape[i] > 0)
             size[i] = fmax(1, round(given[!i] > 0 ? given[!i] * shape[i] / shape[!i] : shape[i]));
+}
+
+/* Scales the lens: what lay x pixels from the left edge and y from the top lies x * `across` and y * `down` from them.
+ * The image's size is the caller's to set. */
+static inline void spl_camera_scale(struct spl_camera *camera, double across, double down)
+{
+    camera->fx *= across;
+    camera->cx *= across;
+    camera->fy *= down;
+    camera->cy *= down;
+}
+
+/* The same picture in width x height pixels. */
+static inline void spl_camera_resize(struct spl_camera *camera, uint32_t width, uint32_t height)
+{
+    spl_camera_scale(camera, (double)width / camera->width, (double)height / camera->height);
+    camera->width = width;
+    camera->height = height;
 }
 
 #endif

@@ -267,7 +267,7 @@ int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
 {
     spl_assert(gpu->recording);
     gpu->recording = false;
-    if (gpu->inject_loss || gpu->lost) {
+    if (gpu->inject_loss) {
         gpu->lost = true;
         return lost(gpu, err);
     }
@@ -282,7 +282,7 @@ int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
 
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err)
 {
-    spl_assert(ticket > 0 && ticket <= gpu->tickets);
+    spl_assert(ticket > 0 && ticket <= gpu->tickets && !gpu->recording);
     if (gpu->lost)
         return lost(gpu, err);
     int code = wait_for(gpu, ticket, spl_remaining_ns(deadline_ns), err);
@@ -290,7 +290,7 @@ int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, str
         return code;
     memset(gpu->timestamps_ns, 0, sizeof gpu->timestamps_ns);
     /* They are overwritten once the next list begins. */
-    if (gpu->limits.timestamps && ticket == gpu->tickets && !gpu->recording)
+    if (gpu->limits.timestamps && ticket == gpu->tickets)
         gpu->backend->read_timestamps(gpu);
     return 0;
 }

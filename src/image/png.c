@@ -7,6 +7,7 @@
 
 #include <spng.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "image/encode.h"
 
@@ -42,15 +43,9 @@ static int append(spng_ctx *ctx, void *user, void *bytes, size_t length)
 {
     (void)ctx;
     struct sink *sink = user;
-    if (length > sink->capacity - sink->length) {
-        size_t capacity = 2 * sink->capacity + length;
-        uint8_t *grown = spl_realloc(sink->bytes, capacity, 1, NULL);
-        if (!grown) {
-            sink->refused = true;
-            return SPNG_IO_ERROR;
-        }
-        sink->bytes = grown;
-        sink->capacity = capacity;
+    if (spl_array_reserve(sink->bytes, sink->capacity, sink->length + length, NULL)) {
+        sink->refused = true;
+        return SPNG_IO_ERROR;
     }
     memcpy(sink->bytes + sink->length, bytes, length);
     sink->length += length;

@@ -141,13 +141,9 @@ static void summarise_row(struct bench *b, size_t index)
     row->frame = SUMMARY(s->frame);
     row->units = SUMMARY(s->frame / s->calibrator);
     row->floor = SUMMARY(s->calibrator * (double)s->stats.splats_drawn / SPL_CALIBRATOR_POINTS).median;
-    row->select = SUMMARY(s->stats.select_ms).median;
-    row->upload = SUMMARY(s->stats.upload_ms).median;
-    row->clear = SUMMARY(s->stats.clear_ms).median;
-    row->depth = SUMMARY(s->stats.depth_ms).median;
-    row->shade = SUMMARY(s->stats.shade_ms).median;
-    row->resolve = SUMMARY(s->stats.resolve_ms).median;
-    row->readback = SUMMARY(s->stats.readback_ms).median;
+#define STAGE(name) row->name = SUMMARY(s->stats.name##_ms).median;
+#include "render/stages.def"
+#undef STAGE
     row->splats = SUMMARY(s->stats.splats_drawn).median;
     row->chunks = SUMMARY(s->stats.chunks_drawn).median;
     row->memory = spl_renderer_get_memory(b->renderers[row_device(b->options, index)]);

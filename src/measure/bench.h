@@ -34,7 +34,9 @@ struct spl_bench_row {
     struct spl_summary frame;
     struct spl_summary units;            /* frame / calibrator of the same place on the path */
     double floor;                        /* median: the calibrator's time for as many points as splats were drawn */
-    double select, upload, clear, depth, shade, resolve, readback; /* medians */
+#define STAGE(name) double name; /* median */
+#include "render/stages.def"
+#undef STAGE
     double splats, chunks;               /* drawn, medians */
     uint32_t incomplete;                 /* frames in which coarser nodes stood in for pages that were not resident */
     uint64_t memory;                     /* device bytes held, all datasets together */

@@ -1,8 +1,5 @@
 /* The page: src/measure/page.html with its places filled in. What comes from files is text (escaped) or JSON in which
- * no
- * '<' stands, so that no name can end the script element that holds it. Any thread. */
-#include "measure/page.h"
-
+ * no '<' stands, so that no name can end the script element that holds it. Any thread. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +8,7 @@
 #include "base/memory.h"
 #include "measure/markup.h"
 #include "measure/page_html.h" /* made from page.html: unsigned char page_html[] */
+#include "measure/report.h"
 
 struct page {
     const struct spl_report *report;

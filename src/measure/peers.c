@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 /* Cuts the last field off `line` and parses it. */
 static int take_number(char *line, const char *field, double least, const char *path, size_t number, double *out,
@@ -39,11 +39,9 @@ static int take_row(struct spl_peers *peers, char *line, const char *path, size_
         return spl_fail_field(err, SPL_E_INPUT, "name", "%s: line %zu: a name has 1 to %zu bytes", path, number,
                               sizeof row.name - 1);
     memcpy(row.name, line, strlen(line));
-    struct spl_peer *rows = spl_realloc(peers->rows, peers->count + 1, sizeof *rows, err);
-    if (!rows)
+    if (spl_array_reserve(peers->rows, peers->capacity, peers->count + 1, err))
         return SPL_E_NOMEM;
-    peers->rows = rows;
-    rows[peers->count++] = row;
+    peers->rows[peers->count++] = row;
     return SPL_OK;
 }
 

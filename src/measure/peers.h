@@ -13,7 +13,7 @@ struct spl_peer {
 
 struct spl_peers {
     struct spl_peer *rows; /* in the file's order; owned by the holder */
-    size_t count;
+    size_t count, capacity;
 };
 
 /* Reads rows "name,ms,psnr"; a first row of just these words, empty rows and rows that begin with '#' are skipped. The

@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "measure/front.h"
 
 bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b)
 {
@@ -81,9 +80,24 @@ void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, dou
     }
 }
 
+static bool beats(double cost, double error, double other_cost, double other_error)
+{
+    return cost <= other_cost && error <= other_error && (cost < other_cost || error < other_error);
+}
+
+/* Every pair is compared: profiles have some dozens of settings, so that the square costs less than sorting is long. */
+void spl_front_mark(const double *cost, const double *error, size_t count, bool *front)
+{
+    for (size_t i = 0; i < count; i++) {
+        front[i] = !isnan(cost[i]) && !isnan(error[i]);
+        for (size_t j = 0; front[i] && j < count; j++)
+            front[i] = !beats(cost[j], error[j], cost[i], error[i]); // false for any NaN in j
+    }
+}
+
 void spl_profile_mark_front(struct spl_profile *profile)
 {
-    double cost[SPL_PROFILE_POINTS_MAX], error[SPL_PROFILE_POINTS_MAX];
+    double cost[SPL_PROFILE_POINTS_MAX] = {0}, error[SPL_PROFILE_POINTS_MAX] = {0};
     bool front[SPL_PROFILE_POINTS_MAX];
     spl_assert(profile->count <= SPL_PROFILE_POINTS_MAX);
     for (size_t i = 0; i < profile->count; i++) {

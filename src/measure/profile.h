@@ -69,6 +69,11 @@ void spl_profile_finish(struct spl_profile *profile);
  * as other sizes are asked for. count >= 1, mpx and ms > 0. */
 void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, double *fixed_ms, double *ms_per_mpx);
 
+/* The Pareto front: front[i] = true where no other entry has at most i's cost and at most i's error, and less of one of
+ * them. Entries that are equal in both are on the front together. An entry whose cost or error is NaN is never on it and
+ * beats nobody; infinities are ordinary. Less is better on both axes: hand over -PSNR. O(count²), no allocation. */
+void spl_front_mark(const double *cost, const double *error, size_t count, bool *front);
+
 /* Sets `front` of every point, from ms and psnr. Points without a PSNR are not on it. */
 void spl_profile_mark_front(struct spl_profile *profile);
 

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 static const struct member {
     const char *name;
@@ -24,12 +24,9 @@ static const struct member {
 #undef MEASURE
 },
   stages[] = {
-#define STAGE(name)                                                                                                    \
-    {                                                                                                                  \
-#name, offsetof(struct spl_sweep_time, name)                                                                   \
-    }
-      STAGE(ms),       STAGE(select_ms), STAGE(upload_ms),  STAGE(clear_ms),
-      STAGE(depth_ms), STAGE(shade_ms),  STAGE(resolve_ms), STAGE(readback_ms),
+    {"ms", offsetof(struct spl_sweep_time, ms)},
+#define STAGE(name) {#name "_ms", offsetof(struct spl_sweep_time, name##_ms)},
+#include "render/stages.def"
 #undef STAGE
 };
 enum { MEASURES = sizeof measures / sizeof *measures, STAGES = sizeof stages / sizeof *stages };
@@ -98,11 +95,10 @@ static bool take_index(const json_t *record, const char *key, size_t count, size
 
 static bool take_calibrator(struct spl_sweep *sweep, double ms)
 {
-    double *grown = spl_realloc(sweep->calibrator, sweep->calibrator_count + 1, sizeof *grown, NULL);
-    if (!grown || !(ms > 0))
+    size_t wanted = sweep->calibrator_count + 1;
+    if (!(ms > 0) || spl_array_reserve(sweep->calibrator, sweep->calibrator_capacity, wanted, NULL))
         return false;
-    sweep->calibrator = grown;
-    grown[sweep->calibrator_count++] = ms;
+    sweep->calibrator[sweep->calibrator_count++] = ms;
     return true;
 }
 

@@ -40,25 +40,22 @@ static double pick_device(const struct spl_sweep_time *t)
     return t->clear_ms + t->depth_ms + t->shade_ms + t->resolve_ms;
 }
 
-#define PICK(stage)                                                                                                    \
-    static double pick_##stage(const struct spl_sweep_time *t)                                                         \
+#define STAGE(name)                                                                                                    \
+    static double pick_##name(const struct spl_sweep_time *t)                                                          \
     {                                                                                                                  \
-        return t->stage##_ms;                                                                                          \
+        return t->name##_ms;                                                                                           \
     }
-PICK(select)
-PICK(upload)
-PICK(clear)
-PICK(depth)
-PICK(shade)
-PICK(resolve)
-PICK(readback)
-#undef PICK
+#include "render/stages.def"
+#undef STAGE
 
 static const struct {
     const char *name;
     double (*pick)(const struct spl_sweep_time *);
-} stages[] = {{"select", pick_select}, {"upload", pick_upload},   {"clear", pick_clear},      {"depth", pick_depth},
-              {"shade", pick_shade},   {"resolve", pick_resolve}, {"readback", pick_readback}};
+} stages[] = {
+#define STAGE(name) {#name, pick_##name},
+#include "render/stages.def"
+#undef STAGE
+};
 enum { STAGES = sizeof stages / sizeof *stages };
 
 /* Median over the views of the median over the repeats; `values` is scratch, one a view, and left sorted. */

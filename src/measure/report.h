@@ -42,6 +42,12 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
 int spl_report_chart(const struct spl_profile *profile, uint64_t splats, double calibrator_ms,
                      const struct spl_peers *peers, char **svg, size_t *length, struct spl_error *err);
 
+/* The page of a sweep (page.c): chart, pictures with their error maps, tables; one HTML file that needs nothing else.
+ * Reads the sweep's pictures from its folder. `svg` is the chart's text, without any outside markup. *html is released
+ * with free(). Errors: SPL_E_IO names a picture that is gone. Blocks on disk. */
+int spl_page_write(const struct spl_report *report, const struct spl_peers *peers, const char *svg, char **html,
+                   size_t *length, struct spl_error *err);
+
 /* "splat lod=1", "points lod=2 2×2", "splat lod=1 atoms=2" where not all are drawn. */
 void spl_report_setting_name(const struct spl_setting *setting, char name[64]);
 

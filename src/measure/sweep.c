@@ -11,6 +11,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "geom/size.h"
 #include "measure/calibrator.h"
 #include "measure/record.h"
 #include "measure/state.h"
@@ -54,16 +55,8 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
     out->lod = o->settings[setting].lod;
     out->supersample = o->settings[setting].supersample;
     out->disc.atoms = o->settings[setting].atoms;
-    if (size == SPL_SWEEP_FULL)
-        return;
-    struct spl_camera *c = &out->camera;
-    double x = (double)((c->width + 1) / 2) / c->width, y = (double)((c->height + 1) / 2) / c->height;
-    c->width = (c->width + 1) / 2;
-    c->height = (c->height + 1) / 2;
-    c->fx *= x;
-    c->cx *= x;
-    c->fy *= y;
-    c->cy *= y;
+    if (size != SPL_SWEEP_FULL)
+        spl_camera_resize(&out->camera, (out->camera.width + 1) / 2, (out->camera.height + 1) / 2);
 }
 
 static int get_reference(struct job *job, size_t view, struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err)
@@ -212,13 +205,9 @@ static int time_frame(struct job *job, size_t setting, size_t v, enum spl_sweep_
     if (rc)
         return rc;
     const struct spl_frame_stats *s = &frame.stats;
-    t->select_ms = s->select_ms;
-    t->upload_ms = s->upload_ms;
-    t->clear_ms = s->clear_ms;
-    t->depth_ms = s->depth_ms;
-    t->shade_ms = s->shade_ms;
-    t->resolve_ms = s->resolve_ms;
-    t->readback_ms = s->readback_ms;
+#define STAGE(name) t->name##_ms = s->name##_ms;
+#include "render/stages.def"
+#undef STAGE
     spl_frame_finish(&frame);
     return SPL_OK;
 }

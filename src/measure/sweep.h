@@ -33,7 +33,9 @@ struct spl_sweep_options {
 
 struct spl_sweep_time { /* one frame, colour only */
     double ms;          /* the whole call on the host's clock, readback included */
-    double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms;
+#define STAGE(name) double name##_ms;
+#include "render/stages.def"
+#undef STAGE
     bool done;
 };
 
@@ -53,7 +55,7 @@ struct spl_sweep {
     struct spl_sweep_accuracy *accuracy; /* [setting][view] */
     struct spl_sweep_time *times;        /* [setting][view][size][repeat] */
     double *calibrator;                  /* milliseconds; at least one */
-    size_t calibrator_count;
+    size_t calibrator_count, calibrator_capacity;
     size_t resumed;              /* results that the state had */
     double rendering_s, seconds; /* of this run: inside render calls; altogether */
 };

@@ -6,8 +6,7 @@
 #include <errno.h>
 #include <stdio.h>
 
-#include "measure/error_map.h"
-#include "measure/thumbnail.h"
+#include "measure/pictures.h"
 
 size_t spl_sweep_page_views(size_t views)
 {

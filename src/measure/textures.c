@@ -392,20 +392,3 @@ int spl_textures_measure(const struct spl_textures_options *o, struct spl_textur
     }
     return rc;
 }
-
-double spl_textures_bytes_at(const struct spl_textures_report *report, double psnr)
-{
-    const struct spl_textures_row *a = NULL;
-    for (uint32_t i = 0; i < report->rows; i++) {
-        const struct spl_textures_row *b = &report->row[i];
-        if (b->kind != SPL_TEXTURES_OURS)
-            continue;
-        if (a && a->psnr <= psnr && psnr <= b->psnr && a->psnr < b->psnr) {
-            double share = (psnr - a->psnr) / (b->psnr - a->psnr);
-            double low = log(spl_textures_row_bytes(a)), high = log(spl_textures_row_bytes(b));
-            return exp(low + share * (high - low));
-        }
-        a = b;
-    }
-    return NAN;
-}

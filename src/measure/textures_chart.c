@@ -1,5 +1,6 @@
 /* What 'splatd bench --textures' draws: training's quality against seconds, textures' against bytes. A point says all
- * of itself to the pointer; photographs as they are have no error, so they are not on the chart. One thread. */
+ * of itself to the pointer; photographs as they are have no error, so they are not on the chart. And the bytes that our
+ * curve has at a quality. One thread. */
 #include <math.h>
 #include <stdio.h>
 
@@ -76,4 +77,21 @@ int spl_textures_chart_rate(const struct spl_textures_report *report, char **svg
                                                .curves = curves,
                                                .curve_count = 4},
                            svg, length, err);
+}
+
+double spl_textures_bytes_at(const struct spl_textures_report *report, double psnr)
+{
+    const struct spl_textures_row *a = NULL;
+    for (uint32_t i = 0; i < report->rows; i++) {
+        const struct spl_textures_row *b = &report->row[i];
+        if (b->kind != SPL_TEXTURES_OURS)
+            continue;
+        if (a && a->psnr <= psnr && psnr <= b->psnr && a->psnr < b->psnr) {
+            double share = (psnr - a->psnr) / (b->psnr - a->psnr);
+            double low = log(spl_textures_row_bytes(a)), high = log(spl_textures_row_bytes(b));
+            return exp(low + share * (high - low));
+        }
+        a = b;
+    }
+    return NAN;
 }

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/chunks.h"
@@ -178,17 +179,10 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
 /* Room for `wanted` chunks and their streams' codes. */
 static int reserve(struct spl_emitted *out, size_t wanted, size_t *capacity, struct spl_error *err)
 {
-    if (wanted <= *capacity)
-        return SPL_OK;
-    wanted += *capacity;
-    void *chunks = spl_realloc(out->chunks, wanted, sizeof *out->chunks, err);
-    if (!chunks)
+    size_t before = *capacity;
+    if (spl_array_reserve(out->chunks, *capacity, wanted, err))
         return SPL_E_NOMEM;
-    out->chunks = chunks;
-    int rc = spl_emitted_streams_reserve(&out->streams, wanted, err);
-    if (!rc)
-        *capacity = wanted;
-    return rc;
+    return *capacity > before ? spl_emitted_streams_reserve(&out->streams, *capacity, err) : SPL_OK;
 }
 
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
@@ -203,8 +197,8 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     }
     if (from->depth > UINT8_MAX)
         return spl_fail(err, SPL_E_LIMIT,
-                        "more than %d levels; points lie closer together than the scan is wide by more"
-                        " than floats can say",
+                        "more than %d levels; points lie closer together than the scan is wide by more than floats "
+                        "can say",
                         UINT8_MAX + 1);
     int rc = reserve(out, out->chunk_count + encoded->chunk_count, chunk_capacity, err);
     if (!rc)

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "cloud/cloud.h"
 
@@ -95,10 +96,8 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
 {
     if (!info->station_count)
         return 0;
-    void *bigger = spl_realloc(p->stations, (size_t)p->station_count + info->station_count, sizeof *p->stations, err);
-    if (!bigger)
+    if (spl_array_reserve(p->stations, p->station_capacity, (size_t)p->station_count + info->station_count, err))
         return SPL_E_NOMEM;
-    p->stations = bigger;
     memcpy(p->stations + p->station_count, info->stations, info->station_count * sizeof *p->stations);
     p->station_count += info->station_count;
     return 0;

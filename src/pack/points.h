@@ -30,6 +30,7 @@ struct spl_points {
     struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
+    size_t station_capacity;
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
     uint64_t points_read, points_skipped, duplicates;

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 #include "geom/morton.h"
 #include "pack/order.h"
 
@@ -85,14 +85,8 @@ static bool too_wide(const struct spl_tree_node *node, const struct spl_points *
 
 static int add_node(struct spl_tree *tree, size_t *capacity, const struct spl_tree_node *node, struct spl_error *err)
 {
-    if (tree->count == *capacity) {
-        size_t wanted = *capacity ? *capacity * 2 : 64;
-        void *bigger = spl_realloc(tree->nodes, wanted, sizeof *tree->nodes, err);
-        if (!bigger)
-            return SPL_E_NOMEM;
-        tree->nodes = bigger;
-        *capacity = wanted;
-    }
+    if (spl_array_reserve(tree->nodes, *capacity, (size_t)tree->count + 1, err))
+        return SPL_E_NOMEM;
     tree->nodes[tree->count++] = *node;
     tree->levels = node->depth + 1 > tree->levels ? node->depth + 1 : tree->levels;
     return 0;

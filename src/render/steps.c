@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "geom/size.h"
 #include "image/enlarge.h"
 #include "render/frame.h"
 #include "render/method.h"
@@ -51,10 +52,7 @@ static void make_coarse(struct spl_view *view)
     view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
     view->camera.width = (uint32_t)ceil(view->camera.width * scale);
     view->camera.height = (uint32_t)ceil(view->camera.height * scale);
-    view->camera.fx *= scale;
-    view->camera.fy *= scale;
-    view->camera.cx *= scale;
-    view->camera.cy *= scale;
+    spl_camera_scale(&view->camera, scale, scale);
 }
 
 static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)

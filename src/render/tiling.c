@@ -6,6 +6,7 @@
 
 #include <math.h>
 
+#include "geom/size.h"
 #include "render/method.h"
 #include "render/renderer.h"
 
@@ -15,10 +16,7 @@ void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camer
     *camera = view->camera;
     camera->width *= side;
     camera->height *= side;
-    camera->fx *= side;
-    camera->fy *= side;
-    camera->cx *= side;
-    camera->cy *= side;
+    spl_camera_scale(camera, side, side);
 }
 
 int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint64_t samples, struct spl_error *err)

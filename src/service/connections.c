@@ -1,6 +1,8 @@
 /* Connections and how long they may take. Each phase has a time limit of its own, which trickling bytes does not
  * extend: libmicrohttpd's own limit is about silence only. A connection that is too slow is shut down here, and
  * libmicrohttpd then sees it closed. Owned by the loop's thread. */
+#include "service/http.h"
+
 #include <poll.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
@@ -8,6 +10,8 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/ops/counters.h"
 #include "service/state.h"
 
 enum { slow_sweep_ms = 500 };
@@ -39,7 +43,7 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
         if (connection->request)
             spl_request_finish(connection->request, MHD_REQUEST_TERMINATED_WITH_ERROR);
         LIST_REMOVE(connection, link);
-        service->connections_open--;
+        service->http->connections_open--;
         free(connection);
         return;
     }
@@ -49,8 +53,8 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
     connection->service = service;
     connection->fd = info->connect_fd;
     spl_connection_enter(connection, PHASE_READING);
-    LIST_INSERT_HEAD(&service->connections, connection, link);
-    service->connections_open++;
+    LIST_INSERT_HEAD(&service->http->connections, connection, link);
+    service->http->connections_open++;
     *socket_context = connection;
 }
 
@@ -70,14 +74,14 @@ static void on_slow_timer(uv_timer_t *timer)
     struct spl_service *service = timer->data;
     uint64_t now = spl_now_ns();
     struct connection *connection;
-    LIST_FOREACH(connection, &service->connections, link)
+    LIST_FOREACH(connection, &service->http->connections, link)
     {
         bool hurry = service->draining && connection->phase == PHASE_READING;
         if (has_ended_early(connection))
             shutdown(connection->fd, SHUT_RDWR);
         if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
             continue;
-        spl_count(&service->counters, slow_closed);
+        spl_count(service->counters, slow_closed);
         shutdown(connection->fd, SHUT_RDWR);
         connection->since_ns = now;
     }
@@ -85,5 +89,5 @@ static void on_slow_timer(uv_timer_t *timer)
 
 void spl_connections_watch(struct spl_service *service)
 {
-    uv_timer_start(&service->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);
+    uv_timer_start(&service->http->slow_timer, on_slow_timer, slow_sweep_ms, slow_sweep_ms);
 }

@@ -13,7 +13,9 @@
 #include <string.h>
 #include <strings.h>
 
-#include "service/state.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
 
 struct framing {
     const char *begin, *end; /* of the request, as libmicrohttpd has cut it into strings; NULL: it is not known to */

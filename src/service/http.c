@@ -6,14 +6,21 @@
  * suspended request is in `waiting`, or has a change; libmicrohttpd 0.9.75 goes on with what lies in its buffer (the
  * next chunk, the end of the body) though the request was suspended a moment ago, and nothing is taken then: it asks
  * again once it is resumed. Owned by the loop's thread. */
+#include "service/http.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "base/array.h"
 #include "base/clock.h"
 #include "base/memory.h"
 #include "service/access/door.h"
+#include "service/datasets/library.h"
+#include "service/exchange.h"
+#include "service/ops/ops.h"
+#include "service/reply.h"
 #include "service/state.h"
 
 enum { drain_max = 8 * body_max, idle_s = 30 };
@@ -45,10 +52,10 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
         *mark = '\0';
         request->query = mark + 1;
     }
-    request->number = spl_count(&service->counters, requests) + 1;
+    request->number = spl_count(service->counters, requests) + 1;
     spl_request_set_id(request, NULL);
     spl_connection_enter(request->connection, PHASE_READING);
-    service->requests_open++;
+    service->http->requests_open++;
     spl_refuse_many_parameters(request, uri);
     return request;
 }
@@ -60,7 +67,7 @@ void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode
     spl_change_abandon(request);
     request->connection->request = NULL;
     spl_connection_enter(request->connection, PHASE_IDLE);
-    request->service->requests_open--;
+    request->service->http->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
     free(request->body);
@@ -80,7 +87,7 @@ static void on_completed(void *context, struct MHD_Connection *handle, void **re
 
 static void count_reply(struct request *request)
 {
-    struct spl_counters *counters = &request->service->counters;
+    struct spl_counters *counters = request->service->counters;
     if (request->status < 300)
         spl_count(counters, replies_2xx);
     else if (request->status < 500)
@@ -99,7 +106,7 @@ static void prepare_reply(struct request *request)
     MHD_add_response_header(request->response, "X-Content-Type-Options", "nosniff");
     spl_door_add_cors(request);
     count_reply(request);
-    spl_latency_observe(&request->service->latencies, request->route, SPL_LATENCY_REQUEST,
+    spl_latency_observe(&request->service->ops->latencies, request->route, SPL_LATENCY_REQUEST,
                         (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_S);
     spl_connection_enter(request->connection, PHASE_WRITING);
 }
@@ -122,16 +129,8 @@ static bool append_body(struct request *request, const char *data, size_t length
     request->body_seen += length;
     if (request->body_seen > body_max)
         return request->body_seen <= drain_max;
-    if (request->body_seen > request->body_capacity) {
-        size_t capacity = request->body_capacity ? request->body_capacity : 4096;
-        while (capacity < request->body_seen)
-            capacity *= 2;
-        char *grown = spl_realloc(request->body, capacity, 1, NULL);
-        if (!grown)
-            return false;
-        request->body = grown;
-        request->body_capacity = capacity;
-    }
+    if (spl_array_reserve(request->body, request->body_capacity, request->body_seen, NULL))
+        return false;
     memcpy(request->body + request->body_length, data, length);
     request->body_length += length;
     return true;
@@ -236,6 +235,23 @@ void spl_request_resume(struct request *request)
     MHD_resume_connection(request->handle);
 }
 
+void spl_http_turns_init(struct spl_http_turns *turns, struct spl_service *service)
+{
+    uv_timer_init(&service->loop, &turns->timer);
+    uv_idle_init(&service->loop, &turns->again);
+    turns->timer.data = turns->again.data = service;
+}
+
+void spl_http_init(struct spl_service *service)
+{
+    struct spl_http *http = service->http;
+    http->listen_fd = -1;
+    spl_http_turns_init(&http->turns, service);
+    uv_timer_init(&service->loop, &http->wait_timer);
+    uv_timer_init(&service->loop, &http->slow_timer);
+    http->wait_timer.data = http->slow_timer.data = service;
+}
+
 static void on_timer(uv_timer_t *timer)
 {
     spl_http_pump(timer->data);
@@ -276,32 +292,34 @@ void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_ti
 
 void spl_http_pump(struct spl_service *service)
 {
-    if (service->daemon)
-        spl_http_run(service->daemon, &service->http_turns, on_timer, on_again);
+    struct spl_http *http = service->http;
+    if (http->daemon)
+        spl_http_run(http->daemon, &http->turns, on_timer, on_again);
 }
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)
 {
-    service->daemon = MHD_start_daemon(
+    struct spl_http *http = service->http;
+    http->daemon = MHD_start_daemon(
         MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET,
-        service->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
+        http->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
         service, MHD_OPTION_NOTIFY_CONNECTION, spl_connection_notify, service, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)service->options->connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
         (unsigned)service->options->connections_per_address, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)connection_pool, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1,
         MHD_OPTION_END);
-    if (!service->daemon)
+    if (!http->daemon)
         return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start");
-    const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->daemon, MHD_DAEMON_INFO_EPOLL_FD);
-    int rc = info ? uv_poll_init(&service->loop, &service->http_poll, info->epoll_fd) : UV_EINVAL;
-    service->listen_fd = -1; // MHD closes it
+    const union MHD_DaemonInfo *info = MHD_get_daemon_info(http->daemon, MHD_DAEMON_INFO_EPOLL_FD);
+    int rc = info ? uv_poll_init(&service->loop, &http->poll, info->epoll_fd) : UV_EINVAL;
+    http->listen_fd = -1; // MHD closes it
     if (rc) {
-        MHD_stop_daemon(service->daemon);
-        service->daemon = NULL;
+        MHD_stop_daemon(http->daemon);
+        http->daemon = NULL;
         return spl_fail(err, SPL_E_IO, "the loop cannot poll libmicrohttpd: %s", uv_strerror(rc));
     }
-    service->http_poll.data = service;
-    uv_poll_start(&service->http_poll, UV_READABLE, on_poll);
+    http->poll.data = service;
+    uv_poll_start(&http->poll, UV_READABLE, on_poll);
     spl_connections_watch(service);
     spl_http_pump(service);
     return 0;
@@ -309,19 +327,21 @@ int spl_http_start(struct spl_service *service, struct spl_error *err)
 
 void spl_http_quiesce(struct spl_service *service)
 {
-    if (!service->daemon)
+    struct spl_http *http = service->http;
+    if (!http->daemon)
         return;
     spl_http_pump(service); // what is in the backlog is still served
-    int fd = MHD_quiesce_daemon(service->daemon);
+    int fd = MHD_quiesce_daemon(http->daemon);
     if (fd >= 0)
         close(fd);
 }
 
 void spl_http_stop(struct spl_service *service)
 {
-    if (!service->daemon)
+    struct spl_http *http = service->http;
+    if (!http->daemon)
         return;
-    uv_close((uv_handle_t *)&service->http_poll, NULL);
-    MHD_stop_daemon(service->daemon);
-    service->daemon = NULL;
+    uv_close((uv_handle_t *)&http->poll, NULL);
+    MHD_stop_daemon(http->daemon);
+    http->daemon = NULL;
 }

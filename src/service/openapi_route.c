@@ -4,7 +4,8 @@
 
 #include "openapi_json.h"
 #include "openapi_yaml.h"
-#include "service/state.h"
+#include "service/pages.h"
+#include "service/reply.h"
 
 void spl_show_openapi_yaml(struct request *request, const struct spl_call *call)
 {

@@ -3,9 +3,14 @@
  * pool between requests, so all of it is resident on every idle connection and costs time with every request: it is
  * small. Owned by the loop's thread. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
 #include "service/state.h"
 
 enum {
@@ -15,29 +20,25 @@ enum {
 };
 
 /* libmicrohttpd 0.9.75 falls silent when the parameters of a query, or a reply's headers, do not fit what is left of
- * its pool, so such a request is answered past it, right on the socket, and the connection ended. `detail` needs no
- * quoting.
- */
+ * its pool, so such a request is answered past it, right on the socket, and the connection ended. Without memory it
+ * ends without an answer. */
 void spl_refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
 {
-    char text[512], reply[sizeof text + 256];
-    const char *title = MHD_get_reason_phrase_for(status);
-    int length =
-        snprintf(text, sizeof text,
-                 "{\"type\": \"urn:splatd:error:limit\", \"title\": \"%s\", \"status\": %u, \"detail\": \"%s\", "
-                 "\"instance\": \"urn:splatd:request:%s\", \"field\": \"%s\"}",
-                 title, status, detail, request->id, field);
-    if (!strcmp(request->method, MHD_HTTP_METHOD_HEAD))
-        text[0] = '\0'; // its length is told all the same
-    length = snprintf(reply, sizeof reply,
-                      "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                      "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %d\r\n\r\n%s",
-                      status, title, request->id, length, text);
+    bool head = !strcmp(request->method, MHD_HTTP_METHOD_HEAD); // the body's length is told all the same
+    char *text = spl_problem_print(request, status, "limit", field, detail), *reply = NULL;
+    int length = !text ? -1
+                       : asprintf(&reply,
+                                  "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
+                                  "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %zu\r\n\r\n%s",
+                                  status, MHD_get_reason_phrase_for(status), request->id, strlen(text),
+                                  head ? "" : text);
     request->status = status;
     request->abandoned = true;
-    if (send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
-        spl_count(&request->service->counters, replies_4xx);
+    if (length > 0 && send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)
+        spl_count(request->service->counters, replies_4xx);
     shutdown(request->connection->fd, SHUT_RDWR);
+    free(length < 0 ? NULL : reply);
+    free(text);
 }
 
 void spl_refuse_many_parameters(struct request *request, const char *uri)

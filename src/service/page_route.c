@@ -4,12 +4,15 @@
  * asked about every time (no-cache), so that a new daemon never meets an old page. The page may load what the daemon
  * serves and nothing else; only /embed/ may be framed, and only what is under /clients/ may be loaded by other origins.
  * Owned by the loop's thread. */
+#include "service/pages.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
-#include "service/state.h"
+#include "service/exchange.h"
+#include "service/reply.h"
 
 struct asset {
     const char *name, *type, *etag;

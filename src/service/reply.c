@@ -1,20 +1,18 @@
-/* Replies: JSON, RFC 9457 problems, and encoded views with the headers that say what their pixels mean.
- *
- * Bytes of a view are handed to MHD as they came from the encoder, without a copy. Owned by the loop's thread. */
+/* Replies: JSON, RFC 9457 problems, text, and what has no length yet. A problem's status and Retry-After follow from
+ * its error. Owned by the loop's thread. */
+#include "service/reply.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "base/log.h"
-#include "base/memory.h"
-#include "service/headers.h"
+#include "service/exchange.h"
+#include "service/ops/access_log.h"
 #include "service/state.h"
+#include "service/view/views.h"
 
-static void header(struct request *request, const char *name, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-static void header(struct request *request, const char *name, const char *format, ...)
+void spl_reply_add_header(struct request *request, const char *name, const char *format, ...)
 {
     char text[1024];
     va_list args;
@@ -35,7 +33,7 @@ static void set_text(struct request *request, unsigned status, const char *type,
     if (!request->response)
         free(body);
     else
-        header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
 }
 
 void spl_reply_empty(struct request *request, unsigned status)
@@ -70,8 +68,8 @@ static json_t *outside_text(const char *text)
     return json_string(plain);
 }
 
-static char *problem_text(const struct request *request, unsigned status, const char *type, const char *field,
-                          const char *detail)
+char *spl_problem_print(const struct request *request, unsigned status, const char *type, const char *field,
+                        const char *detail)
 {
     json_t *json = json_pack("{s:o, s:s, s:i, s:o, s:o}", "type", json_sprintf("urn:splatd:error:%s", type), "title",
                              MHD_get_reason_phrase_for(status), "status", (int)status, "detail", outside_text(detail),
@@ -96,13 +94,14 @@ static unsigned status_of(const struct request *request, const struct spl_error 
 
 char *spl_problem_text(const struct request *request, const struct spl_error *err)
 {
-    return problem_text(request, status_of(request, err), spl_code_get_info(err->code)->name, err->field, err->message);
+    return spl_problem_print(request, status_of(request, err), spl_code_get_info(err->code)->name, err->field,
+                             err->message);
 }
 
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail)
 {
-    set_text(request, status, "application/problem+json", problem_text(request, status, type, field, detail));
+    set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
 }
 
 void spl_reply_error(struct request *request, const struct spl_error *err)
@@ -113,97 +112,8 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
         spl_log_error("request %s: %s", request->id, err->message);
     spl_reply_problem(request, status, info->name, err->field, err->message);
     if (request->response && info->retry)
-        header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u", 
-               spl_pipeline_get_retry_after(request->service->pipeline, request->large));
-}
-
-static void add_headers(struct request *request, const char *text)
-{
-    for (const char *name = text, *value; (value = spl_headers_value(name)); name = spl_headers_next(value))
-        MHD_add_response_header(request->response, name, value);
-}
-
-static void add_validator(struct request *request, const struct spl_key *key)
-{
-    char etag[SPL_ETAG_BYTES];
-    spl_key_etag(key, etag);
-    MHD_add_response_header(request->response, MHD_HTTP_HEADER_ETAG, etag);
-    // what not everybody may see is kept by clients, not by proxies
-    const char *forever =
-        request->service->access ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable";
-    MHD_add_response_header(request->response, MHD_HTTP_HEADER_CACHE_CONTROL,
-                            request->versioned ? forever : "no-cache");
-}
-
-static void release_rendering(void *rendering)
-{
-    spl_rendering_unref(rendering);
-}
-
-void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin)
-{
-    struct spl_encoded *encoded = &rendering->encoded;
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback_cls(encoded->length, encoded->bytes,
-                                                                               release_rendering, rendering);
-    if (!request->response)
-        return;
-    spl_rendering_ref(rendering);
-    add_headers(request, rendering->headers);
-    if (!strcmp(origin, "hit"))
-        header(request, "Server-Timing", "cache, total;dur=%.3f",
-               (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
-    else
-        header(request, "Server-Timing", "%s, total;dur=%.3f", rendering->timing,
-               (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
-    header(request, "Splatd-Cache", "%s", origin);
-    if (!rendering->reusable)
-        header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
-    else if (request->validated)
-        add_validator(request, &rendering->key);
-}
-
-/* The bytes of a batch on their way to a client. */
-struct outgoing {
-    struct spl_service *service;
-    struct spl_encoded bundle;
-};
-
-static void release_outgoing(void *context)
-{
-    struct outgoing *outgoing = context;
-    outgoing->service->reply_bytes -= outgoing->bundle.length;
-    spl_encoded_finish(&outgoing->bundle);
-    free(outgoing);
-}
-
-void spl_reply_bundle(struct request *request, struct spl_encoded *bundle, size_t failed)
-{
-    struct outgoing *outgoing = spl_alloc(1, sizeof *outgoing, NULL);
-    if (!outgoing)
-        return;
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback_cls(bundle->length, bundle->bytes,
-                                                                               release_outgoing, outgoing);
-    if (!request->response) {
-        free(outgoing);
-        return;
-    }
-    *outgoing = (struct outgoing){request->service, *bundle};
-    *bundle = (struct spl_encoded){0};
-    request->service->reply_bytes += outgoing->bundle.length;
-    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", outgoing->bundle.media_type);
-    header(request, "Server-Timing", "total;dur=%.3f", (double)(spl_now_ns() - request->began_ns) / SPL_NS_PER_MS);
-    header(request, "Splatd-Failed", "%zu", failed);
-    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
-}
-
-void spl_reply_not_modified(struct request *request, const struct spl_key *key)
-{
-    request->status = MHD_HTTP_NOT_MODIFIED;
-    request->response = MHD_create_response_from_buffer(0, NULL, MHD_RESPMEM_PERSISTENT);
-    if (request->response)
-        add_validator(request, key);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u",
+                             spl_pipeline_get_retry_after(request->service->views->pipeline, request->large));
 }
 
 void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,
@@ -215,28 +125,4 @@ void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCa
     // chunks it closes the connection
     if (request->response && request->head)
         MHD_set_response_options(request->response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
-}
-
-static ssize_t read_nothing(void *context, uint64_t position, char *buffer, size_t size)
-{
-    (void)context;
-    (void)position;
-    (void)buffer;
-    (void)size;
-    return MHD_CONTENT_READER_END_OF_STREAM;
-}
-
-void spl_reply_view_head(struct request *request, const struct spl_view_request *view, const struct spl_key *key)
-{
-    struct spl_headers headers;
-    spl_headers_open(&headers);
-    spl_headers_add_view(&headers, view, NULL);
-    if (!spl_headers_close(&headers))
-        return;
-    spl_reply_stream(request, 16, read_nothing, NULL, NULL); // a GET's length is known only once it is rendered
-    if (request->response) {
-        add_headers(request, headers.text);
-        add_validator(request, key);
-    }
-    free(headers.text);
 }

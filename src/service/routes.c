@@ -5,8 +5,15 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "service/access/access.h"
+#include "service/datasets/library.h"
+#include "service/exchange.h"
+#include "service/ops/ops.h"
+#include "service/pages.h"
+#include "service/reply.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
 
 static const char *const methods[] = {[SPL_GET] = MHD_HTTP_METHOD_GET,
                                       [SPL_POST] = MHD_HTTP_METHOD_POST,
@@ -26,11 +33,11 @@ static void index_page(struct request *request, const struct spl_call *call)
         spl_show_page(request);
         return;
     }
-    struct spl_service *service = request->service;
+    const struct spl_catalog *catalog = &request->service->library->catalog;
     json_t *views = json_array();
-    for (size_t i = 0; i < service->catalog.count; i++)
-        if (service->catalog.slots[i].current && spl_access_may_see(request, service->catalog.slots[i].id))
-            json_array_append_new(views, json_sprintf("%s/view", service->catalog.slots[i].current->uri));
+    for (size_t i = 0; i < catalog->count; i++)
+        if (catalog->slots[i].current && spl_access_may_see(request, catalog->slots[i].id))
+            json_array_append_new(views, json_sprintf("%s/view", catalog->slots[i].current->uri));
     spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version",
                                       SPLATD_VERSION, "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets",
                                       "/v1/datasets", "status", "/v1/status", "views", views));
@@ -41,7 +48,7 @@ static void index_page(struct request *request, const struct spl_call *call)
 static void list_datasets(struct request *request, const struct spl_call *call)
 {
     (void)call;
-    struct spl_catalog *catalog = &request->service->catalog;
+    const struct spl_catalog *catalog = &request->service->library->catalog;
     json_t *list = json_array();
     for (size_t i = 0; i < catalog->count; i++)
         if (spl_access_may_see(request, catalog->slots[i].id))
@@ -194,7 +201,7 @@ static void enter(struct request *request, const struct route *route, enum spl_h
         return;
     if (request->query[0] && (method == SPL_POST || !route->query))
         refuse_query(request, method);
-    else if (find(&request->service->catalog, route->scope, &call, &err))
+    else if (find(&request->service->library->catalog, route->scope, &call, &err))
         spl_reply_error(request, &err);
     else
         route->handle(request, &call);

@@ -13,18 +13,31 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/access/access.h"
+#include "service/datasets/library.h"
+#include "service/exchange.h"
+#include "service/http.h"
 #include "service/listen.h"
 #include "service/ops/health.h"
 #include "service/ops/ops.h"
 #include "service/ops/supervisor.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
+
+/* The service and its rooms in one piece. */
+struct house {
+    struct spl_service service;
+    struct spl_http http;
+    struct spl_views views;
+    struct spl_library library;
+    struct spl_ops ops;
+};
 
 enum {
     drain_check_ms = 20,
@@ -41,7 +54,7 @@ static void on_drain_timer(uv_timer_t *timer)
         spl_waiting_refuse_all(service);
         spl_change_refuse_all(service);
         uv_stop(&service->loop);
-    } else if (elapsed_ms >= drain_least_ms && !service->requests_open) {
+    } else if (elapsed_ms >= drain_least_ms && !service->http->requests_open) {
         uv_stop(&service->loop);
     }
 }
@@ -52,7 +65,7 @@ static void drain(struct spl_service *service)
         return;
     service->draining = true;
     service->drain_began_ns = spl_now_ns();
-    if (!service->daemon) {
+    if (!service->http->daemon) {
         uv_stop(&service->loop);
         return;
     }
@@ -95,11 +108,11 @@ static void on_signal(uv_signal_t *handle, int number)
         _exit(1);
     service->leaving = true;
     spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
-                 service->requests_open);
+                 service->http->requests_open);
     spl_supervisor_say_stopping("finishing what runs");
-    if (service->loading)
+    if (service->library->loading)
         _exit(0); // loading.c
-    if (service->options->drain_delay_ms && service->daemon)
+    if (service->options->drain_delay_ms && service->http->daemon)
         uv_timer_start(&service->drain_timer, on_leave, service->options->drain_delay_ms, 0);
     else
         drain(service);
@@ -113,51 +126,46 @@ static void on_hangup(uv_signal_t *handle, int number)
 
 static void announce(struct spl_service *service)
 {
+    const struct spl_catalog *catalog = &service->library->catalog;
     struct spl_pipeline_status status;
-    spl_pipeline_get_status(service->pipeline, &status);
+    spl_pipeline_get_status(service->views->pipeline, &status);
     spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
                  status.device.driver, status.device.software ? ", software" : "");
-    for (size_t i = 0; i < service->catalog.count; i++) {
-        const struct spl_catalog_entry *entry = service->catalog.slots[i].current;
+    for (size_t i = 0; i < catalog->count; i++) {
+        const struct spl_catalog_entry *entry = catalog->slots[i].current;
         if (entry)
             spl_log_info("dataset %s: %llu splats, %llu bytes, %s/view", entry->info->id,
                          (unsigned long long)entry->info->splats, (unsigned long long)entry->info->file_bytes,
                          entry->uri);
     }
-    if (!service->catalog.count)
+    if (!catalog->count)
         spl_log_warn("no dataset yet; 'splatd pack' makes one");
-    spl_log_info("listening on %s", service->url);
+    spl_log_info("listening on %s", service->http->url);
     spl_log_info("ready");
     char line[SPL_DEVICE_NAME_MAX + 64];
     snprintf(line, sizeof line, "rendering on %s%s", status.device.name, status.device.software ? " (software)" : "");
     spl_supervisor_say_ready(line);
-    service->said_state = SPL_PIPELINE_READY;
+    service->ops->said_state = SPL_PIPELINE_READY;
 }
 
 static void on_wake(uv_async_t *handle)
 {
     struct spl_service *service = handle->data;
-    enum spl_pipeline_state state = spl_pipeline_get_state(service->pipeline);
+    enum spl_pipeline_state state = spl_pipeline_get_state(service->views->pipeline);
     spl_library_take_changes(service); // first, so that what does not fit is not announced
-    if (state == SPL_PIPELINE_READY && !service->daemon && !service->draining) {
+    if (state == SPL_PIPELINE_READY && !service->http->daemon && !service->draining) {
         if (spl_http_start(service, &service->failure))
             drain(service);
         else
             announce(service);
         spl_library_start(service);
     }
-    spl_waiting_complete(service);
+    spl_views_complete(service);
     spl_tours_pump(service->tours);
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
-        service->failure = *spl_pipeline_get_failure(service->pipeline);
+        service->failure = *spl_pipeline_get_failure(service->views->pipeline);
         drain(service);
     }
-}
-
-static void wake(void *context)
-{
-    struct spl_service *service = context;
-    uv_async_send(&service->wake);
 }
 
 /* Every connection is a descriptor. */
@@ -178,22 +186,15 @@ static void raise_descriptor_limit(const struct spl_service_options *options)
 static int init_loop(struct spl_service *service, struct spl_error *err)
 {
     static const int numbers[] = {SIGTERM, SIGINT};
-    uv_timer_t *timers[] = {&service->http_turns.timer, &service->wait_timer,    &service->slow_timer,
-                            &service->drain_timer,      &service->library.timer, &service->look_timer,
-                            &service->ops_turns.timer};
     int rc = uv_loop_init(&service->loop);
     if (rc)
         return spl_fail(err, SPL_E_IO, "cannot make an event loop: %s", uv_strerror(rc));
-    spl_loop_turns_watch(&service->loop_turns, &service->loop);
+    spl_ops_init(service);
     uv_async_init(&service->loop, &service->wake, on_wake);
-    service->wake.data = service;
-    for (size_t i = 0; i < sizeof timers / sizeof *timers; i++) {
-        uv_timer_init(&service->loop, timers[i]);
-        timers[i]->data = service;
-    }
-    uv_idle_init(&service->loop, &service->http_turns.again);
-    uv_idle_init(&service->loop, &service->ops_turns.again);
-    service->http_turns.again.data = service->ops_turns.again.data = service;
+    uv_timer_init(&service->loop, &service->drain_timer);
+    service->wake.data = service->drain_timer.data = service;
+    spl_http_init(service);
+    spl_library_init(service);
     for (size_t i = 0; i < 2; i++) {
         uv_signal_init(&service->loop, &service->signals[i]);
         service->signals[i].data = service;
@@ -219,31 +220,6 @@ static void finish_loop(struct spl_service *service)
     uv_walk(&service->loop, close_handle, NULL);
     uv_run(&service->loop, UV_RUN_DEFAULT);
     uv_loop_close(&service->loop);
-}
-
-static int start_pipeline(struct spl_service *service, struct spl_error *err)
-{
-    struct spl_catalog_entry **entries = service->entries = spl_alloc(service->catalog.count, sizeof *entries, err);
-    size_t count = 0;
-    if (!entries)
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < service->catalog.count; i++)
-        if (service->catalog.slots[i].current)
-            entries[count++] = service->catalog.slots[i].current;
-    struct spl_pipeline_options options = {
-        .renderer = {.device = service->options->device,
-                     .require_gpu = service->options->require_gpu,
-                     .memory_limit = service->options->memory_limit},
-        .entries = entries,
-        .entry_count = count,
-        .queue = service->options->queue,
-        .encoders = service->options->encoders,
-        .samples_max = 4 * service->options->samples_max,
-        .counters = &service->counters,
-        .wake = wake,
-        .wake_context = service,
-    };
-    return spl_pipeline_create(&options, &service->pipeline, err);
 }
 
 /* Where tours go must be a folder that can be written, or one that open.c can make, or datasets are loaded in vain. */
@@ -273,45 +249,46 @@ static int check(struct spl_service *service, struct spl_error *err)
     int fds[SPL_SUPERVISOR_SOCKETS], rc = spl_service_options_check(service->options, err);
     if (rc || (rc = check_folder(service->options->tours, err)) || (rc = spl_supervisor_take_sockets(fds, err)))
         return rc;
-    service->listen_fd = fds[0];
-    service->ops_fd = fds[1];
+    service->http->listen_fd = fds[0];
+    service->ops->listen_fd = fds[1];
     return spl_access_init(service, err);
 }
 
 /* The sockets that the supervisor has bound, or our own. */
 static int open_sockets(struct spl_service *service, struct spl_error *err)
 {
+    struct spl_http *http = service->http;
     int rc = spl_ops_start(service, err);
     if (rc)
         return rc;
-    if (service->listen_fd < 0)
-        return spl_listen("listen", service->options->listen, &service->listen_fd, service->url, sizeof service->url,
-                          err);
-    spl_listen_print(service->listen_fd, service->url, sizeof service->url);
+    if (http->listen_fd < 0)
+        return spl_listen("listen", service->options->listen, &http->listen_fd, http->url, sizeof http->url, err);
+    spl_listen_print(http->listen_fd, http->url, sizeof http->url);
     return 0;
 }
 
 int spl_service_go_on(struct spl_service *service, struct spl_error *err)
 {
-    const struct spl_service_options *options = service->options;
-    int rc = spl_cache_create(options->cache_bytes, &service->cache, err);
     spl_tours_start(service->tours);
-    return rc ? rc : start_pipeline(service, err);
+    return spl_views_start(service, err);
 }
 
 int spl_service_run(const struct spl_service_options *options, struct spl_error *err)
 {
-    struct spl_service *service = spl_alloc(1, sizeof *service, err);
-    if (!service)
+    struct house *house = spl_alloc(1, sizeof *house, err);
+    if (!house)
         return SPL_E_NOMEM;
-    service->options = options;
-    service->listen_fd = service->ops_fd = -1;
-    service->started_ns = spl_now_ns();
-    service->started_unix_s = (double)time(NULL);
+    struct spl_service *service = &house->service;
+    *service = (struct spl_service){.options = options,
+                                    .counters = &house->ops.counters,
+                                    .http = &house->http,
+                                    .views = &house->views,
+                                    .library = &house->library,
+                                    .ops = &house->ops};
     raise_descriptor_limit(options);
     int rc = init_loop(service, err);
     if (rc)
-        goto free_service;
+        goto free_house;
     if ((rc = check(service, err)) || (rc = open_sockets(service, err)) || (rc = spl_loading_start(service, err)))
         goto done;
     spl_health_watch(service);
@@ -326,17 +303,15 @@ done:
     spl_ops_stop(service);
     spl_tours_stop(service->tours);
     spl_library_stop(service);
-    spl_catalog_finish(&service->catalog); // before the pipeline, which lets go of what nobody refers to
-    spl_pipeline_destroy(service->pipeline);
-    spl_cache_destroy(service->cache);
-    free(service->entries);
+    spl_catalog_finish(&service->library->catalog); // before the pipeline, which lets go of what nobody refers to
+    spl_views_finish(service);
     spl_access_finish(service);
-    if (service->listen_fd >= 0)
-        close(service->listen_fd);
+    if (service->http->listen_fd >= 0)
+        close(service->http->listen_fd);
     finish_loop(service);
     spl_tours_close(service->tours);
     end_in(service, 0);
-free_service:
-    free(service);
+free_house:
+    free(house);
     return rc;
 }

@@ -4,29 +4,26 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "synth/random.h"
 #include "synth/vector.h"
 
 uint32_t spl_build_object(struct spl_scene *scene, const char *name)
 {
-    const char **grown = spl_realloc(scene->objects, scene->object_count + 1, sizeof *grown, &scene->error);
-    if (!grown)
+    if (spl_array_reserve(scene->objects, scene->object_capacity, scene->object_count + 1, &scene->error))
         return 0;
-    scene->objects = grown;
-    grown[scene->object_count] = name;
+    scene->objects[scene->object_count] = name;
     return (uint32_t)scene->object_count++;
 }
 
 void spl_build_station(struct spl_scene *scene, const double position[3], double yaw, double tilt)
 {
-    struct spl_station *grown = spl_realloc(scene->stations, scene->station_count + 1, sizeof *grown, &scene->error);
-    if (!grown)
+    if (spl_array_reserve(scene->stations, scene->station_capacity, scene->station_count + 1, &scene->error))
         return;
-    scene->stations = grown;
     double cy = cos(yaw * M_PI / 180), sy = sin(yaw * M_PI / 180);
     double ct = cos(tilt * M_PI / 180), st = sin(tilt * M_PI / 180);
-    grown[scene->station_count++] = (struct spl_station){
+    scene->stations[scene->station_count++] = (struct spl_station){
         .position = {position[0], position[1], position[2]},
         .rotation = {cy, -sy * ct, sy * st, sy, cy * ct, -cy * st, 0, st, ct},
     };
@@ -51,15 +48,8 @@ void spl_build_track(struct spl_scene *scene, const double (*points)[3], size_t 
 
 static void add(struct spl_scene *scene, const struct spl_primitive *primitive)
 {
-    if (scene->primitive_count == scene->primitive_capacity) {
-        size_t capacity = scene->primitive_capacity ? 2 * scene->primitive_capacity : 1024;
-        struct spl_primitive *grown = spl_realloc(scene->primitives, capacity, sizeof *grown, &scene->error);
-        if (!grown)
-            return;
-        scene->primitives = grown;
-        scene->primitive_capacity = capacity;
-    }
-    scene->primitives[scene->primitive_count++] = *primitive;
+    if (!spl_array_reserve(scene->primitives, scene->primitive_capacity, scene->primitive_count + 1, &scene->error))
+        scene->primitives[scene->primitive_count++] = *primitive;
 }
 
 /* A primitive around `normal`, which need not be unit; its length is kept in .length. */

@@ -143,7 +143,6 @@ unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_g
             continue;
         }
         spl_footprint_color(scene, grid, pass, column, row, hit, place.color);
-        spl_footprint_color(scene, grid, pass, column, row, hit, place.color);
         if (mixing)
             mix(scanner, hits + first, last - first, return_key, &place);
         if (faults->noise > 0)

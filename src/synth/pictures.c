@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <jansson.h>
+
 #include "base/clock.h"
 #include "base/memory.h"
 #include "synth/exact.h"
@@ -174,16 +176,16 @@ static int write_photos(struct run *r, struct spl_error *err)
     return write_text(r, &poses, "images", "txt", result, err);
 }
 
-static void print_numbers(FILE *out, const char *key, const double *values, int count)
+static json_t *numbers(const double *values, int count)
 {
-    fprintf(out, "\"%s\": [", key);
+    json_t *list = json_array();
     for (int i = 0; i < count; i++)
-        fprintf(out, "%s%.17g", i ? ", " : "", values[i]);
-    fprintf(out, "]");
+        json_array_append_new(list, json_real(values[i]));
+    return list;
 }
 
 static int write_panorama(struct run *r, const char *name, const double position[3], const double rotation[9],
-                          FILE *poses, struct spl_error *err)
+                          json_t *poses, struct spl_error *err)
 {
     const struct spl_pictures_options *o = r->options;
     struct spl_image images[SPL_LAYER_COUNT];
@@ -191,13 +193,12 @@ static int write_panorama(struct run *r, const char *name, const double position
     double world[3];
     for (int i = 0; i < 3; i++)
         world[i] = position[i] + r->scene->offset[i];
-    fprintf(poses, "%s\n  {\"name\": \"%s\", \"color\": \"%s.color.png\", \"range\": \"%s.range.npy\", ",
-            r->done ? "," : "", name, name, name);
-    fprintf(poses, "\"width\": %u, \"height\": %u,\n   ", lens.width, lens.height);
-    print_numbers(poses, "position", world, 3);
-    fprintf(poses, ", ");
-    print_numbers(poses, "rotation", rotation, 9);
-    fprintf(poses, "}");
+    json_t *pose = json_pack("{s:s, s:o, s:o, s:i, s:i, s:o, s:o}", "name", name, "color",
+                             json_sprintf("%s.color.png", name), "range", json_sprintf("%s.range.npy", name), "width",
+                             (int)lens.width, "height", (int)lens.height, "position", numbers(world, 3), "rotation",
+                             numbers(rotation, 9));
+    if (json_array_append_new(poses, pose))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a list of poses");
     int result = spl_exact_trace(r->scene, &lens, o->samples, o->threads, images, err);
     if (!result)
         result = write_image(r, name, "color.png", &images[SPL_LAYER_COLOR], SPL_FORMAT_PNG, err);
@@ -209,34 +210,39 @@ static int write_panorama(struct run *r, const char *name, const double position
     return result;
 }
 
+/* Takes the reference. */
+static int write_json(const struct run *r, json_t *json, const char *name, struct spl_error *err)
+{
+    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    int result = text ? write_bytes(r, name, "json", text, strlen(text), err)
+                      : spl_fail(err, SPL_E_NOMEM, "out of memory for a list of poses");
+    json_decref(json);
+    free(text);
+    return result;
+}
+
 static int write_panoramas(struct run *r, struct spl_error *err)
 {
+    static const char mapping[] =
+        "p = rotation * d + position (rotation row-major, panorama to world); a direction d has longitude = "
+        "atan2(d.y, d.x), latitude = asin(d.z / |d|), and lies at x = (1 - longitude / pi) * width / 2, y = (1/2 - "
+        "latitude / pi) * height; the first pixel's centre is x = 0.5, y = 0.5";
     static const double upright[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const struct spl_scene *scene = r->scene;
     bool tripods = scene->scanner.kind == SPL_SCANNER_TERRESTRIAL;
     size_t count = tripods ? scene->station_count : scene->camera_count;
-    struct text poses = {0};
+    json_t *poses = json_array();
     int result = begin(r, "panoramas", "panoramas", count, err);
-    if (!result)
-        result = open_text(&poses, err);
-    if (!result)
-        fprintf(
-            poses.stream,
-            "{\"mapping\": \"p = rotation * d + position (rotation row-major, panorama to world); a direction d has "
-            "longitude = atan2(d.y, d.x), latitude = asin(d.z / |d|), and lies at x = (1 - longitude / pi) * width / "
-            "2, "
-            "y = (1/2 - latitude / pi) * height; the first pixel's centre is x = 0.5, y = 0.5\",\n"
-            " \"panoramas\": [");
     for (size_t i = 0; i < count && !result; i++) {
         char name[32];
         snprintf(name, sizeof name, "station-%zu", i + 1);
-        result = tripods ? write_panorama(r, name, scene->stations[i].position, scene->stations[i].rotation,
-                                          poses.stream, err)
-                         : write_panorama(r, scene->cameras[i].name, scene->cameras[i].eye, upright, poses.stream, err);
+        result = tripods ? write_panorama(r, name, scene->stations[i].position, scene->stations[i].rotation, poses, err)
+                         : write_panorama(r, scene->cameras[i].name, scene->cameras[i].eye, upright, poses, err);
     }
     if (!result)
-        fprintf(poses.stream, "\n]}\n");
-    return write_text(r, &poses, "panoramas", "json", result, err);
+        return write_json(r, json_pack("{s:s, s:o}", "mapping", mapping, "panoramas", poses), "panoramas", err);
+    json_decref(poses);
+    return result;
 }
 
 static int check_against(const struct spl_pictures_options *o, const struct spl_scene *scene, struct spl_error *err)

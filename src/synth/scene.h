@@ -63,10 +63,10 @@ struct spl_scene {
     struct spl_bvh_node *nodes;   /* over the primitives once they are complete */
     const struct spl_material *materials; /* static */
     const char **objects;         /* names, static; an object's id is its index */
-    size_t object_count;
+    size_t object_count, object_capacity;
     struct spl_scanner scanner;
     struct spl_station *stations; /* what they are is the scanner's kind */
-    size_t station_count;
+    size_t station_count, station_capacity;
     struct spl_track_point *track; /* mobile: the trajectory, a polyline */
     size_t track_count;
     double offset[3];             /* world = scene + offset; whole metres */

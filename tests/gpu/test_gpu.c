@@ -102,9 +102,10 @@ static void refuses_devices_by_reason(void **state)
 {
     (void)state;
     struct spl_gpu *gpu;
-    char far_index[32];
+    char far_index[32], half_index[32];
     snprintf(far_index, sizeof far_index, "%s:999", device);
-    const char *const wrong[] = {"no such card", far_index, "vulkan:", "egl:x", "ffffffffffffffffffffffffffffffff"};
+    snprintf(half_index, sizeof half_index, "%s:0x", device);
+    const char *const wrong[] = {"no such card", far_index, half_index, "vulkan:", "egl:x", "ffffffffffffffffffffffffffffffff"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         struct spl_error err = {0};
         assert_int_equal(spl_gpu_open(&(struct spl_gpu_options){.device = wrong[i]}, &gpu, &err), SPL_E_NO_DEVICE);

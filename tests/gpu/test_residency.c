@@ -16,7 +16,7 @@
 enum { splats = 4000000, splats_beside = 400000, width = 96, height = 64 };
 
 static const char *device;
-static struct spl_dataset *dataset, *beside;
+static struct spl_dataset *dataset, *beside, *second, *third;
 
 static double uniform(void)
 {
@@ -199,6 +199,40 @@ static void preloading_leaves_others_where_they_are(void **state)
     spl_renderer_destroy(renderer);
 }
 
+/* Three datasets of a page each where two fit: the third takes the place of the one that was not drawn for longest. */
+static void who_was_drawn_longest_ago_gives_way(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_view view = looking(0, 0);
+    const struct spl_dataset *all[] = {beside, second, third};
+    struct spl_renderer *renderer = open_renderer(1ull << 30, &err);
+    struct spl_frame frame;
+    uint64_t page = spl_dataset_get_info(beside)->page_bytes, both = 0;
+    for (int round = 0; round < 2; round++) { /* once to see what two of them take */
+        assert_non_null(renderer);
+        for (int i = 0; i < 3; i++)
+            assert_int_equal(spl_renderer_add(renderer, all[i], &err), SPL_OK);
+        static const int order[] = {0, 1, 0, 2, 1};
+        for (int i = 0; i < (round ? 5 : 3); i++) {
+            if (spl_renderer_render(renderer, all[order[i]], &view, &frame, &err))
+                fail_msg("%s", err.message);
+            assert_true(frame.stats.complete);
+            assert_int_equal(frame.stats.pages_loaded, i != 2);
+            spl_frame_finish(&frame);
+            for (int k = 0; k < 3 && round; k++) {
+                static const bool there[5][3] = {{1, 0, 0}, {1, 1, 0}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}};
+                struct spl_residency_info info;
+                spl_renderer_get_residency(renderer, all[k], &info);
+                assert_int_equal(info.bytes > 0, there[i][k]);
+            }
+        }
+        both = spl_renderer_get_memory(renderer);
+        spl_renderer_destroy(renderer);
+        renderer = round ? NULL : open_renderer(both + page / 2, &err);
+    }
+}
+
 static void a_limit_below_the_scratch_is_refused_with_numbers(void **state)
 {
     (void)state;
@@ -229,15 +263,20 @@ int main(void)
     }
     dataset = make_dataset_levels(all, splats, 2);
     beside = make_dataset(all, splats_beside);
+    second = make_dataset(all, splats_beside);
+    third = make_dataset(all, splats_beside);
     free(all);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pages_come_and_go_within_the_limit),
         cmocka_unit_test(a_draw_list_that_grows_takes_the_place_of_others),
         cmocka_unit_test(pages_of_the_same_view_make_room_for_its_draw_list),
         cmocka_unit_test(preloading_leaves_others_where_they_are),
+        cmocka_unit_test(who_was_drawn_longest_ago_gives_way),
         cmocka_unit_test(a_limit_below_the_scratch_is_refused_with_numbers),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_dataset_close(third);
+    spl_dataset_close(second);
     spl_dataset_close(beside);
     spl_dataset_close(dataset);
     return failed;

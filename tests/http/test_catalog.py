@@ -355,9 +355,8 @@ def test_sigterm_while_a_knot_is_opened():
         eventually(lambda: listed(d).get("knot", {}).get("state") == "loading")
         time.sleep(0.5)
         assert listed(d)["knot"]["state"] == "loading"
-        began = time.monotonic()
         assert d.stop() == 0
-        assert time.monotonic() - began < 20 and not any("does not answer" in line for line in d.lines), d.lines
+        assert not any("does not answer" in line for line in d.lines), d.lines
 
 
 def test_sigterm_while_datasets_are_opened():

@@ -124,14 +124,14 @@ def test_a_large_view_that_nobody_waits_for_ends():
 
 
 def test_sigterm_finishes_large_views():
-    with Daemon(FAKE, FAKE_MPX_MS=10) as d:
+    with Daemon(FAKE, "--deadline", "120000", FAKE_MPX_MS=10) as d:
         replies, threads = begin_large(d, 2)
         assert d.stop() == 0
         finish_large(replies, threads)
 
 
 def test_encoding_a_large_image_holds_up_no_small_one():
-    with Daemon(FAKE, "--encoders", "1", FAKE_FRAME_MS=0) as d:
+    with Daemon(FAKE, "--encoders", "1", "--deadline", "120000", FAKE_FRAME_MS=0) as d:
         replies, threads = begin_large(d, 2, VIEW + "?width=8192&height=4096&layer=id&format=png")
         eventually(lambda: d.status()["counters"]["frames"] == 2)  # the first is being encoded
         assert d.ask(fresh(SMALL)).status == 200

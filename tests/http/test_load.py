@@ -1,6 +1,7 @@
 """More than the device can do, clients that leave or dawdle, a device that is lost, a daemon that is told to stop:
 every reply is 200 or says when to come back, and none is dropped."""
 import os
+import pathlib
 import re
 import signal
 import socket
@@ -10,6 +11,12 @@ import time
 from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
+
+
+def processor_s(d):
+    """What the daemon has taken of processors so far."""
+    fields = pathlib.Path(f"/proc/{d.process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def statuses(replies):
@@ -31,16 +38,14 @@ def test_a_full_queue_is_said_at_once():
             return reply
         got = statuses(together(12, ask))
         assert set(got) == {200, 503} and 3 <= got.count(200) <= 5, got
-        assert max(times[503]) < 0.19, times
+        assert max(times[503]) < max(times[200]), times  # 200 waited for two frames before it, 503 for none
         counters = d.status()["counters"]
         assert counters["refused_full"] == got.count(503) and counters["frames"] == got.count(200) + 1
 
 
 def test_the_deadline_ends_a_wait():
     with Daemon(FAKE, "--deadline", "300", FAKE_FRAME_MS=200) as d:
-        began = time.monotonic()
         got = statuses(together(6, lambda i: d.ask(fresh(SMALL))))
-        assert time.monotonic() - began < 1.5
         assert got.count(200) == 1 and got.count(503) == 5, got
         eventually(lambda: d.status()["queues"]["render"]["length"] == 0)
         status = d.status()
@@ -52,7 +57,8 @@ def test_a_frame_slower_than_the_deadline_ends_too():
     with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=5000) as d:
         assert d.post({"width": 16, "height": 16}).status == 503
         reply = d.ask(fresh(SMALL))
-        assert reply.status == 503 and "100 ms" in reply.json()["detail"] or "deadline" in reply.json()["detail"]
+        assert reply.status == 503 and reply.json()["type"] == "urn:splatd:error:timeout", reply.body
+        assert "deadline" in reply.json()["detail"], reply.body
 
 
 def test_work_of_clients_that_left_is_dropped():
@@ -68,12 +74,10 @@ def test_work_of_clients_that_left_is_dropped():
         eventually(lambda: d.status()["queues"]["render"]["length"] >= 7)
         for s in gone:
             s.close()
-        began = time.monotonic()
         assert d.ask(fresh(SMALL)).status == 200
-        assert time.monotonic() - began < 8 * 0.3, "frames were rendered for nobody"
         first.join()
         counters = d.status()["counters"]
-        assert counters["clients_left"] == 8 and counters["frames"] == 2, counters
+        assert counters["clients_left"] == 8 and counters["frames"] == 2, (counters, "frames were rendered for nobody")
 
 
 def lose_under_load(d, losses):
@@ -173,23 +177,22 @@ def test_sigterm_finishes_a_long_frame():
 
 
 def test_a_second_signal_ends_at_once():
-    d = Daemon(FAKE, FAKE_FRAME_MS=5000)
+    d = Daemon(FAKE, "--deadline", "600000", FAKE_FRAME_MS=500000)  # far longer than wait_exit() is patient
     s = socket.create_connection(("127.0.0.1", d.port))
     s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
     eventually(lambda: d.status()["counters"]["requests"] >= 2)
-    began = time.monotonic()
     d.process.send_signal(signal.SIGTERM)
     time.sleep(0.2)
     d.process.send_signal(signal.SIGTERM)
-    assert d.wait_exit() == 1 and time.monotonic() - began < 2
+    assert d.wait_exit() == 1
+    s.close()
 
 
 def test_slow_requests_are_cut_and_cost_nothing():
     with Daemon(FAKE) as d:
         slow = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(50)]
-        began = time.monotonic()
-        cut = 0
-        while cut < len(slow) and time.monotonic() - began < 25:
+        began, busy_s, cut = time.monotonic(), processor_s(d), 0
+        while cut < len(slow) and time.monotonic() - began < 60:
             cut = 0
             for s in slow:
                 try:
@@ -200,33 +203,32 @@ def test_slow_requests_are_cut_and_cost_nothing():
                     pass
                 except OSError:
                     cut += 1
-            reply_began = time.monotonic()
-            assert d.ask(fresh(SMALL)).status == 200 and time.monotonic() - reply_began < 1
+            assert d.ask(fresh(SMALL)).status == 200
             time.sleep(0.5)
+        took, busy_s = time.monotonic() - began, processor_s(d) - busy_s
         assert cut == len(slow), cut
-        assert 8 < time.monotonic() - began < 25
+        assert took > 8, "cut although they had time left"
+        assert busy_s < 0.2 * took, (busy_s, took)
         assert d.status()["counters"]["slow_closed"] >= len(slow)
 
 
 def test_idle_connections_do_not_stop_the_daemon():
-    with Daemon(FAKE) as d:
+    with Daemon(FAKE, "--deadline", "600000") as d:  # what an exit may wait for: far longer than stop() is patient
         idle = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(20)]
         keep = d.connect()
         assert d.ask(fresh(SMALL), connection=keep).status == 200
-        began = time.monotonic()
-        assert d.stop() == 0 and time.monotonic() - began < 3
+        assert d.stop() == 0
         for s in idle:
             s.close()
 
 
 def test_half_a_request_holds_up_no_exit():
-    with Daemon(FAKE) as d:
+    with Daemon(FAKE, "--deadline", "600000") as d:
         halves = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(4)]
         for s in halves:
             s.sendall(f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99\r\n\r\n{{".encode())
         eventually(lambda: d.status()["counters"]["requests"] >= 4)
-        began = time.monotonic()
-        assert d.stop() == 0 and time.monotonic() - began < 8
+        assert d.stop() == 0
         for s in halves:
             s.close()
 

@@ -33,6 +33,9 @@ def test_a_line_a_request():
         for line, reply in zip(lines, replies):
             assert len(reply.body) < line["bytes"] < len(reply.body) + 2000, (line, len(reply.body))
             assert 0 <= line["ms"] < 60000
+        # what the cache said, where it was asked
+        assert [line.get("cache") for line in lines] == [r.headers.get("Splatd-Cache") for r in replies]
+        assert d.ask(SMALL).headers["Splatd-Cache"] == requests_in(d, len(replies) + 1)[-1]["cache"] == "hit"
         assert "geheim" not in "".join(d.lines)
         for line in d.lines:
             assert {"time", "level", "message"} <= set(json.loads(line)), line

@@ -11,8 +11,9 @@ from mutating import wrong_server
 SECONDS, SEED = float(os.environ.get("SPLATD_MUTATE_S", 8)), int(os.environ.get("SPLATD_MUTATE_SEED", 1))
 
 
-def test_the_judge_finds_planted_faults():
-    assert wrong_server.self_test() == 0
+if os.environ["SPLATD_SANITIZED"] == "0":  # nothing of ours is built for it: once is enough
+    def test_the_judge_finds_planted_faults():
+        assert wrong_server.self_test() == 0
 
 
 def test_spoiled_requests():

@@ -1,7 +1,8 @@
 """What nothing may take down: random requests, clients that leave in the middle of a reply, a clock that jumps, a dataset
 that is cut while it is served, days of work. deploy/operating.md says what each looks like from outside.
 
-By option, through the environment: SPLATD_RANDOM_REQUESTS=100000 (2000), SPLATD_RANDOM_SEED=N, SPLATD_SOAK_S=1800 (1)."""
+By option, through the environment: SPLATD_RANDOM_REQUESTS=100000 (2000), SPLATD_RANDOM_SEED=N, SPLATD_SOAK_S=1800 (1).
+A soak of any length judges what a request leaves behind; from 1800 s on also what an hour does."""
 import os
 import re
 import random
@@ -143,14 +144,16 @@ def slope(samples):
 
 def test_soak():
     seconds, r = float(os.environ.get("SPLATD_SOAK_S", 1)), random.Random(1)
-    with Daemon(REAL, "--log-rate", "0", "--cache", "1M") as d:
+    # AddressSanitizer keeps what is freed for a while
+    asan = os.environ.get("ASAN_OPTIONS", "") + ":quarantine_size_mb=1:thread_local_quarantine_size_kb=64"
+    with Daemon(REAL, "--log-rate", "0", "--cache", "1M", ASAN_OPTIONS=asan) as d:
         connection, memory, descriptors, asked = d.connect(), [], [], 0
         picture = f"{VIEW}?width=320&height=180&format=png"
         first = d.ask(picture, connection=connection)
         for _ in range(20):
             d.ask(picture, connection=connection)
         began = time.monotonic()
-        while (now := time.monotonic() - began) < seconds:
+        while (now := time.monotonic() - began) < seconds or len(memory) < 15:
             for _ in range(20):
                 query = f"eye={r.uniform(2, 5)},{r.uniform(-1, 1)},{r.uniform(0, 2)}&target=0,0,1&width=160&height=90"
                 layer = r.choice(["color", "depth&format=npy", "normal&format=raw", "range&format=png"])
@@ -176,6 +179,10 @@ def test_soak():
         print(f"  the loop's longest turn: {float(turns['seconds']) * 1000:.1f} ms by the clock, "
               f"{float(turns['cpu_seconds']) * 1000:.1f} ms of processor time", flush=True)
         assert os.environ["SPLATD_SANITIZED"] == "1" or float(turns["cpu_seconds"]) < 0.05, turns
+        leaked = (memory[-1][1] - memory[steady][1] - (2 << 20)) / (asked * (1 - steady / len(memory)))
+        print(f"  {max(leaked, 0):.0f} bytes of memory a request beyond 2 MiB", flush=True)
+        assert leaked < 4096, (leaked, memory)  # a picture of 160 x 90 has 57,600
+        assert descriptors[-1][1] <= descriptors[steady][1], descriptors
         if seconds >= 1800:  # glibc takes and gives in steps of 128 KiB, each 1.7 MB/h over ten minutes, 0.6 over thirty
             assert grown < 2e6 and abs(opened) < 1, (grown, opened)
 

@@ -13,17 +13,15 @@
 #include "dataset/texture.h"
 #include "geom/octahedral.h"
 #include "geom/tangent.h"
-#include "render/occupancy.h"
-#include "render/fill.h"
-#include "render/select.h"
-#include "render/tiling.h"
 #include "render/wires.h"
+#include "support/naive_select.h"
 #include "support/reference_fill.h"
 
 struct sample {
     float first;   /* pushed depth, INFINITY = nothing */
     float own;     /* method nearest: depth of the winner, which is not bent */
     uint32_t id;
+    uint32_t fragments; /* discs that cover it */
     uint32_t word;    /* method fill: depth, spacing, linear */
     uint32_t payload; /* of the winner, where one wins: colour */
     float normal_winner[3];
@@ -36,7 +34,9 @@ struct scene {
     const struct spl_view *view;
     struct spl_camera camera; /* in samples, with what method fill draws around the image */
     uint32_t guard;           /* samples of it */
-    struct spl_draw_list list;
+    struct spl_draw_list list; /* the lines of wires alone */
+    struct naive_chunk *chunks;
+    size_t chunk_count;
     struct sample *samples;
     uint32_t weight_max;
     float margin;
@@ -51,7 +51,6 @@ struct disc {
     float p[3], n[3], radius;
     uint32_t id;
     uint8_t color[3];
-    uint32_t window;               /* of the tile that it is drawn to; 0 = all of it */
     float world[3], texture_scale; /* with atoms: its normal, and its radius over that of its texture */
     bool smooth;                   /* texels are interpolated */
     float line[3], end;            /* of its clip line: across it, view space, and where it lies, radii */
@@ -71,33 +70,12 @@ static bool sums(const struct scene *s)
     return s->view->method == SPL_METHOD_SPLAT;
 }
 
-static bool always(void *context, uint32_t page)
-{
-    (void)context;
-    (void)page;
-    return true;
-}
-
 static void to_view(const struct spl_camera *camera, const float v[3], float out[3])
 {
     for (int i = 0; i < 3; i++) {
         const double *r = camera->rotation + 3 * i;
         out[i] = (float)r[0] * v[0] + (float)r[1] * v[1] + (float)r[2] * v[2];
     }
-}
-
-/* The container's chunk behind a draw chunk, found by its first splat's id. */
-static const struct spl_chunk *find_chunk(const struct spl_chunk *chunks, uint64_t count, uint32_t first_id)
-{
-    uint64_t low = 0, high = count;
-    while (high - low > 1) {
-        uint32_t middle = low + (high - low) / 2;
-        if (chunks[middle].first_id <= first_id)
-            low = middle;
-        else
-            high = middle;
-    }
-    return &chunks[low];
 }
 
 static void footprint(const struct scene *s, const struct disc *d, int first[2], int last[2], float center[2])
@@ -119,11 +97,6 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
         high = fmax(high, center[i] + 1);
         first[i] = low < 0 ? 0 : low > size[i] ? size[i] : (int)low;
         last[i] = high >= size[i] ? size[i] - 1 : high < 0 ? -1 : (int)high;
-        if (d->window) {
-            int cell = i ? (int)(d->window >> SPL_WINDOW_BITS) : (int)(d->window & ((1u << SPL_WINDOW_BITS) - 1)) - 1;
-            first[i] = first[i] < cell * SPL_WINDOW ? cell * SPL_WINDOW : first[i];
-            last[i] = last[i] >= (cell + 1) * SPL_WINDOW ? (cell + 1) * SPL_WINDOW - 1 : last[i];
-        }
     }
 }
 
@@ -246,6 +219,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
                 continue;
             }
             if (!shade) {
+                at->fragments++;
                 if (pushed < at->first)
                     at->first = pushed;
                 continue;
@@ -359,57 +333,71 @@ static void lines(struct scene *s)
     }
 }
 
+/* Splat `index` of a chunk as it is drawn; false where it lies before or behind what is. */
+static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t index, struct disc *d,
+                      uint32_t *low_bits)
+{
+    uint64_t count;
+    size_t bytes;
+    const struct spl_node *node = &spl_dataset_get_nodes(s->dataset, &count)[drawn->node];
+    const struct spl_chunk *chunk = &spl_dataset_get_chunks(s->dataset, &count)[drawn->chunk];
+    const uint32_t *page = spl_dataset_get_page(s->dataset, node->page, &bytes);
+    struct spl_chunk local = *chunk;
+    struct spl_splat splat;
+    local.origin[0] = local.origin[1] = local.origin[2] = 0;
+    local.radius_min = (float)(chunk->radius_min * drawn->scale);
+    local.radius_step = (float)(chunk->radius_step * drawn->scale);
+    spl_chunk_decode(&local, page, index, &splat);
+    *d = (struct disc){.radius = splat.radius,
+                       .id = (uint32_t)chunk->first_id + index,
+                       .texture_scale = (float)drawn->scale};
+    memcpy(d->color, splat.color, sizeof d->color);
+    memcpy(d->world, splat.normal, sizeof d->world);
+    d->end = splat.clip.offset / d->texture_scale;
+    to_view(&s->camera, splat.clip.direction, d->line);
+    d->planes = drawn->planes;
+    d->smooth = drawn->smooth;
+    if (d->planes) {
+        load_code(s, node->page, chunk, drawn->chunk);
+        d->code = &s->code;
+        d->atoms = &s->code.splat[index];
+    }
+    to_view(&s->camera, splat.position, d->p);
+    to_view(&s->camera, splat.normal, d->n);
+    for (int i = 0; i < 3; i++) {
+        double origin = 0;
+        for (int a = 0; a < 3; a++)
+            origin += s->camera.rotation[3 * i + a] * (node->origin[a] - s->camera.eye[a] + chunk->origin[a]);
+        d->p[i] += (float)origin;
+    }
+    double median = spl_dataset_get_info(s->dataset)->splat_radius;
+    float radius = fminf(splat.radius, SPL_FILL_STRAY * local.radius_min);
+    *low_bits = reference_fill_code(radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0);
+    return d->p[2] >= (float)s->camera.near && d->p[2] <= (float)s->camera.far;
+}
+
 static void for_each_disc(struct scene *s, bool shade)
 {
-    uint64_t chunk_count;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(s->dataset, &chunk_count);
-    for (size_t b = 0; b < s->list.batch_count; b++) {
-        const struct spl_draw_batch *batch = &s->list.batches[b];
-        size_t bytes;
-        const uint32_t *page = spl_dataset_get_page(s->dataset, batch->page, &bytes);
-        for (uint32_t e = 0; e < batch->entries * SPL_RUN_SPLATS; e++) {
-            uint32_t entry = s->list.entries[batch->first_entry + e / SPL_RUN_SPLATS];
-            const struct spl_draw_chunk *draw = &s->list.chunks[entry >> SPL_RUN_BITS];
-            uint32_t index = (entry & 3) * SPL_RUN_SPLATS + e % SPL_RUN_SPLATS;
-            if (index >= (draw->count & ((1u << SPL_COUNT_BITS) - 1)))
+    for (size_t c = 0; c < s->chunk_count; c++) {
+        for (uint32_t index = 0; index < s->chunks[c].count; index++) {
+            struct disc d;
+            uint32_t low_bits;
+            if (!load_disc(s, &s->chunks[c], index, &d, &low_bits))
                 continue;
-            const struct spl_chunk *chunk = find_chunk(chunks, chunk_count, draw->first_id);
-            struct spl_chunk local = *chunk;
-            local.origin[0] = local.origin[1] = local.origin[2] = 0;
-            local.radius_min = draw->radius_min;
-            local.radius_step = draw->radius_step;
-            struct spl_splat splat;
-            spl_chunk_decode(&local, page, index, &splat);
-            struct disc d = {
-                .radius = splat.radius, .id = draw->first_id + index, .window = draw->count >> SPL_COUNT_BITS};
-            memcpy(d.color, splat.color, sizeof d.color);
-            memcpy(d.world, splat.normal, sizeof d.world);
-            d.texture_scale = draw->texture_scale;
-            d.end = splat.clip.offset / draw->texture_scale;
-            to_view(&s->camera, splat.clip.direction, d.line);
-            d.planes = spl_texture_planes(draw->texture);
-            d.smooth = draw->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1;
-            if (d.planes) {
-                load_code(s, batch->page, chunk, (uint32_t)(chunk - chunks));
-                d.code = &s->code;
-                d.atoms = &s->code.splat[index];
-            }
-            to_view(&s->camera, splat.position, d.p);
-            to_view(&s->camera, splat.normal, d.n);
-            d.p[0] += draw->origin_x;
-            d.p[1] += draw->origin_y;
-            d.p[2] += draw->origin_z;
-            if (!(d.p[2] >= (float)s->camera.near && d.p[2] <= (float)s->camera.far))
-                continue;
-            double median = spl_dataset_get_info(s->dataset)->splat_radius;
-            float radius = fminf(splat.radius, SPL_FILL_STRAY * draw->radius_min);
-            uint32_t low_bits = reference_fill_code(radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0);
             if (!draws_discs(s->view))
                 point(s, &d, low_bits);
             else
                 depth_disc(s, &d, shade);
         }
     }
+}
+
+static uint32_t most_fragments(const struct scene *s)
+{
+    uint32_t most = 0;
+    for (size_t i = 0; i < (size_t)s->camera.width * s->camera.height; i++)
+        most = s->samples[i].fragments > most ? s->samples[i].fragments : most;
+    return most;
 }
 
 static float depth_of(const struct scene *s, const struct sample *at)
@@ -541,7 +529,7 @@ static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_fr
         ((float *)images[SPL_LAYER_COVERAGE].pixels)[pixel] = (float)covered / (float)(side * side);
 }
 
-static void fill(struct scene *s, const struct spl_fill_plan *plan)
+static void fill(struct scene *s, const struct fill_plan *plan)
 {
     size_t count = (size_t)s->camera.width * s->camera.height;
     struct fill_sample *samples = spl_alloc(count, sizeof *samples, NULL);
@@ -586,33 +574,25 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
     s.margin = (float)view->disc.margin;
-    struct spl_select_params params = {.dataset = dataset,
-                                       .camera = &s.camera,
-                                       .lod = view->lod,
-                                       .low_pass = SPL_LOW_PASS,
-                                       .resident = always,
-                                       .lines = view->method == SPL_METHOD_FILL,
-                                       .discs = draws_discs(view),
-                                       .textured = always,
-                                       .atoms = spl_view_is_textured(view) ? view->disc.atoms : 0};
+    const struct naive_options options = {.dataset = dataset,
+                                          .camera = &s.camera,
+                                          .lod = view->lod,
+                                          .atoms = view->method == SPL_METHOD_SPLAT ? view->disc.atoms : 0};
     const struct spl_wires *wires = NULL;
-    struct spl_fill_plan plan;
-    struct spl_reach reach = {0};
+    struct fill_plan plan = {0};
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
-        double spacing = 1;
-        bool complete = true;
-        rc = view->fill.kernel > 0 ? SPL_OK : spl_select_spacing(&params, &spacing, &complete, err);
-        spl_fill_plan_init(&plan, &reach, view, spacing);
-        s.guard = reach.guard;
-        s.camera.width += 2 * reach.guard;
-        s.camera.height += 2 * reach.guard;
-        s.camera.cx += reach.guard;
-        s.camera.cy += reach.guard;
+        s.chunks = naive_select(&options, &s.chunk_count);
+        plan = fill_plan_of(view, naive_spacing(s.chunks, s.chunk_count));
+        free(s.chunks);
+        s.guard = plan.guard;
+        s.camera.width += 2 * plan.guard;
+        s.camera.height += 2 * plan.guard;
+        s.camera.cx += plan.guard;
+        s.camera.cy += plan.guard;
     }
-    if (!rc)
-        rc = spl_select(&params, &s.list, err);
-    if (!rc && view->method == SPL_METHOD_FILL && !(rc = spl_dataset_get_wires(dataset, &wires, err)))
+    s.chunks = naive_select(&options, &s.chunk_count);
+    if (view->method == SPL_METHOD_FILL && !(rc = spl_dataset_get_wires(dataset, &wires, err)))
         rc = spl_wires_draw(wires, &s.camera, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
@@ -630,11 +610,11 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         rc = image->pixels ? SPL_OK : SPL_E_NOMEM;
     }
     if (!rc) {
-        s.weight_max = spl_occupancy_weight(s.list.sample_splats);
         for (size_t i = 0; i < count; i++)
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
         lines(&s);
+        s.weight_max = naive_weight(most_fragments(&s));
         if (sums(&s))
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
@@ -643,6 +623,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
             for (uint32_t x = 0; x < view->camera.width; x++)
                 resolve_pixel(&s, x, y, frame);
     }
+    free(s.chunks);
     free(s.samples);
     free(s.textures);
     free(s.atoms);

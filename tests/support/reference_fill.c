@@ -25,7 +25,7 @@ struct filter {
     uint32_t width[SPL_FILL_LEVELS_MAX + 1], height[SPL_FILL_LEVELS_MAX + 1];
     float focal, radius, reach, margin, threshold;
     const struct spl_view *view;
-    const struct spl_fill_plan *plan;
+    const struct fill_plan *plan;
 };
 
 static uint32_t bits_of(float f)
@@ -45,6 +45,24 @@ static float float_of(uint32_t u)
 static float cut(float w, uint32_t bits)
 {
     return float_of(bits_of(w) & ~((1u << bits) - 1));
+}
+
+/* A kernel of three spacings, or of the pixels asked for across; at least one and a half samples, at most 128, or 64
+ * pixels where each of its samples is looked at or a pixel has many. Levels double what they look at. */
+struct fill_plan fill_plan_of(const struct spl_view *view, double spacing)
+{
+    bool constant = view->fill.visibility == SPL_VISIBILITY_CONSTANT;
+    double side = view->supersample, around = 64 * (side > 1 ? side : 1);
+    double most = constant || around > 128 ? around : 128;
+    struct fill_plan plan = {.rings = 2, .guard = 4};
+    plan.kernel = view->fill.kernel > 0 ? view->fill.kernel * side / 2 : 3 * spacing;
+    plan.kernel = plan.kernel < 1.5 ? 1.5 : plan.kernel > most ? most : plan.kernel;
+    while (plan.rings < SPL_FILL_LEVELS_MAX - 1 && plan.kernel >= pow(2, plan.rings - 0.25))
+        plan.rings++;
+    while (plan.guard < plan.kernel && plan.guard < around)
+        plan.guard *= 2;
+    plan.levels = view->fill.pyramid ? view->fill.pyramid : plan.rings;
+    return plan;
 }
 
 uint32_t reference_fill_code(float radius, double median)
@@ -246,7 +264,7 @@ static void finish_sample(const struct filter *f, struct fill_sample *s, int x, 
 }
 
 void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
-                    const struct spl_view *view, const struct spl_fill_plan *plan)
+                    const struct spl_view *view, const struct fill_plan *plan)
 {
     struct filter f = {.view = view, .plan = plan, .focal = (float)focal};
     f.reach = (float)(3 / 1.128379f * focal);

@@ -8,7 +8,6 @@
 #include <splatd/render.h>
 
 #include "dataset/chunk.h"
-#include "render/fill.h"
 
 struct fill_sample {
     uint32_t word; /* depth with spacing and linear bit, SPL_NOTHING = none; afterwards the plain depth's bits */
@@ -17,11 +16,21 @@ struct fill_sample {
     double normal[3];
 };
 
+/* What an image is filtered with. Lengths in samples. */
+struct fill_plan {
+    double kernel;          /* the farthest that a point hides others */
+    uint32_t rings, levels; /* of the pyramids that visibility looks at and that holes are filled from */
+    uint32_t guard;         /* drawn around the image */
+};
+
+/* That of points which lie `spacing` samples apart where they are sparsest. */
+struct fill_plan fill_plan_of(const struct spl_view *view, double spacing);
+
 /* The code of a splat's radius, of a dataset whose median radius is `median`. */
 uint32_t reference_fill_code(float radius, double median);
 
 /* Filters the samples in place; `focal` in samples. */
 void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
-                    const struct spl_view *view, const struct spl_fill_plan *plan);
+                    const struct spl_view *view, const struct fill_plan *plan);
 
 #endif

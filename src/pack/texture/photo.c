@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/size.h"
 #include "image/load.h"
 
 enum { black = 6, border_steps = 32 };
@@ -98,8 +99,7 @@ static struct spl_camera find_depth_camera(const struct spl_named_view *view, ui
     find_extent(view, low, high);
     double span = fmax((high[0] - low[0]) * camera.fx, (high[1] - low[1]) * camera.fy);
     double scale = fmin(1, side / span);
-    camera.fx *= scale;
-    camera.fy *= scale;
+    spl_camera_scale(&camera, scale, scale);
     camera.cx = -low[0] * camera.fx;
     camera.cy = -low[1] * camera.fy;
     camera.width = (uint32_t)fmax(1, ceil((high[0] - low[0]) * camera.fx - 1e-6));

@@ -21,6 +21,10 @@
 #include "service/access/door.h"
 #include "service/access/sign.h"
 #include "service/listen.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
 #include "service/state.h"
 
 struct spl_access {
@@ -35,9 +39,9 @@ static int find_local(const struct spl_service *service, bool *local, struct spl
 {
     struct sockaddr_storage bound;
     socklen_t length = sizeof bound;
-    if (service->listen_fd < 0)
+    if (service->http->listen_fd < 0)
         return spl_listen_is_local("listen", service->options->listen, local, err);
-    *local = !getsockname(service->listen_fd, (struct sockaddr *)&bound, &length) &&
+    *local = !getsockname(service->http->listen_fd, (struct sockaddr *)&bound, &length) &&
              spl_sockaddr_is_local((const struct sockaddr *)&bound);
     return 0;
 }
@@ -158,7 +162,7 @@ static bool is_within_rates(struct request *request)
     char detail[128], seconds[16];
     snprintf(detail, sizeof detail, "%s more often than the service allows; come back after %u s", whose, wait_s);
     snprintf(seconds, sizeof seconds, "%u", wait_s);
-    spl_count(&request->service->counters, refused_rate);
+    spl_count(request->service->counters, refused_rate);
     spl_reply_problem(request, MHD_HTTP_TOO_MANY_REQUESTS, "rate", "", detail);
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
@@ -195,7 +199,7 @@ bool spl_access_admit(struct request *request, const char *method)
 static bool refuse(struct request *request, unsigned status, const char *field, const char *challenge,
                    const char *detail)
 {
-    spl_count(&request->service->counters, refused_access);
+    spl_count(request->service->counters, refused_access);
     spl_reply_problem(request, status, status == MHD_HTTP_UNAUTHORIZED ? "unauthorized" : "forbidden", field, detail);
     if (request->response && challenge)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, challenge);

@@ -14,6 +14,9 @@
 #include <strings.h>
 
 #include "service/access/host.h"
+#include "service/exchange.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
 #include "service/state.h"
 
 static const char *get_header(struct request *request, const char *name)
@@ -23,7 +26,7 @@ static const char *get_header(struct request *request, const char *name)
 
 static bool refuse(struct request *request, unsigned status, const char *type, const char *field, const char *detail)
 {
-    spl_count(&request->service->counters, refused_access);
+    spl_count(request->service->counters, refused_access);
     spl_reply_problem(request, status, type, field, detail);
     return false;
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "service/access/secret.h"
 
@@ -25,8 +26,8 @@ struct spl_token {
 };
 
 struct spl_tokens {
-    size_t count;
     struct spl_token *items;
+    size_t count, capacity;
 };
 
 struct place {
@@ -115,20 +116,19 @@ static int parse_line(struct spl_tokens *tokens, char *line, const struct place 
         return spl_fail(err, SPL_E_USAGE, "%s, line %zu: a line is TOKEN SCOPES [PATTERNS]", at->path, at->line);
     if (tokens->count == tokens_max)
         return spl_fail(err, SPL_E_USAGE, "%s, line %zu: more than %d tokens", at->path, at->line, (int)tokens_max);
-    struct spl_token *grown = spl_realloc(tokens->items, tokens->count + 1, sizeof *grown, err);
-    if (!grown)
+    if (spl_array_reserve(tokens->items, tokens->capacity, tokens->count + 1, err))
         return SPL_E_NOMEM;
-    tokens->items = grown;
-    struct spl_token *token = &grown[tokens->count];
+    const struct spl_token *items = tokens->items;
+    struct spl_token *token = &tokens->items[tokens->count];
     *token = (struct spl_token){.line = at->line};
     int rc;
     if ((rc = parse_token(token, fields[0], at, err)) || (rc = parse_scopes(token, fields[1], at, err)) ||
         (rc = parse_patterns(token, fields[2] ? fields[2] : "*", at, err)))
         return rc;
     for (size_t i = 0; i < tokens->count; i++)
-        if (!memcmp(grown[i].digest, token->digest, sizeof token->digest))
+        if (!memcmp(items[i].digest, token->digest, sizeof token->digest))
             return spl_fail(err, SPL_E_USAGE, "%s, line %zu: the token of line %zu again", at->path, at->line,
-                            grown[i].line);
+                            items[i].line);
     tokens->count++;
     return 0;
 }

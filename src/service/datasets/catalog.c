@@ -10,6 +10,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/array.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -79,20 +80,19 @@ struct spl_catalog_slot *spl_catalog_add_slot(struct spl_catalog *catalog, const
         spl_fail(err, SPL_E_LIMIT, "more than %d datasets", (int)SPL_CATALOG_MAX);
         return NULL;
     }
-    struct spl_catalog_slot *grown = spl_realloc(catalog->slots, catalog->count + 1, sizeof *grown, err);
-    if (!grown)
+    if (spl_array_reserve(catalog->slots, catalog->capacity, catalog->count + 1, err))
         return NULL;
-    catalog->slots = grown;
     char *copy = strdup(path);
     if (!copy) {
         spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", id);
         return NULL;
     }
-    memmove(grown + at + 1, grown + at, (catalog->count - at) * sizeof *grown);
-    grown[at] = (struct spl_catalog_slot){.path = copy};
-    snprintf(grown[at].id, sizeof grown[at].id, "%s", id);
+    struct spl_catalog_slot *slot = &catalog->slots[at];
+    memmove(slot + 1, slot, (catalog->count - at) * sizeof *slot);
+    *slot = (struct spl_catalog_slot){.path = copy};
+    snprintf(slot->id, sizeof slot->id, "%s", id);
     catalog->count++;
-    return &grown[at];
+    return slot;
 }
 
 void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, const char *path)

@@ -34,7 +34,7 @@ struct spl_catalog_slot {
 
 struct spl_catalog {
     struct spl_catalog_slot *slots; /* sorted by id */
-    size_t count;
+    size_t count, capacity;
     size_t left_out, nameless; /* files that are not served: beyond SPL_CATALOG_MAX; with names that are no ids */
 };
 
@@ -48,7 +48,7 @@ struct spl_catalog_file {
 
 struct spl_catalog_files {
     struct spl_catalog_file *items; /* named files first, then by id; SPL_CATALOG_MAX at most */
-    size_t count, left_out, nameless;
+    size_t count, capacity, left_out, nameless;
     const char **unlisted; /* paths that could not be listed, borrowed */
     size_t unlisted_count;
     struct spl_error why; /* of the first of them */

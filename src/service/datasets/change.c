@@ -14,6 +14,11 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
+#include "service/state.h"
+#include "service/view/views.h"
 
 struct change *spl_change_begin(struct request *request, struct spl_catalog_slot *slot)
 {
@@ -26,7 +31,7 @@ struct change *spl_change_begin(struct request *request, struct spl_catalog_slot
     change->request = request;
     change->fresh = !slot->current;
     memcpy(change->id, slot->id, sizeof change->id);
-    LIST_INSERT_HEAD(&request->service->library.changes, change, link);
+    LIST_INSERT_HEAD(&request->service->library->changes, change, link);
     slot->busy = true;
     request->change = change;
     return change;
@@ -34,7 +39,7 @@ struct change *spl_change_begin(struct request *request, struct spl_catalog_slot
 
 static void destroy(struct change *change)
 {
-    change->service->library.changes_made++;
+    change->service->library->changes_made++;
     LIST_REMOVE(change, link);
     free(change->buffer);
     free(change->target);
@@ -54,7 +59,7 @@ static void part(struct change *change)
 
 void spl_change_finish(struct change *change)
 {
-    struct spl_catalog *catalog = &change->service->catalog;
+    struct spl_catalog *catalog = &change->service->library->catalog;
     struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, change->id);
     spl_assert(!change->working && !change->loading);
     if (slot) {
@@ -95,7 +100,7 @@ static void run_step(uv_work_t *work)
     case SPL_CHANGE_CHECK:
         if ((incoming->path || !spl_incoming_begin(incoming, change->target, err)) &&
             !spl_incoming_append(incoming, change->buffer, change->filled, err) && change->step == SPL_CHANGE_CHECK)
-            spl_incoming_check(incoming, change->target, &change->service->library.cancelled, &change->entry, err);
+            spl_incoming_check(incoming, change->target, &change->service->library->cancelled, &change->entry, err);
         change->filled = 0;
         break;
     case SPL_CHANGE_PLACE:
@@ -114,7 +119,7 @@ static void hand_to_device(struct change *change, struct spl_catalog_slot *slot)
     struct spl_catalog_entry *entry = change->entry;
     change->entry = NULL;
     slot->next = change->loading = entry;
-    spl_pipeline_add(change->service->pipeline, entry);
+    spl_pipeline_add(change->service->views->pipeline, entry);
 }
 
 static void serve(struct change *change, struct spl_catalog_slot *slot)
@@ -136,7 +141,7 @@ static void remove_slot(struct change *change, struct spl_catalog_slot *slot)
 {
     spl_log_info("dataset %s: removed by a client, no longer served", change->id);
     if (slot)
-        spl_catalog_remove_slot(&change->service->catalog, slot);
+        spl_catalog_remove_slot(&change->service->library->catalog, slot);
     if (change->request)
         spl_reply_empty(change->request, MHD_HTTP_NO_CONTENT);
     spl_change_finish(change);
@@ -158,10 +163,10 @@ static void after_step(uv_work_t *work, int status)
     (void)status;
     struct change *change = work->data;
     struct spl_service *service = change->service;
-    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, change->id);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, change->id);
     bool last = change->step == SPL_CHANGE_CLEAN_UP;
     change->working = false;
-    service->library.tasks--;
+    service->library->tasks--;
     if (last)
         destroy(change);
     else if (change->err.code)
@@ -170,7 +175,7 @@ static void after_step(uv_work_t *work, int status)
         remove_slot(change, slot);
     else if (change->step == SPL_CHANGE_APPEND)
         go_on(change);
-    else if (!slot || service->library.stopped)
+    else if (!slot || service->library->stopped)
         spl_change_finish(change);
     else if (change->step == SPL_CHANGE_CHECK)
         hand_to_device(change, slot);
@@ -196,7 +201,7 @@ void spl_change_run(struct change *change, enum spl_change_step step)
         return;
     }
     change->working = true;
-    service->library.tasks++;
+    service->library->tasks++;
     if (!change->request)
         return;
     spl_connection_enter(change->request->connection, PHASE_WORKING);
@@ -206,7 +211,7 @@ void spl_change_run(struct change *change, enum spl_change_step step)
 bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entry *entry)
 {
     struct change *change;
-    LIST_FOREACH(change, &service->library.changes, link)
+    LIST_FOREACH(change, &service->library->changes, link)
     if (change->loading == entry)
         break;
     if (!change)
@@ -216,7 +221,7 @@ bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entr
     change->err = entry->err;
     if (change->err.code)
         fail(change);
-    else if (service->library.stopped)
+    else if (service->library->stopped)
         spl_change_finish(change);
     else
         spl_change_run(change, SPL_CHANGE_PLACE);
@@ -238,7 +243,7 @@ void spl_change_abandon(struct request *request)
 void spl_change_refuse_all(struct spl_service *service)
 {
     struct change *change, *next;
-    for (change = LIST_FIRST(&service->library.changes); change; change = next) {
+    for (change = LIST_FIRST(&service->library->changes); change; change = next) {
         next = LIST_NEXT(change, link);
         struct request *request = change->request;
         if (!request || !request->suspended)
@@ -254,7 +259,7 @@ void spl_change_refuse_all(struct spl_service *service)
 
 void spl_change_forget_all(struct spl_service *service)
 {
-    for (struct change *change; (change = LIST_FIRST(&service->library.changes));) {
+    for (struct change *change; (change = LIST_FIRST(&service->library->changes));) {
         spl_assert(!change->working && !change->request);
         spl_incoming_abort(&change->incoming);
         destroy(change);

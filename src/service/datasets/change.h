@@ -3,8 +3,8 @@
 #ifndef SPL_SERVICE_CHANGE_H
 #define SPL_SERVICE_CHANGE_H
 
+#include "service/datasets/library.h"
 #include "service/datasets/store.h"
-#include "service/state.h"
 
 /* What a thread of the pool does for a change. */
 enum spl_change_step {

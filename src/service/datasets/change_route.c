@@ -5,8 +5,12 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 #include "service/datasets/change.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
+#include "service/state.h"
 
 enum { step_bytes = 1 << 20, changes_max = 4 };
 
@@ -19,11 +23,11 @@ static void reply_conflict(struct request *request, const char *detail)
 static struct spl_catalog_slot *claim(struct request *request, const char *id, bool make)
 {
     struct spl_service *service = request->service;
-    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, id);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
     struct change *change;
     struct spl_error err = {0};
     size_t changes = 0;
-    LIST_FOREACH(change, &service->library.changes, link)
+    LIST_FOREACH(change, &service->library->changes, link)
     changes++;
     if (service->draining || changes == changes_max || (slot && slot->busy)) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
@@ -34,15 +38,15 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
         return NULL;
     } else if (!slot && !make) {
         spl_fail_field(&err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", id);
-    } else if (!slot && !service->library.directory) {
+    } else if (!slot && !service->library->directory) {
         reply_conflict(request,
                        "the service was started without a directory of datasets, so there is no place for new ones");
         return NULL;
     } else if (!slot) {
         char *path = NULL;
-        if (asprintf(&path, "%s/%s.spld", service->library.directory, id) < 0)
+        if (asprintf(&path, "%s/%s.spld", service->library->directory, id) < 0)
             path = NULL;
-        if (path && (slot = spl_catalog_add_slot(&service->catalog, id, path, &err)))
+        if (path && (slot = spl_catalog_add_slot(&service->library->catalog, id, path, &err)))
             slot->in_directory = true;
         else if (!path)
             spl_fail(&err, SPL_E_NOMEM, "out of memory for a path");
@@ -121,14 +125,9 @@ bool spl_change_take(struct request *request, const char *data, size_t length)
         spl_change_finish(change);
         return true;
     }
-    if (change->filled + length > change->capacity) {
-        size_t capacity = change->filled + length > step_bytes ? change->filled + length : step_bytes;
-        char *grown = spl_realloc(change->buffer, capacity, 1, NULL);
-        if (!grown)
-            return false;
-        change->buffer = grown;
-        change->capacity = capacity;
-    }
+    size_t wanted = change->filled + length, usual = step_bytes + connection_pool;
+    if (spl_array_reserve(change->buffer, change->capacity, wanted > usual ? wanted : usual, NULL))
+        return false;
     memcpy(change->buffer + change->filled, data, length);
     change->filled += length;
     if (change->filled >= step_bytes)

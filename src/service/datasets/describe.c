@@ -1,10 +1,6 @@
-/* Datasets and the service as JSON. Owned by the loop's thread. */
-#include <stdio.h>
-#include <unistd.h>
-
-#include "base/clock.h"
+/* Datasets as JSON. Owned by the loop's thread. */
 #include "dataset/dataset.h"
-#include "service/state.h"
+#include "service/datasets/library.h"
 
 static json_t *vector(const double v[3])
 {
@@ -104,92 +100,5 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "default_view",
         json_pack("{s:o, s:o, s:o, s:f}", "eye", vector(info->default_eye), "target", vector(info->default_target),
                   "up", vector(info->default_up), "fov", info->default_fov));
-    return json;
-}
-
-uint64_t spl_resident_bytes(void)
-{
-    unsigned long long size = 0, resident = 0;
-    FILE *file = fopen("/proc/self/statm", "r");
-    if (file && fscanf(file, "%llu %llu", &size, &resident) != 2)
-        resident = 0;
-    if (file)
-        fclose(file);
-    return resident * (uint64_t)sysconf(_SC_PAGESIZE);
-}
-
-static json_t *describe_device(const struct spl_device_info *device)
-{
-    return json_pack("{s:s, s:i, s:s, s:s, s:b}", "backend", device->backend, "index", (int)device->index, "name",
-                     device->name, "driver", device->driver, "software", device->software);
-}
-
-static json_t *describe_counters(struct spl_counters *counters)
-{
-    json_t *json = json_object();
-#define COUNTER(name, help) set(json, #name, count(atomic_load(&counters->name)));
-#include "service/ops/counters.def"
-#undef COUNTER
-    return json;
-}
-
-static json_t *describe_limits(const struct spl_service_options *options)
-{
-    json_t *json = json_object();
-    set(json, "side_px", count(SPL_SERVICE_SIDE_MAX));
-    set(json, "pixels", count(options->pixels_max));
-    set(json, "samples", count(options->samples_max));
-    set(json, "body_bytes", count(body_max));
-    set(json, "url_bytes", count(uri_max));
-    set(json, "deadline_ms", count(options->deadline_ms));
-    return json;
-}
-
-static json_t *describe_cache(const struct spl_cache *cache)
-{
-    struct spl_cache_status status;
-    spl_cache_get_status(cache, &status);
-    return json_pack("{s:o, s:o, s:o, s:o}", "entries", count(status.entries), "bytes", count(status.bytes),
-                     "limit_bytes", count(status.limit_bytes), "evictions", count(status.evictions));
-}
-
-static json_t *describe_queue(size_t length, size_t capacity)
-{
-    return json_pack("{s:o, s:o}", "length", count(length), "capacity", count(capacity));
-}
-
-json_t *spl_describe_status(struct request *request)
-{
-    struct spl_service *service = request->service;
-    static const char *const states[] = {"starting", "ready", "rebuilding", "failed"};
-    struct spl_pipeline_status status;
-    spl_pipeline_get_status(service->pipeline, &status);
-    const char *state = service->draining ? "stopping" : states[spl_pipeline_get_state(service->pipeline)];
-    json_t *json = json_object(), *ids = json_array();
-    for (size_t i = 0; i < service->catalog.count; i++)
-        if (spl_access_may_see(request, service->catalog.slots[i].id))
-            json_array_append_new(ids, json_string(service->catalog.slots[i].id));
-    set(json, "version", json_string(SPLATD_VERSION));
-    set(json, "state", json_string(state));
-    set(json, "uptime_s", json_real((double)(spl_now_ns() - service->started_ns) / SPL_NS_PER_S));
-    set(json, "device", describe_device(&status.device));
-    set(json, "limits", describe_limits(service->options));
-    set(json, "parameters", spl_service_options_describe(service->options));
-    set(json, "datasets", ids);
-    set(json, "tours", service->tours ? json_string("/v1/tours") : json_null());
-    set(json, "memory",
-        json_pack("{s:o, s:o, s:o, s:o}", "device_bytes", count(status.device_bytes), "device_limit_bytes",
-                  count(status.device_limit_bytes), "resident_bytes", count(spl_resident_bytes()), "reply_bytes",
-                  count(service->reply_bytes + service->large_reply_bytes)));
-    set(json, "cache", describe_cache(service->cache));
-    set(json, "queues",
-        json_pack("{s:o, s:{s:o, s:o, s:o, s:o}, s:o}", "render",
-                  describe_queue(status.render_length, status.render_capacity), "large", "length",
-                  count(status.large_length), "samples", count(status.large_samples), "samples_max",
-                  count(status.large_samples_max), "bytes", count(status.large_bytes), "encode",
-                  describe_queue(status.encode_length, status.encode_capacity)));
-    set(json, "frame_ms", json_real(status.frame_ms));
-    set(json, "connections", count(service->connections_open));
-    set(json, "counters", describe_counters(&service->counters));
     return json;
 }

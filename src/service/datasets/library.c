@@ -5,6 +5,8 @@
  * gpu thread, and only then takes the place of the version before it, which lives until its last request is answered.
  * A file that is gone for two looks is dropped the same way; one that is refused is logged once and not opened again
  * until it changes. Everything here but the two functions run_* belongs to the loop's thread. */
+#include "service/datasets/library.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +14,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/state.h"
+#include "service/view/views.h"
 
 enum { looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
 
@@ -58,7 +61,7 @@ static void free_opening(struct opening *opening)
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
-    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->service->library.cancelled,
+    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->service->library->cancelled,
                            &opening->entry, &opening->err);
 }
 
@@ -67,18 +70,18 @@ static void after_opening(uv_work_t *work, int status)
     (void)status;
     struct opening *opening = work->data;
     struct spl_service *service = opening->service;
-    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, opening->id);
-    service->library.tasks--;
-    if (slot && opening->err.code && !service->library.stopped) {
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, opening->id);
+    service->library->tasks--;
+    if (slot && opening->err.code && !service->library->stopped) {
         if (spl_catalog_may_pass(&opening->err))
             slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
         else
             slot->opened = opening->mark;
         refuse(slot, &opening->err);
-    } else if (slot && opening->entry && !service->library.stopped) {
+    } else if (slot && opening->entry && !service->library->stopped) {
         slot->opened = opening->mark;
         slot->next = opening->entry;
-        spl_pipeline_add(service->pipeline, opening->entry);
+        spl_pipeline_add(service->views->pipeline, opening->entry);
         opening->entry = NULL;
     }
     spl_catalog_entry_unref(opening->entry);
@@ -102,7 +105,7 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
         return;
     }
     slot->busy = true;
-    service->library.tasks++;
+    service->library->tasks++;
 }
 
 static void run_closing(uv_work_t *work)
@@ -115,7 +118,7 @@ static void after_closing(uv_work_t *work, int status)
 {
     (void)status;
     struct opening *closing = work->data;
-    closing->service->library.tasks--;
+    closing->service->library->tasks--;
     free_opening(closing);
 }
 
@@ -128,7 +131,7 @@ static void close_entry(struct spl_service *service, struct spl_catalog_entry *e
         closing->service = service;
         closing->entry = entry;
         if (!uv_queue_work(&service->loop, &closing->work, run_closing, after_closing)) {
-            service->library.tasks++;
+            service->library->tasks++;
             return;
         }
     }
@@ -151,12 +154,12 @@ void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *
 
 void spl_library_take_changes(struct spl_service *service)
 {
-    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_change(service->pipeline));) {
+    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_change(service->views->pipeline));) {
         if (entry->state == SPL_ENTRY_GONE) {
             close_entry(service, entry);
             continue;
         }
-        struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, entry->info->id);
+        struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, entry->info->id);
         bool resident = entry->state == SPL_ENTRY_RESIDENT;
         if (spl_change_take_answer(service, entry))
             continue;
@@ -183,19 +186,19 @@ static bool meet(struct spl_service *service, const struct spl_catalog_file *fil
     if (!stem)
         return true;
     snprintf(id, sizeof id, "%.*s", (int)length, stem);
-    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->catalog, id);
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
     if (!slot) {
-        if (!(slot = spl_catalog_add_slot(&service->catalog, id, file->path, &err)))
+        if (!(slot = spl_catalog_add_slot(&service->library->catalog, id, file->path, &err)))
             return false;
         slot->in_directory = file->in_directory;
         slot->seen = file->mark;
-        slot->met = service->library.looks;
+        slot->met = service->library->looks;
         return true; // opened when the next look finds the same
     }
     if (strcmp(slot->path, file->path))
         return true; // the same id elsewhere waits until this file is gone
     slot->missed = 0;
-    slot->met = service->library.looks;
+    slot->met = service->library->looks;
     bool settled = spl_file_mark_is_equal(&slot->seen, &file->mark);
     slot->seen = file->mark;
     if (!settled)
@@ -209,10 +212,10 @@ static bool meet(struct spl_service *service, const struct spl_catalog_file *fil
 
 static void drop_missing(struct spl_service *service, const struct spl_catalog_files *files)
 {
-    struct spl_catalog *catalog = &service->catalog;
+    struct spl_catalog *catalog = &service->library->catalog;
     for (size_t i = catalog->count; i-- > 0;) {
         struct spl_catalog_slot *slot = &catalog->slots[i];
-        if (slot->met == service->library.looks || slot->busy || spl_catalog_is_unlisted(files, slot->path) ||
+        if (slot->met == service->library->looks || slot->busy || spl_catalog_is_unlisted(files, slot->path) ||
             ++slot->missed < looks_before_drop)
             continue;
         spl_log_info("dataset %s: its file is gone, no longer served", slot->id);
@@ -232,7 +235,7 @@ static void after_look(uv_work_t *work, int status)
     (void)status;
     struct look *look = work->data;
     struct spl_service *service = look->service;
-    struct library *library = &service->library;
+    struct spl_library *library = service->library;
     library->tasks--;
     library->looking = false;
     const struct spl_error *why = look->err.code ? &look->err : &look->files.why;
@@ -245,7 +248,7 @@ static void after_look(uv_work_t *work, int status)
         for (size_t i = 0; i < look->files.count; i++)
             left_out += !meet(service, &look->files.items[i]);
         drop_missing(service, &look->files);
-        spl_catalog_say_left_out(&service->catalog, left_out, look->files.nameless);
+        spl_catalog_say_left_out(&service->library->catalog, left_out, look->files.nameless);
     }
     spl_catalog_files_finish(&look->files);
     free(look);
@@ -254,34 +257,39 @@ static void after_look(uv_work_t *work, int status)
 static void on_timer(uv_timer_t *timer)
 {
     struct spl_service *service = timer->data;
-    struct look *look = service->library.looking ? NULL : spl_alloc(1, sizeof *look, NULL);
+    struct look *look = service->library->looking ? NULL : spl_alloc(1, sizeof *look, NULL);
     if (!look)
         return;
     look->work.data = look;
     look->service = service;
-    look->changes = service->library.changes_made;
+    look->changes = service->library->changes_made;
     if (uv_queue_work(&service->loop, &look->work, run_look, after_look)) {
         free(look);
         return;
     }
-    service->library.looking = true;
-    service->library.tasks++;
+    service->library->looking = true;
+    service->library->tasks++;
+}
+
+void spl_library_init(struct spl_service *service)
+{
+    uv_timer_init(&service->loop, &service->library->timer);
+    service->library->timer.data = service;
 }
 
 void spl_library_start(struct spl_service *service)
 {
     uint64_t interval_ms = service->options->watch_ms;
-    service->library.timer.data = service;
     if (interval_ms)
-        uv_timer_start(&service->library.timer, on_timer, interval_ms, interval_ms);
+        uv_timer_start(&service->library->timer, on_timer, interval_ms, interval_ms);
 }
 
 void spl_library_stop(struct spl_service *service)
 {
-    service->library.stopped = true;
-    atomic_store(&service->library.cancelled, true);
-    uv_timer_stop(&service->library.timer);
-    while (service->library.tasks)
+    service->library->stopped = true;
+    atomic_store(&service->library->cancelled, true);
+    uv_timer_stop(&service->library->timer);
+    while (service->library->tasks)
         uv_run(&service->loop, UV_RUN_ONCE);
     spl_change_forget_all(service);
 }

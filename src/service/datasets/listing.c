@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "service/datasets/catalog.h"
 
@@ -46,13 +47,12 @@ static int add_file(struct spl_catalog_files *files, const char *directory, cons
     char *path = NULL;
     if (files->count == 2 * SPL_CATALOG_MAX)
         keep(files, SPL_CATALOG_MAX);
-    struct spl_catalog_file *grown = spl_realloc(files->items, files->count + 1, sizeof *grown, err);
-    if (!grown)
+    if (spl_array_reserve(files->items, files->capacity, files->count + 1, err))
         return SPL_E_NOMEM;
-    files->items = grown;
     if (asprintf(&path, "%s%s%s", directory, *directory ? "/" : "", name) < 0)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the path of '%s'", name);
-    grown[files->count++] = (struct spl_catalog_file){.path = path, .in_directory = *directory, .place = place};
+    files->items[files->count++] =
+        (struct spl_catalog_file){.path = path, .in_directory = *directory, .place = place};
     return 0;
 }
 

@@ -2,13 +2,14 @@
  * long as reading them, while the loop runs: probes are answered and signals taken from the first moment on. Then the
  * pipeline starts.
  *
- * Invariant: service->loading is set while the thread has *loading, and service->catalog is empty until then. A thread
+ * Invariant: library->loading is set while the thread has *loading, and library->catalog is empty until then. A thread
  * in the middle of a file cannot be stopped, so a signal ends the process (service.c): nothing has been served or
  * written yet. Owned by the loop's thread, but for run(). */
 #include <stdlib.h>
 
 #include "base/memory.h"
 #include "service/datasets/store.h"
+#include "service/datasets/library.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
 
@@ -29,7 +30,7 @@ static void run(uv_work_t *work)
     if (loading->directory)
         spl_store_sweep(loading->directory);
     if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
-                          &loading->service->library.cancelled, &loading->err) &&
+                          &loading->service->library->cancelled, &loading->err) &&
         loading->tours)
         spl_tours_load(loading->tours, &loading->catalog, &loading->err);
 }
@@ -38,10 +39,11 @@ static void after(uv_work_t *work, int status)
 {
     struct loading *loading = work->data;
     struct spl_service *service = loading->service;
+    struct spl_library *library = service->library;
     (void)status;
-    service->loading = false;
-    service->catalog = loading->catalog;
-    service->library.directory = loading->directory;
+    library->loading = false;
+    library->catalog = loading->catalog;
+    library->directory = loading->directory;
     service->tours = loading->tours;
     service->failure = loading->err;
     free(loading);
@@ -67,6 +69,6 @@ int spl_loading_start(struct spl_service *service, struct spl_error *err)
         free(loading);
         return spl_fail(err, SPL_E_IO, "cannot load datasets: %s", uv_strerror(rc));
     }
-    service->loading = true;
+    service->library->loading = true;
     return 0;
 }

@@ -2,7 +2,9 @@
 #include <string.h>
 
 #include "measure/report.h"
-#include "service/state.h"
+#include "service/datasets/library.h"
+#include "service/exchange.h"
+#include "service/reply.h"
 
 /* Names the first parameter that is not "format" with a value we have. */
 static void refuse(struct request *request)

@@ -9,6 +9,9 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/ops/ops.h"
 #include "service/sent_bytes.h"
 #include "service/state.h"
 
@@ -30,7 +33,7 @@ void spl_request_set_id(struct request *request, const char *wanted)
 
 bool spl_access_log_admit(struct spl_service *service)
 {
-    struct spl_access_log *log = &service->access_log;
+    struct spl_access_log *log = &service->ops->access_log;
     double rate = (double)service->options->log_rate;
     uint64_t now = spl_now_ns();
     if (!log->filled_ns)

@@ -11,15 +11,24 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "service/http.h"
+#include "service/ops/ops.h"
 #include "service/ops/supervisor.h"
 #include "service/state.h"
+#include "service/view/views.h"
 
 enum { look_ms = 500 };
+
+static uint64_t get_still_ms(const struct spl_service *service)
+{
+    struct spl_pipeline *pipeline = service->views->pipeline;
+    return pipeline ? spl_pipeline_get_still_ns(pipeline) / SPL_NS_PER_MS : 0;
+}
 
 bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
 {
     const struct spl_service_options *options = service->options;
-    uint64_t still_ms = service->pipeline ? spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_MS : 0;
+    uint64_t still_ms = get_still_ms(service);
     if (still_ms <= options->deadline_ms + options->stall_ms)
         return true;
     snprintf(why, SPL_HEALTH_TEXT, "there is work, and nothing has moved for %llu ms: the device or its driver hangs",
@@ -29,20 +38,21 @@ bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
 
 bool spl_health_is_ready(struct spl_service *service, char why[SPL_HEALTH_TEXT])
 {
+    struct spl_pipeline *pipeline = service->views->pipeline;
     struct spl_pipeline_status status;
     if (service->leaving || service->draining) {
         snprintf(why, SPL_HEALTH_TEXT, "stopping");
         return false;
     }
-    if (!service->pipeline || !service->daemon) {
+    if (!pipeline || !service->http->daemon) {
         snprintf(why, SPL_HEALTH_TEXT, "datasets are being loaded");
         return false;
     }
-    if (spl_pipeline_get_state(service->pipeline) != SPL_PIPELINE_READY) {
+    if (spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY) {
         snprintf(why, SPL_HEALTH_TEXT, "the device was lost and is being reopened");
         return false;
     }
-    spl_pipeline_get_status(service->pipeline, &status);
+    spl_pipeline_get_status(pipeline, &status);
     if (status.render_length >= status.render_capacity) {
         snprintf(why, SPL_HEALTH_TEXT, "the queue is full: %zu of %zu views", status.render_length,
                  status.render_capacity);
@@ -59,11 +69,11 @@ static void say_status(struct spl_service *service)
         [SPL_PIPELINE_REBUILDING] = "the device was lost and is being reopened",
         [SPL_PIPELINE_FAILED] = "the device is gone",
     };
-    enum spl_pipeline_state state =
-        service->pipeline ? spl_pipeline_get_state(service->pipeline) : SPL_PIPELINE_STARTING;
-    if (state != service->said_state && !service->leaving)
+    struct spl_pipeline *pipeline = service->views->pipeline;
+    enum spl_pipeline_state state = pipeline ? spl_pipeline_get_state(pipeline) : SPL_PIPELINE_STARTING;
+    if (state != service->ops->said_state && !service->leaving)
         spl_supervisor_say_status(lines[state]);
-    service->said_state = state;
+    service->ops->said_state = state;
 }
 
 static void on_look(uv_timer_t *timer)
@@ -74,7 +84,7 @@ static void on_look(uv_timer_t *timer)
     say_status(service);
     if (spl_health_is_alive(service, why))
         spl_supervisor_say_alive();
-    uint64_t still_ms = service->pipeline ? spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_MS : 0;
+    uint64_t still_ms = get_still_ms(service);
     if (still_ms <= options->deadline_ms + 2 * options->stall_ms)
         return;
     spl_log_error(
@@ -88,5 +98,5 @@ void spl_health_watch(struct spl_service *service)
 {
     uint64_t watchdog_ms = spl_supervisor_get_watchdog_ms();
     uint64_t every_ms = watchdog_ms && watchdog_ms / 3 < look_ms ? watchdog_ms / 3 + 1 : look_ms;
-    uv_timer_start(&service->look_timer, on_look, every_ms, every_ms);
+    uv_timer_start(&service->ops->look_timer, on_look, every_ms, every_ms);
 }

@@ -24,13 +24,9 @@ static const struct {
     const char *name;
     size_t offset; /* in struct spl_frame_stats */
 } stages[SPL_LATENCY_STAGES] = {
-    {"select", offsetof(struct spl_frame_stats, select_ms)},
-    {"upload", offsetof(struct spl_frame_stats, upload_ms)},
-    {"clear", offsetof(struct spl_frame_stats, clear_ms)},
-    {"depth", offsetof(struct spl_frame_stats, depth_ms)},
-    {"shade", offsetof(struct spl_frame_stats, shade_ms)},
-    {"resolve", offsetof(struct spl_frame_stats, resolve_ms)},
-    {"readback", offsetof(struct spl_frame_stats, readback_ms)},
+#define STAGE(name) {#name, offsetof(struct spl_frame_stats, name##_ms)},
+#include "render/stages.def"
+#undef STAGE
 };
 
 static struct spl_route_latency *find(struct spl_latencies *latencies, const char *route)

@@ -8,7 +8,14 @@
 
 #include <splatd/render.h>
 
-enum { SPL_HISTOGRAM_BUCKETS = 17, SPL_LATENCY_ROUTES = 64, SPL_LATENCY_STAGES = 7 };
+enum { SPL_HISTOGRAM_BUCKETS = 17, SPL_LATENCY_ROUTES = 64 };
+
+enum spl_latency_stage {
+#define STAGE(name) SPL_LATENCY_STAGE_##name,
+#include "render/stages.def"
+#undef STAGE
+    SPL_LATENCY_STAGES
+};
 
 /* What is measured of a request: the whole until its reply is handed to the client's connection, and of those that are
  * rendered the wait in the queue, the frame and its encoding. */

@@ -8,8 +8,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "service/listen.h"
 #include "service/ops/health.h"
@@ -96,43 +98,57 @@ static void on_poll(uv_poll_t *poll, int status, int events)
 
 static void pump(struct spl_service *service)
 {
-    if (!service->ops)
-        return;
-    spl_http_run(service->ops, &service->ops_turns, on_timer, on_again);
+    struct spl_ops *ops = service->ops;
+    if (ops->daemon)
+        spl_http_run(ops->daemon, &ops->turns, on_timer, on_again);
+}
+
+void spl_ops_init(struct spl_service *service)
+{
+    struct spl_ops *ops = service->ops;
+    ops->started_ns = spl_now_ns();
+    ops->started_unix_s = (double)time(NULL);
+    ops->listen_fd = -1;
+    spl_loop_turns_watch(&ops->loop_turns, &service->loop);
+    spl_http_turns_init(&ops->turns, service);
+    uv_timer_init(&service->loop, &ops->look_timer);
+    ops->look_timer.data = service;
 }
 
 /* Hands `fd` to a daemon that the loop polls. */
 static int serve(struct spl_service *service, int fd, struct spl_error *err)
 {
-    service->ops = MHD_start_daemon(MHD_USE_EPOLL, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET, fd,
+    struct spl_ops *ops = service->ops;
+    ops->daemon = MHD_start_daemon(MHD_USE_EPOLL, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET, fd,
                                     MHD_OPTION_CONNECTION_LIMIT, (unsigned)connections_max,
                                     MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
                                     (size_t)connection_memory, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
-    if (!service->ops) {
+    if (!ops->daemon) {
         close(fd);
         return spl_fail(err, SPL_E_IO, "libmicrohttpd refuses to start the ops listener");
     }
-    const union MHD_DaemonInfo *info = MHD_get_daemon_info(service->ops, MHD_DAEMON_INFO_EPOLL_FD);
-    int rc = info ? uv_poll_init(&service->loop, &service->ops_poll, info->epoll_fd) : UV_EINVAL;
+    const union MHD_DaemonInfo *info = MHD_get_daemon_info(ops->daemon, MHD_DAEMON_INFO_EPOLL_FD);
+    int rc = info ? uv_poll_init(&service->loop, &ops->poll, info->epoll_fd) : UV_EINVAL;
     if (rc) {
-        MHD_stop_daemon(service->ops);
-        service->ops = NULL;
+        MHD_stop_daemon(ops->daemon);
+        ops->daemon = NULL;
         return spl_fail(err, SPL_E_IO, "the loop cannot poll the ops listener: %s", uv_strerror(rc));
     }
-    service->ops_poll.data = service;
-    uv_poll_start(&service->ops_poll, UV_READABLE, on_poll);
+    ops->poll.data = service;
+    uv_poll_start(&ops->poll, UV_READABLE, on_poll);
     return 0;
 }
 
 int spl_ops_start(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_service_options *options = service->options;
+    struct spl_ops *ops = service->ops;
     struct spl_error busy = {0};
     char url[192];
     int fd = -1, rc = 0;
-    if (service->ops_fd >= 0) {
-        fd = service->ops_fd;
-        service->ops_fd = -1;
+    if (ops->listen_fd >= 0) {
+        fd = ops->listen_fd;
+        ops->listen_fd = -1;
         spl_listen_print(fd, url, sizeof url);
     } else if (options->ops_listen[0]) {
         rc = spl_listen("ops-listen", options->ops_listen, &fd, url, sizeof url, &busy);
@@ -156,9 +172,10 @@ int spl_ops_start(struct spl_service *service, struct spl_error *err)
 
 void spl_ops_stop(struct spl_service *service)
 {
-    if (!service->ops)
+    struct spl_ops *ops = service->ops;
+    if (!ops->daemon)
         return;
-    uv_close((uv_handle_t *)&service->ops_poll, NULL);
-    MHD_stop_daemon(service->ops);
-    service->ops = NULL;
+    uv_close((uv_handle_t *)&ops->poll, NULL);
+    MHD_stop_daemon(ops->daemon);
+    ops->daemon = NULL;
 }

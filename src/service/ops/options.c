@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "service/access/host.h"
 #include "service/listen.h"
@@ -131,11 +132,9 @@ static int refuse(const struct spl_parameter *parameter, const char *text, const
 
 static int add_item(struct spl_text_list *list, const char *text, struct spl_error *err)
 {
-    char **grown = spl_realloc(list->items, list->count + 1, sizeof *grown, err);
-    if (!grown)
+    if (spl_array_reserve(list->items, list->capacity, list->count + 1, err))
         return SPL_E_NOMEM;
-    list->items = grown;
-    if (!(grown[list->count] = strdup(text)))
+    if (!(list->items[list->count] = strdup(text)))
         return spl_fail(err, SPL_E_NOMEM, "out of memory for '%.80s'", text);
     list->count++;
     return 0;

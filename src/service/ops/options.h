@@ -30,7 +30,7 @@ enum { SPL_MISTAKES_MAX = 16 }; /* of a file, beside the first, that are kept */
 
 struct spl_text_list {
     char **items;
-    size_t count;
+    size_t count, capacity;
 };
 
 /* The members' C types by the table's column. */

@@ -10,10 +10,12 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "service/datasets/library.h"
 #include "service/ops/health.h"
-#include "service/ops/latency.h"
+#include "service/ops/ops.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
 
 static void print(FILE *out, const char *name, const char *type, const char *help, double value)
 {
@@ -47,9 +49,9 @@ static void print_device(FILE *out, const struct spl_device_info *device)
 static void print_pipeline(FILE *out, struct spl_service *service)
 {
     struct spl_pipeline_status status;
-    if (!service->pipeline)
+    if (!service->views->pipeline)
         return;
-    spl_pipeline_get_status(service->pipeline, &status);
+    spl_pipeline_get_status(service->views->pipeline, &status);
     if (status.device.name[0])
         print_device(out, &status.device);
     gauge(out, "splatd_queue_length", "Views that wait for the device, and large ones until they are encoded.",
@@ -62,7 +64,7 @@ static void print_pipeline(FILE *out, struct spl_service *service)
           (double)status.device_limit_bytes);
     gauge(out, "splatd_frame_mean_seconds", "Moving mean of the time a frame takes.", status.frame_ms / 1000);
     gauge(out, "splatd_standstill_seconds", "For how long nothing has moved although there is work; 0 when idle.",
-          (double)spl_pipeline_get_still_ns(service->pipeline) / SPL_NS_PER_S);
+          (double)spl_pipeline_get_still_ns(service->views->pipeline) / SPL_NS_PER_S);
 }
 
 static double seconds(struct timeval t)
@@ -89,7 +91,7 @@ static void print_process(FILE *out, struct spl_service *service)
               seconds(usage.ru_utime) + seconds(usage.ru_stime));
     gauge(out, "process_resident_memory_bytes", "Memory in use.", (double)spl_resident_bytes());
     gauge(out, "process_start_time_seconds", "When the process began, by the clock on the wall.",
-          service->started_unix_s);
+          service->ops->started_unix_s);
 }
 
 /* One series a dataset: as many as the operator has put there, never what a client asks for. */
@@ -137,23 +139,23 @@ char *spl_prometheus_print(struct spl_service *service)
                  "splatd_build_info{version=\"" SPLATD_VERSION "\"} 1\n");
     gauge(out, "splatd_ready", "1 when /readyz says ok.", spl_health_is_ready(service, why));
     gauge(out, "splatd_alive", "1 when /healthz says ok.", spl_health_is_alive(service, why));
-    print_datasets(out, &service->catalog);
+    print_datasets(out, &service->library->catalog);
     print_tours(out, service->tours);
-    gauge(out, "splatd_connections", "Connections of the main listener.", (double)service->connections_open);
+    gauge(out, "splatd_connections", "Connections of the main listener.", (double)service->http->connections_open);
     gauge(out, "splatd_requests_open", "Requests that are being read, worked on or answered.",
-          (double)service->requests_open);
+          (double)service->http->requests_open);
     struct spl_cache_status cache = {0};
-    if (service->cache) // there is none before the datasets are open
-        spl_cache_get_status(service->cache, &cache);
+    if (service->views->cache) // there is none before the datasets are open
+        spl_cache_get_status(service->views->cache, &cache);
     gauge(out, "splatd_cache_bytes", "Encoded replies that are kept.", (double)cache.bytes);
     gauge(out, "splatd_cache_entries", "How many they are.", (double)cache.entries);
     gauge(out, "splatd_reply_memory_bytes", "Images that clients have not read yet.", 
-          (double)(service->reply_bytes + service->large_reply_bytes));
+          (double)(service->views->reply_bytes + service->views->large_reply_bytes));
     print_pipeline(out, service);
     print_process(out, service);
-    print_counters(out, &service->counters);
-    spl_loop_turns_print(&service->loop_turns, out);
-    spl_latency_print(&service->latencies, out);
+    print_counters(out, service->counters);
+    spl_loop_turns_print(&service->ops->loop_turns, out);
+    spl_latency_print(&service->ops->latencies, out);
     bool failed = ferror(out);
     if (fclose(out) || failed) {
         free(text);

@@ -8,6 +8,11 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/datasets/library.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
 
 struct spl_tour_wish {
@@ -32,7 +37,7 @@ static void read_path(uv_work_t *work)
 
 static void reply(struct request *request, struct spl_tour_wish *wish)
 {
-    const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->catalog, wish->dataset);
+    const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->library->catalog, wish->dataset);
     struct spl_error *err = &wish->err;
     struct spl_tour *tour;
     char location[64];

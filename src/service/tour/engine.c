@@ -16,7 +16,11 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/datasets/library.h"
+#include "service/ops/counters.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
 
 enum { writing_max = 4, failures_max = 10 };
 
@@ -136,7 +140,7 @@ static void take_job(struct spl_job *job)
         tours->writing++;
         tour->writing++;
         tours->writing_bytes += job->encoded.length;
-        spl_count(&tours->service->counters, tour_frames);
+        spl_count(tours->service->counters, tour_frames);
         spl_tour_work_frame(tour, job->frame_number, &job->encoded);
     }
     spl_job_destroy(job);
@@ -191,7 +195,7 @@ void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct sp
 static bool submit(struct spl_tour *tour, size_t frame)
 {
     struct spl_tours *tours = tour->tours;
-    struct spl_catalog_entry *entry = spl_catalog_find(&tours->service->catalog, tour->dataset);
+    struct spl_catalog_entry *entry = spl_catalog_find(&tours->service->library->catalog, tour->dataset);
     struct spl_error err = {0};
     char version[17] = "";
     if (entry)
@@ -216,7 +220,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
     job->frame_number = frame;
     job->owner = tour;
     job->done = take_job;
-    if (spl_pipeline_submit(tours->service->pipeline, job, &err)) {
+    if (spl_pipeline_submit(tours->service->views->pipeline, job, &err)) {
         spl_job_destroy(job);
         return false;
     }
@@ -229,7 +233,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
 void spl_tours_pump(struct spl_tours *tours)
 {
     if (!tours || tours->stopping || tours->service->draining ||
-        spl_pipeline_get_state(tours->service->pipeline) != SPL_PIPELINE_READY)
+        spl_pipeline_get_state(tours->service->views->pipeline) != SPL_PIPELINE_READY)
         return;
     struct spl_tour *tour, *next;
     for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {

@@ -13,7 +13,10 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/http.h"
 #include "service/range.h"
+#include "service/reply.h"
 #include "service/tour/tour.h"
 #include "service/view/key.h"
 

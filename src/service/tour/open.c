@@ -15,7 +15,9 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
 
 enum { sweep_ms = 1000 };
 

@@ -6,6 +6,9 @@
 #include <string.h>
 
 #include "service/access/access.h"
+#include "service/exchange.h"
+#include "service/reply.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
 
 /* NULL, and a reply, in a service without a place for tours. */

@@ -11,6 +11,11 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
 
 enum { tick_ms = 20, streams_max = 256 };
@@ -169,7 +174,7 @@ static bool is_due(struct spl_tour_stream *s, uint64_t now)
         struct pollfd socket = {.fd = s->connection->fd, .events = POLLRDHUP};
         s->looked_ns = now;
         if (poll(&socket, 1, 0) > 0 && socket.revents & (POLLRDHUP | POLLHUP | POLLERR)) {
-            spl_count(&s->tour->tours->service->counters, clients_left);
+            spl_count(s->tour->tours->service->counters, clients_left);
             s->gone = true;
             return true;
         }

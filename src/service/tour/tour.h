@@ -6,10 +6,17 @@
 #ifndef SPL_SERVICE_TOUR_H
 #define SPL_SERVICE_TOUR_H
 
+#include <jansson.h>
 #include <stdatomic.h>
+#include <sys/queue.h>
+#include <uv.h>
 
-#include "service/state.h"
+#include "service/datasets/catalog.h"
 #include "service/tour/spec.h"
+
+struct spl_service;
+struct request;
+struct spl_call;
 
 enum {
     SPL_TOUR_NAME = 16,        /* hex digits, random: a name cannot be guessed and is no path */
@@ -24,6 +31,7 @@ extern const char *const spl_tour_state_names[];
 enum spl_frame_state { SPL_FRAME_OPEN, SPL_FRAME_IN_FLIGHT, SPL_FRAME_DONE };
 
 struct spl_tour_stream;
+struct spl_tour_wish;
 
 struct spl_tour {
     TAILQ_ENTRY(spl_tour) link; // spl_tours.all, oldest first
@@ -151,6 +159,7 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
 
 /* create.c: has a thread of the pool read the request's body; the request waits, and gets 202 or why not. */
 void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const struct spl_catalog_entry *entry);
+void spl_tour_wish_abandon(struct spl_tour_wish *wish); /* its request no longer waits for it; NULL-safe */
 
 /* route.c */
 void spl_create_tour(struct request *request, const struct spl_call *call);

@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "image/load.h"
 #include "image/video.h"
+#include "service/state.h"
 #include "service/tour/tour.h"
 
 struct work {

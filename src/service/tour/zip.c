@@ -6,8 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/exchange.h"
+#include "service/http.h"
+#include "service/reply.h"
 #include "service/tour/tour.h"
 #include "service/zip.h"
 
@@ -29,13 +33,8 @@ static la_ssize_t on_write(struct archive *archive, void *context, const void *b
 {
     struct zip *zip = context;
     (void)archive;
-    if (zip->length + length > zip->capacity) {
-        char *grown = spl_realloc(zip->piece, 2 * (zip->length + length), 1, NULL);
-        if (!grown)
-            return -1;
-        zip->piece = grown;
-        zip->capacity = 2 * (zip->length + length);
-    }
+    if (spl_array_reserve(zip->piece, zip->capacity, zip->length + length, NULL))
+        return -1;
     memcpy(zip->piece + zip->length, bytes, length);
     zip->length += length;
     return (la_ssize_t)length;

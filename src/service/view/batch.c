@@ -11,9 +11,16 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/access/access.h"
+#include "service/exchange.h"
 #include "service/headers.h"
+#include "service/http.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
 #include "service/state.h"
 #include "service/view/bundle.h"
+#include "service/view/reply.h"
+#include "service/view/views.h"
 
 enum { seats = 2, batch_bytes_max = 256 << 20 };
 
@@ -146,7 +153,7 @@ static void on_done(struct ticket *ticket, struct spl_rendering *rendering, cons
     struct seat *seat = (struct seat *)ticket;
     struct batch *batch = seat->batch;
     if (err->code == SPL_E_TIMEOUT)
-        spl_count(&batch->service->counters, deadline_missed);
+        spl_count(batch->service->counters, deadline_missed);
     settle(batch, seat->item, rendering, err);
     spl_batch_go_on(batch);
 }
@@ -166,10 +173,10 @@ static int begin(struct batch *batch, struct seat *seat, size_t i, struct spl_er
     const struct spl_view_request *view = &batch->views.views[i];
     struct spl_key key = {0};
     if (!view->planned) {
-        key = spl_key_make(view, batch->entry->info->version, spl_pipeline_get_renderer(service->pipeline));
-        struct spl_rendering *rendering = spl_cache_find(service->cache, &key);
+        key = spl_key_make(view, batch->entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));
+        struct spl_rendering *rendering = spl_cache_find(service->views->cache, &key);
         if (rendering) {
-            spl_count(&service->counters, cache_hits);
+            spl_count(service->counters, cache_hits);
             settle(batch, i, rendering, err);
             return 0;
         }
@@ -181,7 +188,7 @@ static int begin(struct batch *batch, struct seat *seat, size_t i, struct spl_er
     seat->ticket.deadline_ns = spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS;
     int rc = spl_flight_board(service, &seat->ticket, batch->entry, view, &key, err);
     if (!rc && !view->planned)
-        spl_count(&service->counters, cache_misses);
+        spl_count(service->counters, cache_misses);
     return rc;
 }
 
@@ -246,9 +253,9 @@ void spl_make_views(struct request *request, const struct spl_call *call)
     batch->request = request;
     batch->entry = spl_catalog_entry_ref(call->entry);
     struct spl_pipeline_status status;
-    spl_pipeline_get_status(service->pipeline, &status);
+    spl_pipeline_get_status(service->views->pipeline, &status);
     if (status.render_length >= status.render_capacity) {
-        spl_count(&service->counters, refused_full);
+        spl_count(service->counters, refused_full);
         spl_fail(&err, SPL_E_BUSY, "the queue of views is full; come back later");
         goto refuse;
     }

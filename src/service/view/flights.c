@@ -4,11 +4,15 @@
  * was given up has no owner and is destroyed when it comes back. The job's deadline is its latest ticket's: who boards
  * late raises it, and where the frame had begun under an earlier one, it is launched again for those with time left.
  * Owned by the loop's thread. */
+#include "service/view/flights.h"
+
 #include <stdlib.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "service/ops/counters.h"
 #include "service/state.h"
+#include "service/view/views.h"
 
 /* One view, for every request that waits for it. */
 struct flight {
@@ -39,7 +43,7 @@ static int launch(struct flight *flight, uint64_t deadline_ns, struct spl_error 
     job->deadline_ns = deadline_ns;
     job->owner = flight;
     job->done = land;
-    int rc = spl_pipeline_submit(flight->service->pipeline, job, err);
+    int rc = spl_pipeline_submit(flight->service->views->pipeline, job, err);
     if (rc)
         spl_job_destroy(job);
     else
@@ -56,7 +60,7 @@ static void finish(struct flight *flight)
 static struct flight *find(struct spl_service *service, const struct spl_key *key)
 {
     struct flight *flight;
-    LIST_FOREACH(flight, &service->flights, link)
+    LIST_FOREACH(flight, &service->views->flights, link)
     if (!flight->request.planned && spl_key_equal(&flight->key, key))
         return flight;
     return NULL;
@@ -77,7 +81,7 @@ int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct 
         if (flight->job->deadline_ns < ticket->deadline_ns)
             flight->job->deadline_ns = ticket->deadline_ns;
         board(ticket, flight);
-        spl_count(&service->counters, views_shared);
+        spl_count(service->counters, views_shared);
         return 0;
     }
     if (!(flight = spl_alloc(1, sizeof *flight, err)))
@@ -87,13 +91,13 @@ int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct 
     flight->route = ticket->route;
     flight->request = *request;
     flight->key = *key;
-    flight->renderer = spl_pipeline_get_renderer(service->pipeline);
+    flight->renderer = spl_pipeline_get_renderer(service->views->pipeline);
     int rc = launch(flight, ticket->deadline_ns, err);
     if (rc) {
         finish(flight);
         return rc;
     }
-    LIST_INSERT_HEAD(&service->flights, flight, link);
+    LIST_INSERT_HEAD(&service->views->flights, flight, link);
     board(ticket, flight);
     return 0;
 }
@@ -122,16 +126,16 @@ static bool go_on(struct flight *flight, const struct spl_error *late)
 
 static struct spl_rendering *unload(struct flight *flight, struct spl_job *job)
 {
-    struct spl_service *service = flight->service;
+    struct spl_views *views = flight->service->views;
     struct spl_rendering *rendering = NULL;
     if (!job->err.code)
-        rendering = spl_rendering_create(job, &flight->key,
-                                         job->large ? &service->large_reply_bytes : &service->reply_bytes, &job->err);
+        rendering = spl_rendering_create(job, &flight->key, job->large ? &views->large_reply_bytes : &views->reply_bytes,
+                                         &job->err);
     if (rendering &&
         job->renderer != flight->renderer) // reopened as another one meanwhile: the key is not of these bytes
         rendering->reusable = false;
     if (rendering && rendering->reusable)
-        spl_cache_put(service->cache, rendering);
+        spl_cache_put(views->cache, rendering);
     return rendering;
 }
 
@@ -146,7 +150,7 @@ static void land(struct spl_job *job)
     flight->job = NULL;
     LIST_REMOVE(flight, link);
     if (job->err.code == SPL_E_TIMEOUT && go_on(flight, &job->err)) {
-        LIST_INSERT_HEAD(&flight->service->flights, flight, link);
+        LIST_INSERT_HEAD(&flight->service->views->flights, flight, link);
     } else {
         struct spl_rendering *rendering = unload(flight, job);
         while ((ticket = LIST_FIRST(&flight->tickets)))

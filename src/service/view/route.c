@@ -3,7 +3,12 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "service/exchange.h"
+#include "service/ops/counters.h"
+#include "service/reply.h"
 #include "service/state.h"
+#include "service/view/reply.h"
+#include "service/view/views.h"
 
 typedef int parse_fn(const char *text, size_t length, const struct spl_camera_defaults *defaults,
                      const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
@@ -25,7 +30,7 @@ static void answer(struct ticket *ticket, struct spl_rendering *rendering, const
 {
     struct request *request = (struct request *)((char *)ticket - offsetof(struct request, ticket));
     if (err->code == SPL_E_TIMEOUT)
-        spl_count(&request->service->counters, deadline_missed);
+        spl_count(request->service->counters, deadline_missed);
     if (rendering)
         spl_reply_rendering(request, rendering, ticket->shared ? "shared" : "miss");
     else
@@ -41,57 +46,21 @@ static bool answer_at_once(struct request *request, const struct spl_view_reques
     spl_key_etag(key, etag);
     const char *known = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
     if (request->validated && known && spl_etag_matches(known, etag)) {
-        spl_count(&service->counters, not_modified);
+        spl_count(service->counters, not_modified);
         spl_reply_not_modified(request, key);
         return true;
     }
-    struct spl_rendering *rendering = spl_cache_find(service->cache, key);
+    struct spl_rendering *rendering = spl_cache_find(service->views->cache, key);
     if (rendering) {
-        spl_count(&service->counters, cache_hits);
+        spl_count(service->counters, cache_hits);
         spl_reply_rendering(request, rendering, "hit");
         return true;
     }
     if (request->head)
         spl_reply_view_head(request, view, key);
     else
-        spl_count(&service->counters, cache_misses);
+        spl_count(service->counters, cache_misses);
     return request->head;
-}
-
-/* A URL that names a version means that one, whatever is served by now. */
-int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
-                           struct spl_error *err)
-{
-    if (!view->versioned || view->version == info->version)
-        return 0;
-    return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
-                          (unsigned long long)view->version, info->id, (unsigned long long)info->version);
-}
-
-/* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view
- * from being made. */
-bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view, struct spl_error *err)
-{
-    bool large = spl_request_is_large(view);
-    size_t bytes = service->reply_bytes;
-    if (large) {
-        struct spl_pipeline_status status;
-        spl_pipeline_get_status(service->pipeline, &status);
-        bytes = service->large_reply_bytes + status.large_bytes;
-    }
-    uint64_t own = large ? spl_view_get_frame_bytes(&view->view) : 0;
-    if (!bytes || bytes + own <= reply_bytes_max) // one alone always gets in
-        return false;
-    spl_fail(err, SPL_E_BUSY, "%zu bytes of images are on their way to clients; come back later", bytes);
-    return true;
-}
-
-struct spl_camera_limits spl_view_get_limits(const struct spl_service *service)
-{
-    return (struct spl_camera_limits){.side_px = SPL_SERVICE_SIDE_MAX,
-                                      .pixels = service->options->pixels_max,
-                                      .samples = service->options->samples_max,
-                                      .bytes = SPL_FRAME_BYTES_MAX};
 }
 
 static void make(struct request *request, const struct spl_call *call, parse_fn *parse)
@@ -104,7 +73,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     if (parse_view(request, call, parse, &view, &err) || spl_view_check_version(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
-        key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->pipeline));
+        key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));
         request->validated = call->method == SPL_GET;
         request->versioned = view.versioned;
         if (answer_at_once(request, &view, &key))
@@ -120,7 +89,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
         spl_waiting_add(request, request->ticket.deadline_ns);
         return;
     }
-    spl_count(&service->counters, refused_full);
+    spl_count(service->counters, refused_full);
 refuse:
     spl_reply_error(request, &err);
 }

@@ -74,10 +74,12 @@ static void loop_visits_everything_once(void **state)
 {
     (void)state;
     enum { n = 10007 };
-    static uint8_t visits[n];
+    static uint8_t visits[n + 64]; /* the last piece is a part of one */
     spl_parallel_for(4, n, 64, count_visits, visits);
     for (size_t i = 0; i < n; i++)
         assert_int_equal(visits[i], 1);
+    for (size_t i = n; i < n + 64; i++)
+        assert_int_equal(visits[i], 0);
     spl_parallel_for(0, 0, 1, count_visits, NULL);
 }
 

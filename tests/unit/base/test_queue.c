@@ -74,6 +74,11 @@ static void an_interruption_ends_one_wait(void **state)
     assert_null(spl_queue_pop(queue, SPL_NEVER)); // still to come: the queue was not empty
     assert_true(spl_queue_try_push(queue, &items[1]));
     assert_ptr_equal(spl_queue_pop(queue, SPL_NEVER), &items[1]);
+    spl_queue_interrupt(queue);
+    assert_null(spl_queue_pop(queue, SPL_NEVER));
+    uint64_t deadline = spl_now_ns() + 5 * SPL_NS_PER_MS;
+    assert_null(spl_queue_pop(queue, deadline)); // and it has passed: this one waits again
+    assert_true(spl_now_ns() >= deadline);
     spl_queue_destroy(queue);
 }
 

@@ -266,6 +266,25 @@ static void intensity_is_grey_without_colour(void **state)
     loaded_finish(&l);
 }
 
+/* Two hundred intensities from 0 to 199 and one glint, which is white and takes nothing from the others. */
+static void a_glint_darkens_nothing(void **state)
+{
+    struct loaded l;
+    char text[8192];
+    (void)state;
+    int length = snprintf(text, sizeof text,
+                          "ply\nformat ascii 1.0\nelement vertex 201\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty float intensity\nend_header\n");
+    for (int i = 0; i <= 200; i++)
+        length += snprintf(text + length, sizeof text - (size_t)length, "0 0 %d %d\n", i,
+                           i == 40 ? 1000000 : (i + 90) % 200);
+    load_text(text, NULL, &l);
+    uint8_t middle = l.first.color[10][0];
+    assert_true(middle > 120 && middle < 136);
+    assert_color(&l, 40, 255, 255, 255);
+    loaded_finish(&l);
+}
+
 static void non_finite_points_are_skipped_and_counted(void **state)
 {
     struct loaded l;
@@ -353,6 +372,7 @@ int main(void)
         cmocka_unit_test(colour_range_is_found),
         cmocka_unit_test(sixteen_bits_are_found_at_the_very_end),
         cmocka_unit_test(intensity_is_grey_without_colour),
+        cmocka_unit_test(a_glint_darkens_nothing),
         cmocka_unit_test(non_finite_points_are_skipped_and_counted),
         cmocka_unit_test(broken_headers_are_refused),
         cmocka_unit_test(broken_data_is_refused),

@@ -248,7 +248,10 @@ static void test_tangent(void **state)
 {
     (void)state;
     for (int i = 0; i < 2000; i++) {
-        double z = i % 40 / 19.5 - 1, angle = i * 0.7, level = sqrt(fmax(1 - z * z, 0));
+        double z = i % 40 / 19.5 - 1, angle = i * 0.7;
+        if (i % 3 == 0) /* nearly level, where the frame follows x */
+            z = copysign(sqrt(1 - pow(0.24 * (i % 40) / 40, 2)), z);
+        double level = sqrt(fmax(1 - z * z, 0));
         float n[3] = {(float)(level * cos(angle)), (float)(level * sin(angle)), (float)z}, u[3], v[3];
         spl_tangent_frame(n, u, v);
         double uu = 0, vv = 0, uv = 0, un = 0, vn = 0;

@@ -11,6 +11,8 @@
 
 #include <splatd/camera.h>
 
+#include "geom/size.h"
+
 struct posed { /* one pose at two places; the point projects to (412.5, 273.125) at depth 8 */
     double eye[3], point[3], t[3];
     double pixel[2], depth;
@@ -302,6 +304,27 @@ static void check_names_the_field(void **state)
     FAULT(c.far = NAN, "far");
 }
 
+/* At another size everything lies at the same share of the image, along each side. */
+static void a_resized_camera_shows_the_same(void **state)
+{
+    (void)state;
+    struct spl_camera camera = {.fx = 700, .fy = 650, .cx = 301, .cy = 262, .width = 640, .height = 480};
+    const double eye[3] = {3, -2, 1}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1}, point[3] = {0.3, -0.4, 0.2};
+    double before[2], after[2], depth, depth_after;
+    camera.near = 0.1f;
+    camera.far = INFINITY;
+    assert_int_equal(spl_camera_look_at(&camera, eye, target, up, NULL), 0);
+    struct spl_camera resized = camera;
+    spl_camera_resize(&resized, 321, 100);
+    assert_int_equal(resized.width, 321);
+    assert_int_equal(resized.height, 100);
+    assert_true(spl_camera_project(&camera, point, before, &depth));
+    assert_true(spl_camera_project(&resized, point, after, &depth_after));
+    assert_true(fabs(after[0] / 321 - before[0] / 640) < 1e-12);
+    assert_true(fabs(after[1] / 100 - before[1] / 480) < 1e-12);
+    assert_true(depth_after == depth);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -315,7 +338,7 @@ int main(void)
         cmocka_unit_test(bad_look_at_is_refused),
         cmocka_unit_test(bad_matrix_is_refused),
         cmocka_unit_test(bad_colmap_is_refused),
-        cmocka_unit_test(check_names_the_field),
+        cmocka_unit_test(check_names_the_field), cmocka_unit_test(a_resized_camera_shows_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -92,6 +92,28 @@ static void test_passes_through_keys(void **state)
     }
 }
 
+/* Between inner keys, whatever their times, a parabola is met exactly: its slopes are what the keys around say. */
+static void test_parabolas_are_exact(void **state)
+{
+    (void)state;
+    const double times[4] = {0, 1, 3, 4};
+    struct spl_camera_path path = {0};
+    for (int i = 0; i < 4; i++) {
+        struct spl_camera camera = make_camera(0);
+        camera.eye[0] += times[i] * times[i];
+        camera.eye[1] -= 3 * times[i] * times[i] + times[i];
+        assert_int_equal(spl_camera_path_add(&path, &camera, times[i], NULL), 0);
+    }
+    struct spl_camera *frames = sample(&path, (struct spl_path_motion){0}, 41), first = make_camera(0);
+    for (int i = 10; i <= 30; i++) {
+        double t = 0.1 * i;
+        assert_true(fabs(frames[i].eye[0] - first.eye[0] - t * t) < 1e-6);
+        assert_true(fabs(frames[i].eye[1] - first.eye[1] + 3 * t * t + t) < 1e-6);
+    }
+    free(frames);
+    spl_camera_path_finish(&path);
+}
+
 /* Steps of `frames` frames differ by no more than a bound that falls with the square of the step: no jump in speed. */
 static double largest_bend(const struct spl_camera_path *path, struct spl_path_motion motion, size_t frames,
                            double *spin)
@@ -322,6 +344,7 @@ static void test_frames_are_counted(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_parabolas_are_exact),
         cmocka_unit_test(test_passes_through_keys),         cmocka_unit_test(test_velocity_is_continuous),
         cmocka_unit_test(test_closed_loop_closes),          cmocka_unit_test(test_signs_of_quaternions_do_not_matter),
         cmocka_unit_test(test_turning_in_place_takes_time), cmocka_unit_test(test_ease_and_single_camera),

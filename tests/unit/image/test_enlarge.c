@@ -60,6 +60,21 @@ static void transparent_pixels_lend_no_colour(void **state)
     }
 }
 
+/* Quarters of the way from 10 to 11 and from an alpha of 254 to 255. */
+static void colours_are_rounded(void **state)
+{
+    (void)state;
+    uint8_t small[] = {10, 20, 30, 254, 11, 20, 30, 255}, large[16];
+    struct spl_image from = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 2, 1, small);
+    struct spl_image to = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 4, 1, large);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
+    const uint8_t red[] = {10, 10, 11, 11}, alpha[] = {254, 254, 255, 255};
+    for (int x = 0; x < 4; x++) {
+        assert_int_equal(large[4 * x], red[x]);
+        assert_int_equal(large[4 * x + 3], alpha[x]);
+    }
+}
+
 static void normals_are_unit_and_ids_are_whole(void **state)
 {
     (void)state;
@@ -95,7 +110,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ramp_of_depth_stays_a_ramp),      cmocka_unit_test(an_edge_of_depth_has_no_value_in_between),
         cmocka_unit_test(transparent_pixels_lend_no_colour), cmocka_unit_test(normals_are_unit_and_ids_are_whole),
-        cmocka_unit_test(coverage_fades),
+        cmocka_unit_test(coverage_fades), cmocka_unit_test(colours_are_rounded),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,6 +35,23 @@ static void fence(uint32_t x, uint32_t y, uint8_t rgba[4])
     memcpy(rgba, x % 2 ? (uint8_t[]){255, 255, 255, 0} : (uint8_t[]){90, 0, 0, 255}, 4);
 }
 
+/* 2 x 2 whose means are 10.75 and 0.5 of colour, 254.5 of alpha. */
+static void odd_means(uint32_t x, uint32_t y, uint8_t rgba[4])
+{
+    uint8_t first = x == 0 && y == 0;
+    memcpy(rgba, (uint8_t[]){first ? 10 : 11, y ? 1 : 0, 0, y ? 255 : 254}, 4);
+}
+
+static void means_are_rounded(void **state)
+{
+    struct spl_pyramid p = make(2, 2, odd_means);
+    (void)state;
+    assert_int_equal(p.texels[1][0], 11);
+    assert_int_equal(p.texels[1][1], 1);
+    assert_int_equal(p.texels[1][3], 255);
+    spl_pyramid_finish(&p);
+}
+
 static void test_levels(void **state)
 {
     struct spl_pyramid p = make(5, 3, checkered);
@@ -77,6 +94,7 @@ static void test_sample(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels), cmocka_unit_test(test_sample)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels), cmocka_unit_test(test_sample),
+                                       cmocka_unit_test(means_are_rounded)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,8 +11,8 @@
 #include <cmocka.h>
 
 #include "base/memory.h"
-#include "measure/error_map.h"
 #include "measure/metrics.h"
+#include "measure/pictures.h"
 
 static bool close_to(double a, double b, double within)
 {

@@ -13,7 +13,6 @@
 
 #include <cmocka.h>
 
-#include "measure/front.h"
 #include "measure/profile.h"
 #include "support/make_dataset.h"
 

@@ -15,10 +15,10 @@
 #include "measure/chart.h"
 #include "measure/markup.h"
 #include "measure/peers.h"
+#include "measure/pictures.h"
 #include "measure/reference.h"
 #include "measure/report.h"
 #include "measure/state.h"
-#include "measure/thumbnail.h"
 #include "measure/tolerance.h"
 #include "support/make_dataset.h"
 

@@ -135,6 +135,10 @@ static void test_every_point_is_there(void **state)
     (void)state;
     for (int shape = 0; shape < SHAPES; shape++) {
         size_t count = 60000;
+#ifdef __SANITIZE_THREAD__ /* which looks for what threads share, and that is the same in every shape */
+        if (shape != SHAPE_CUBE && shape != SHAPE_CLUSTERS)
+            continue;
+#endif
         double(*position)[3] = shape_points((enum shape)shape, count, 31);
         struct spl_pack_report report;
         struct spl_error err = {0};

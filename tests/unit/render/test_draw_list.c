@@ -63,11 +63,50 @@ static void slots_cover_the_entries(void **state)
     spl_draw_list_finish(&list);
 }
 
+/* Chunks of every number of splats: each splat lies in one run of the list. */
+static void runs_hold_every_splat(void **state)
+{
+    struct spl_draw_list list = {0};
+    (void)state;
+    for (uint32_t splats = 1; splats <= SPL_CHUNK_SPLATS; splats++) {
+        spl_draw_list_clear(&list);
+        add(&list, 0, splats, 0, false);
+        assert_int_equal(spl_draw_list_lay_out(&list, 1, NULL), SPL_OK);
+        assert_int_equal(list.batch_count, 1);
+        uint32_t runs = list.batches[0].entries;
+        assert_true(runs * SPL_RUN_SPLATS >= splats && (runs - 1) * SPL_RUN_SPLATS < splats);
+        for (uint32_t run = 0; run < runs; run++)
+            assert_int_equal(list.entries[run], run);
+    }
+    spl_draw_list_finish(&list);
+}
+
+/* The half of the splats that was listed first hides chunks of the rest. */
+static void the_nearer_half_goes_first(void **state)
+{
+    struct spl_draw_list list = {0};
+    (void)state;
+    for (size_t chunks = 1; chunks < 12; chunks++) {
+        spl_draw_list_clear(&list);
+        for (uint32_t i = 0; i < chunks; i++)
+            add(&list, i % 2, 128, 0, false);
+        assert_int_equal(spl_draw_list_lay_out(&list, 2, NULL), SPL_OK);
+        assert_int_equal(list.first_back_chunk, (chunks + 1) / 2);
+        for (size_t b = 0; b < list.batch_count; b++)
+            for (uint32_t e = 0; e < list.batches[b].entries; e++)
+                assert_true(list.batches[b].back ==
+                            (list.entries[list.batches[b].first_entry + e] >> SPL_RUN_BITS >= list.first_back_chunk));
+    }
+    spl_draw_list_finish(&list);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pages_take_two_slots),
         cmocka_unit_test(slots_cover_the_entries),
+        cmocka_unit_test(runs_hold_every_splat),
+        cmocka_unit_test(the_nearer_half_goes_first),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,14 +1,28 @@
-/* What level selection says of nodes that are not there. */
+/* What level selection draws, against a selector that looks at everything (support/naive_select.h) and against the
+ * splats themselves; and what it says of nodes that are not there. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
 #include <cmocka.h>
 
+#include "dataset/chunk.h"
 #include "render/select.h"
 #include "support/make_dataset.h"
+#include "support/naive_select.h"
 
-enum { side = 40 };
+enum { side = 40, splats = 20000, width = 320, height = 200 };
+
+static uint64_t random_state;
+
+static double uniform(void)
+{
+    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(random_state >> 11) / 9007199254740992.0;
+}
 
 /* Grants as many nodes as are left. */
 static bool take_one(void *context, uint32_t page)
@@ -21,11 +35,11 @@ static bool take_one(void *context, uint32_t page)
 static void a_spacing_of_stand_ins_is_not_complete(void **state)
 {
     (void)state;
-    static struct make_splat splats[side * side];
+    static struct make_splat wall[side * side];
     for (int i = 0; i < side * side; i++)
-        splats[i] =
+        wall[i] =
             (struct make_splat){.position = {i % side * 0.1, i / side * 0.1, 0}, .normal = {0, 0, 1}, .radius = 0.05f};
-    struct spl_dataset *dataset = make_dataset_levels(splats, side * side, 2);
+    struct spl_dataset *dataset = make_dataset_levels(wall, side * side, 2);
     struct spl_view view;
     spl_view_init(&view);
     view.camera.near = 0.1;
@@ -50,8 +64,252 @@ static void a_spacing_of_stand_ins_is_not_complete(void **state)
     spl_dataset_close(dataset);
 }
 
+/* Clumps of a chunk each over two decades of size, in a cube of 2 m; radii as alike as the packer leaves them. */
+static struct spl_dataset *make_clumps(void)
+{
+    struct make_splat *all = calloc(splats, sizeof *all);
+    double middle[3] = {0}, size = 0;
+    assert_non_null(all);
+    for (size_t i = 0; i < splats; i++) {
+        if (i % SPL_CHUNK_SPLATS == 0) {
+            size = 0.005 * pow(100, uniform());
+            for (int c = 0; c < 3; c++)
+                middle[c] = (1 - size) * (2 * uniform() - 1);
+        }
+        for (int c = 0; c < 3; c++)
+            all[i].position[c] = middle[c] + size * (2 * uniform() - 1);
+        all[i].normal[2] = 1;
+        all[i].radius = (float)(0.012 * (0.6 + 0.8 * uniform()));
+    }
+    struct spl_dataset *dataset = make_dataset_levels(all, splats, 2);
+    free(all);
+    return dataset;
+}
+
+/* Around the cube, within it, beside it, with lenses of every length. */
+static struct spl_camera random_camera(void)
+{
+    struct spl_camera camera = {.near = 0.01, .far = uniform() < 0.2 ? 1.5 : 1000};
+    double away = 0.1 + 10 * uniform() * uniform();
+    for (;;) {
+        double eye[3], target[3];
+        for (int c = 0; c < 3; c++) {
+            eye[c] = away * (2 * uniform() - 1);
+            target[c] = 1.5 * (2 * uniform() - 1);
+        }
+        const double up[3] = {0.1, 0.2, 1};
+        if (!spl_camera_look_at(&camera, eye, target, up, NULL))
+            break;
+    }
+    assert_int_equal(spl_camera_set_fov(&camera, 10 + 80 * uniform(), width, height, NULL), SPL_OK);
+    camera.cx += 60 * (uniform() - 0.5);
+    camera.fy *= 0.8 + 0.4 * uniform();
+    return camera;
+}
+
+/* A disc as a ball in view space. */
+struct ball {
+    double at[3], radius;
+};
+
+static struct ball ball_of(const struct spl_dataset *dataset, const struct spl_camera *camera,
+                           const struct naive_chunk *drawn, uint32_t index)
+{
+    uint64_t count;
+    size_t bytes;
+    const struct spl_node *node = &spl_dataset_get_nodes(dataset, &count)[drawn->node];
+    struct spl_splat splat;
+    spl_chunk_decode(&spl_dataset_get_chunks(dataset, &count)[drawn->chunk],
+                     spl_dataset_get_page(dataset, node->page, &bytes), index, &splat);
+    struct ball ball = {.radius = splat.radius * drawn->scale};
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++)
+            ball.at[i] += camera->rotation[3 * i + a] * (node->origin[a] + splat.position[a] - camera->eye[a]);
+    return ball;
+}
+
+/* Does it reach into the image? Its middle lies where splats are drawn, and it on the inner side of each edge. */
+static bool is_seen(const struct spl_camera *camera, const struct ball *ball)
+{
+    if (!(ball->at[2] >= camera->near && ball->at[2] <= camera->far))
+        return false;
+    const double edges[4][3] = {{camera->fx, 0, camera->cx},
+                                {-camera->fx, 0, camera->width - camera->cx},
+                                {0, camera->fy, camera->cy},
+                                {0, -camera->fy, camera->height - camera->cy}};
+    for (int e = 0; e < 4; e++) {
+        double inside = 0, length = 0;
+        for (int c = 0; c < 3; c++) {
+            inside += edges[e][c] * ball->at[c];
+            length += edges[e][c] * edges[e][c];
+        }
+        if (inside < -ball->radius * sqrt(length))
+            return false;
+    }
+    return true;
+}
+
+/* What was listed of a chunk. */
+struct listed {
+    uint32_t times, count, last_window;
+    float radius_min;
+    double near;
+};
+
+static struct listed *index_list(const struct spl_draw_list *list, const struct spl_chunk *chunks, uint32_t chunk_count)
+{
+    struct listed *listed = calloc(chunk_count, sizeof *listed);
+    assert_non_null(listed);
+    for (size_t i = 0; i < list->chunk_count; i++) {
+        const struct spl_draw_chunk *draw = &list->chunks[i];
+        uint32_t at = 0, window = draw->count >> SPL_COUNT_BITS;
+        while (at < chunk_count && chunks[at].first_id != draw->first_id)
+            at++;
+        assert_true(at < chunk_count);
+        assert_true(!listed[at].times++ || window > listed[at].last_window); /* each window once */
+        listed[at].last_window = window;
+        listed[at].count = draw->count & ((1u << SPL_COUNT_BITS) - 1);
+        listed[at].radius_min = draw->radius_min;
+        listed[at].near = list->bounds[i].near;
+    }
+    return listed;
+}
+
+/* Splats whose balls lie over the middle of a pixel: at most as many discs can. */
+static uint32_t count_over(const struct spl_camera *camera, const struct ball *balls, size_t count, double x, double y)
+{
+    double ray[3] = {(x - camera->cx) / camera->fx, (y - camera->cy) / camera->fy, 1}, square = 0;
+    uint32_t over = 0;
+    for (int c = 0; c < 3; c++)
+        square += ray[c] * ray[c];
+    for (size_t i = 0; i < count; i++) {
+        double along = 0, away = 0;
+        for (int c = 0; c < 3; c++)
+            along += ray[c] * balls[i].at[c] / square;
+        for (int c = 0; c < 3; c++)
+            away += pow(along * ray[c] - balls[i].at[c], 2);
+        over += away < balls[i].radius * balls[i].radius;
+    }
+    return over;
+}
+
+/* Whether the root was asked for. */
+static bool check_view(const struct spl_dataset *dataset, const struct spl_camera *camera, double lod)
+{
+    uint64_t chunk_count;
+    size_t count, seen_balls = 0;
+    int left = 1 << 30;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    struct spl_select_params params = {.dataset = dataset,
+                                       .camera = camera,
+                                       .lod = lod,
+                                       .low_pass = (double)SPL_LOW_PASS,
+                                       .discs = true,
+                                       .resident = take_one,
+                                       .context = &left};
+    struct spl_draw_list list = {0};
+    assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
+    struct listed *listed = index_list(&list, chunks, chunk_count);
+    struct naive_chunk *naive =
+        naive_select(&(struct naive_options){.dataset = dataset, .camera = camera, .lod = lod}, &count);
+    struct ball *balls = calloc(splats + splats / 4, sizeof *balls);
+    assert_non_null(balls);
+    uint64_t drawn = 0;
+    for (size_t i = 0; i < count; i++) {
+        struct listed *is = &listed[naive[i].chunk];
+        bool wanted = false;
+        for (uint32_t k = 0; k < naive[i].count; k++) {
+            struct ball ball = ball_of(dataset, camera, &naive[i], k);
+            bool seen = is_seen(camera, &ball);
+            wanted |= seen;
+            if (seen)
+                balls[seen_balls++] = ball;
+            if (seen && is->times && is->near > 0) /* not hidden by what lies behind it; 0: never is */
+                assert_true(is->near <= ball.at[2] - ball.radius);
+        }
+        if (wanted && !is->times)
+            fail_msg("chunk %u of node %u is not drawn at lod %g", naive[i].chunk, naive[i].node, lod);
+        if (!is->times)
+            continue;
+        drawn += is->count;
+        assert_int_equal(is->count, naive[i].count);
+        assert_float_equal(is->radius_min / (float)(chunks[naive[i].chunk].radius_min * naive[i].scale), 1, 1e-6);
+        is->times = 0;
+    }
+    assert_int_equal(drawn, list.splats);
+    for (uint32_t c = 0; c < chunk_count; c++)
+        assert_int_equal(listed[c].times, 0); /* nothing of another level */
+    for (int y = 5; y < height; y += 40)
+        for (int x = 5; x < width; x += 40)
+            assert_true(count_over(camera, balls, seen_balls, x + 0.5, y + 0.5) <= list.sample_splats);
+    double spacing;
+    bool complete = true;
+    assert_int_equal(spl_select_spacing(&params, &spacing, &complete, NULL), SPL_OK);
+    assert_float_equal(spacing / naive_spacing(naive, count), 1, 1e-9);
+    bool coarse = naive[0].node == 0;
+    free(balls);
+    free(naive);
+    free(listed);
+    spl_draw_list_finish(&list);
+    return coarse;
+}
+
+static void every_splat_that_is_seen_is_drawn_at_its_level(void **state)
+{
+    (void)state;
+    static const double lods[] = {0, 0.3, 1, 4, 16};
+    unsigned coarse = 0;
+    random_state = 17;
+    struct spl_dataset *dataset = make_clumps();
+    for (int view = 0; view < 400; view++) {
+        struct spl_camera camera = random_camera();
+        coarse += check_view(dataset, &camera, lods[view % 5]);
+    }
+    assert_in_range(coarse, 40, 360); /* both levels were asked for */
+    spl_dataset_close(dataset);
+}
+
+/* Nodes come nearest first: what is drawn first hides the rest, and takes memory first. */
+static void nodes_are_listed_front_to_back(void **state)
+{
+    (void)state;
+    random_state = 23;
+    struct spl_dataset *dataset = make_clumps();
+    uint64_t node_count, chunk_count;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    for (int view = 0; view < 20; view++) {
+        struct spl_camera camera = random_camera();
+        struct spl_draw_list list = {0};
+        int left = 1 << 30;
+        double last = -INFINITY;
+        struct spl_select_params params = {
+            .dataset = dataset, .camera = &camera, .resident = take_one, .context = &left};
+        assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
+        for (size_t i = 0; i < list.chunk_count; i++) {
+            uint32_t n = 0, c = 0;
+            while (chunks[c].first_id != list.chunks[i].first_id)
+                c++;
+            while (nodes[n].first_chunk > c || nodes[n].first_chunk + nodes[n].chunk_count <= c)
+                n++;
+            double depth = 0;
+            for (int a = 0; a < 3; a++)
+                depth += camera.rotation[6 + a] * (nodes[n].origin[a] - camera.eye[a] +
+                                                   0.5 * ((double)nodes[n].box_min[a] + nodes[n].box_max[a]));
+            assert_true(depth >= last - 1e-6);
+            last = depth;
+        }
+        spl_draw_list_finish(&list);
+    }
+    spl_dataset_close(dataset);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_spacing_of_stand_ins_is_not_complete)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_spacing_of_stand_ins_is_not_complete),
+        cmocka_unit_test(every_splat_that_is_seen_is_drawn_at_its_level),
+        cmocka_unit_test(nodes_are_listed_front_to_back),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

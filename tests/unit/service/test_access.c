@@ -313,11 +313,31 @@ static void a_table_full_of_addresses_still_works(void **state)
     spl_buckets_destroy(buckets);
 }
 
+/* Who asks again and again is known among very many others: a new address takes the place of who was longest away. */
+static void who_was_longest_away_makes_room(void **state)
+{
+    (void)state;
+    struct spl_buckets *buckets;
+    uint8_t key[SPL_BUCKET_KEY] = {0}, busy[SPL_BUCKET_KEY];
+    uint64_t now = SPL_NS_PER_S;
+    memset(busy, 0xff, sizeof busy);
+    assert_int_equal(spl_buckets_create(1, &buckets, NULL), 0);
+    assert_int_equal(spl_buckets_take(buckets, busy, now), 0);
+    assert_int_equal(spl_buckets_take(buckets, busy, now), 0);
+    for (uint32_t i = 0; i < 100000; i++) {
+        memcpy(key, &i, sizeof i);
+        spl_buckets_take(buckets, key, ++now);
+        if (i % 10 == 0)
+            assert_int_not_equal(spl_buckets_take(buckets, busy, now), 0);
+    }
+    spl_buckets_destroy(buckets);
+}
+
 static void a_host_is_an_address_or_a_name_that_is_listed(void **state)
 {
     (void)state;
     char *items[] = {"Scans.example.", "[2001:db8::1]", "*", "not a name"};
-    const struct spl_text_list none = {0}, some = {items, 2}, any = {items, 4};
+    const struct spl_text_list none = {0}, some = {.items = items, .count = 2}, any = {.items = items, .count = 4};
     static const char *const bad[] = {"", ":80", ".", "..", "a..", "[", "[]", "[::1", "[::1]x", "[::1]:x", "[a]", "::1",
                                       "a b", "a/b", "a@b", "a:1:2", "a:80x", "a,b", "\xc3\xa4.example", "a%2e", "a#b"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -358,6 +378,7 @@ int main(void)
         cmocka_unit_test(keys_that_are_too_short_are_refused),
         cmocka_unit_test(buckets_empty_and_fill_again),
         cmocka_unit_test(a_table_full_of_addresses_still_works),
+        cmocka_unit_test(who_was_longest_away_makes_room),
         cmocka_unit_test(a_host_is_an_address_or_a_name_that_is_listed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

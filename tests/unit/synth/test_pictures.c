@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include <jansson.h>
 #include <splatd/synth.h>
 
 #include "base/memory.h"
@@ -221,6 +222,28 @@ static void photographers_stand_free(void **state)
     }
 }
 
+/* The second pose of the list is the second station's, to the bit. */
+static void check_pose(const struct spl_scene *scene)
+{
+    const struct spl_station *station = &scene->stations[1];
+    json_t *json = json_load_file(in_folder("panoramas/panoramas/panoramas.json"), 0, NULL);
+    json_t *list = json_object_get(json, "panoramas"), *pose = json_array_get(list, 1);
+    assert_true(json_is_string(json_object_get(json, "mapping")));
+    assert_int_equal(json_array_size(list), scene->station_count);
+    assert_string_equal(json_string_value(json_object_get(pose, "name")), "station-2");
+    assert_string_equal(json_string_value(json_object_get(pose, "color")), "station-2.color.png");
+    assert_string_equal(json_string_value(json_object_get(pose, "range")), "station-2.range.npy");
+    assert_int_equal(json_integer_value(json_object_get(pose, "width")), 256);
+    assert_int_equal(json_integer_value(json_object_get(pose, "height")), 128);
+    for (size_t i = 0; i < 3; i++)
+        assert_true(json_number_value(json_array_get(json_object_get(pose, "position"), i)) ==
+                    station->position[i] + scene->offset[i]);
+    assert_int_equal(json_array_size(json_object_get(pose, "rotation")), 9);
+    for (size_t i = 0; i < 9; i++)
+        assert_true(json_number_value(json_array_get(json_object_get(pose, "rotation"), i)) == station->rotation[i]);
+    json_decref(json);
+}
+
 static void panoramas_come_with_poses(void **state)
 {
     (void)state;
@@ -230,6 +253,7 @@ static void panoramas_come_with_poses(void **state)
     assert_int_equal(file_count(in_folder("panoramas/panoramas")), 9); /* four stations, one list */
     struct spl_scene *scene = NULL;
     assert_int_equal(spl_scene_create("courtyard", &scene, NULL), 0);
+    check_pose(scene);
     struct spl_image color = load(in_folder("panoramas/panoramas/station-2.color.png"), SPL_LAYER_COLOR);
     struct spl_image range = load(in_folder("panoramas/panoramas/station-2.range.npy"), SPL_LAYER_RANGE);
     assert_int_equal(color.width, 256);

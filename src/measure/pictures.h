@@ -1,10 +1,14 @@
-/* Where an image differs from the truth: a picture for reports. */
-#ifndef SPL_MEASURE_ERROR_MAP_H
-#define SPL_MEASURE_ERROR_MAP_H
+/* Pictures for people and reports: small ones, and where an image differs from the truth. */
+#ifndef SPL_MEASURE_PICTURES_H
+#define SPL_MEASURE_PICTURES_H
 
 #include <splatd/image.h>
 
 #include "base/error.h"
+
+/* `color` (RGBA8, over black) at most `side` (> 0) pixels wide, averaged down by a whole number. The caller owns *out;
+ * it is zeroed on failure. Any thread. */
+int spl_thumbnail(const struct spl_image *color, uint32_t side, struct spl_encoded *out, struct spl_error *err);
 
 enum { SPL_ERROR_MAP_GAIN = 8 };
 

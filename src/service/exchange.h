@@ -1,0 +1,72 @@
+/* One request of HTTP and its reply, and how it waits for what others make. Owned by the loop's thread. */
+#ifndef SPL_SERVICE_EXCHANGE_H
+#define SPL_SERVICE_EXCHANGE_H
+
+#include <microhttpd.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/queue.h>
+
+#include "service/view/flights.h"
+
+/* From its first line until its reply is written. */
+struct request {
+    LIST_ENTRY(request) link; // spl_http.waiting, while `waits`
+    struct spl_service *service;
+    struct MHD_Connection *handle;
+    struct connection *connection;
+    uint64_t number, began_ns;
+    char id[65]; /* X-Request-Id of the reply */
+    char method[16];
+    const char *route; /* its pattern; NULL when there is none */
+    const char *cache; /* for the log: "hit", "miss", …; NULL where no cache was asked */
+    char *uri;         /* path, cut at '?'; NULL when the URI was too long */
+    const char *query; /* inside uri, "" when there is none */
+    char *body;        // may be NULL
+    size_t body_length, body_capacity, body_seen;
+    const struct spl_token *token; // may be NULL; what it shows, only while it is routed
+    bool started;
+    bool has_host;  /* of HTTP/1.1, which demands it */
+    bool head;      /* the method is HEAD */
+    bool closes;    /* the connection ends with the reply */
+    bool prepared;  /* the reply has its last headers and is counted */
+    bool abandoned; /* the client has left: close without a reply */
+    bool suspended; /* libmicrohttpd does not go on with it */
+    bool waits;     /* suspended, until a view is ready or deadline_ns */
+    uint64_t deadline_ns;
+    struct batch *batch;           // may be NULL; the views that it waits for
+    struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
+    struct ticket ticket;          /* of the view that it waits for */
+    bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
+    bool versioned;                /* the URL names the dataset's version */
+    bool large;                    /* the view goes the large ones' way */
+    struct change *change;         /* of a dataset, in progress; NULL otherwise */
+    struct MHD_Response *response; // may be NULL
+    unsigned status;
+};
+
+/* What a route's handler is called with; valid during the call. */
+enum spl_http_method { SPL_GET, SPL_POST, SPL_PUT, SPL_DELETE }; /* HEAD is GET as well: MHD leaves the body out */
+struct spl_call {
+    enum spl_http_method method;
+    char id[256];                    /* of the dataset in the path, decoded; "" without */
+    struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a route of scope ADMIN
+    char name[256];                  /* the path's other segment, decoded; "" without */
+    char number[24];                 /* the path's {n}, decoded; "" without */
+};
+
+/* routes.c: fills request->response, or has the request wait. */
+void spl_route(struct request *request, const char *method);
+
+/* http.c: frees it. */
+void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode code);
+/* The one way to have libmicrohttpd leave a request alone, and take it up again; both idempotent. */
+void spl_request_suspend(struct request *request);
+void spl_request_resume(struct request *request);
+
+/* waiting.c: requests that wait for views, batches and tours. */
+void spl_waiting_add(struct request *request, uint64_t deadline_ns); /* suspends it */
+void spl_waiting_resume(struct request *request);                    /* its response is set */
+void spl_waiting_refuse_all(struct spl_service *service);
+
+#endif

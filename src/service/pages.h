@@ -1,0 +1,20 @@
+/* What lies in the program itself: the page, its modules and the clients (page_route.c), the interface's own document
+ * (openapi_route.c). Handlers of routes; owned by the loop's thread. */
+#ifndef SPL_SERVICE_PAGES_H
+#define SPL_SERVICE_PAGES_H
+
+#include <stdbool.h>
+
+struct request;
+struct spl_call;
+
+bool spl_wants_page(struct request *request); /* its Accept names text/html, and nothing of JSON before that */
+void spl_show_page(struct request *request);
+void spl_show_viewer_file(struct request *request, const struct spl_call *call);
+void spl_show_embed(struct request *request, const struct spl_call *call);
+void spl_list_clients(struct request *request, const struct spl_call *call);
+void spl_show_client(struct request *request, const struct spl_call *call);
+void spl_show_openapi_yaml(struct request *request, const struct spl_call *call);
+void spl_show_openapi_json(struct request *request, const struct spl_call *call);
+
+#endif

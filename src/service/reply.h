@@ -1,0 +1,33 @@
+/* Replies: each sets request->response and status; without memory the response stays NULL and the connection closes.
+ * Those of views are view/reply.h's. Owned by the loop's thread. */
+#ifndef SPL_SERVICE_REPLY_H
+#define SPL_SERVICE_REPLY_H
+
+#include <jansson.h>
+#include <microhttpd.h>
+
+#include "base/error.h"
+
+struct request;
+
+void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
+                       const char *detail);
+void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
+void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
+void spl_reply_empty(struct request *request, unsigned status);
+void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
+/* 200, of a length that nobody knows when it begins; `destroy` gets `context` with the last of the reply, not after
+ * failure. The only way to such a reply, HEAD included. */
+void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,
+                      MHD_ContentReaderFreeCallback destroy);
+
+/* Adds a header to a response that there is; bytes that no header may hold become '?'. */
+void spl_reply_add_header(struct request *request, const char *name, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* The body of a problem, malloc'd; NULL without memory. */
+char *spl_problem_print(const struct request *request, unsigned status, const char *type, const char *field,
+                        const char *detail);
+char *spl_problem_text(const struct request *request, const struct spl_error *err);
+
+#endif

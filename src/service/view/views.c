@@ -1,0 +1,125 @@
+/* The life of the room of views, and what its routes check alike. Owned by the loop's thread, but for wake(). */
+#include "service/view/views.h"
+
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "service/datasets/library.h"
+#include "service/http.h"
+#include "service/ops/ops.h"
+#include "service/state.h"
+
+/* Of replies with small views, and with large ones; beyond, they are refused until clients have read. */
+enum { reply_bytes_max = 1 << 30 };
+
+/* Any thread: a job is done, or the pipeline's state has changed. */
+static void wake(void *context)
+{
+    struct spl_service *service = context;
+    uv_async_send(&service->wake);
+}
+
+static int start_pipeline(struct spl_service *service, struct spl_error *err)
+{
+    const struct spl_catalog *catalog = &service->library->catalog;
+    struct spl_catalog_entry **entries = service->views->entries = spl_alloc(catalog->count, sizeof *entries, err);
+    size_t count = 0;
+    if (!entries)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < catalog->count; i++)
+        if (catalog->slots[i].current)
+            entries[count++] = catalog->slots[i].current;
+    struct spl_pipeline_options options = {
+        .renderer = {.device = service->options->device,
+                     .require_gpu = service->options->require_gpu,
+                     .memory_limit = service->options->memory_limit},
+        .entries = entries,
+        .entry_count = count,
+        .queue = service->options->queue,
+        .encoders = service->options->encoders,
+        .samples_max = 4 * service->options->samples_max,
+        .counters = service->counters,
+        .wake = wake,
+        .wake_context = service,
+    };
+    return spl_pipeline_create(&options, &service->views->pipeline, err);
+}
+
+int spl_views_start(struct spl_service *service, struct spl_error *err)
+{
+    int rc = spl_cache_create(service->options->cache_bytes, &service->views->cache, err);
+    return rc ? rc : start_pipeline(service, err);
+}
+
+void spl_views_finish(struct spl_service *service)
+{
+    struct spl_views *views = service->views;
+    spl_pipeline_destroy(views->pipeline);
+    spl_cache_destroy(views->cache);
+    free(views->entries);
+    *views = (struct spl_views){0};
+}
+
+/* Latencies of what was rendered, for whoever waited. */
+static void observe(struct spl_service *service, const struct spl_job *job)
+{
+    const char *route = job->route;
+    if (!job->rendered_ns)
+        return;
+    spl_latency_observe(&service->ops->latencies, route, SPL_LATENCY_QUEUE, job->queue_ms / 1000);
+    spl_latency_observe(&service->ops->latencies, route, SPL_LATENCY_FRAME,
+                        (double)(job->rendered_ns - job->began_ns) / SPL_NS_PER_S);
+    spl_latency_add_stages(&service->ops->latencies, &job->stats);
+    if (!job->err.code)
+        spl_latency_observe(&service->ops->latencies, route, SPL_LATENCY_ENCODE, job->encode_ms / 1000);
+}
+
+void spl_views_complete(struct spl_service *service)
+{
+    for (struct spl_job *job; (job = spl_pipeline_take(service->views->pipeline));) {
+        observe(service, job);
+        if (job->done)
+            job->done(job);
+        else
+            spl_job_destroy(job);
+    }
+    spl_http_pump(service);
+}
+
+/* A URL that names a version means that one, whatever is served by now. */
+int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
+                           struct spl_error *err)
+{
+    if (!view->versioned || view->version == info->version)
+        return 0;
+    return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
+                          (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+}
+
+/* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view
+ * from being made. */
+bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view, struct spl_error *err)
+{
+    bool large = spl_request_is_large(view);
+    const struct spl_views *views = service->views;
+    size_t bytes = views->reply_bytes;
+    if (large) {
+        struct spl_pipeline_status status;
+        spl_pipeline_get_status(views->pipeline, &status);
+        bytes = views->large_reply_bytes + status.large_bytes;
+    }
+    uint64_t own = large ? spl_view_get_frame_bytes(&view->view) : 0;
+    if (!bytes || bytes + own <= reply_bytes_max) // one alone always gets in
+        return false;
+    spl_fail(err, SPL_E_BUSY, "%zu bytes of images are on their way to clients; come back later", bytes);
+    return true;
+}
+
+struct spl_camera_limits spl_view_get_limits(const struct spl_service *service)
+{
+    return (struct spl_camera_limits){.side_px = SPL_SERVICE_SIDE_MAX,
+                                      .pixels = service->options->pixels_max,
+                                      .samples = service->options->samples_max,
+                                      .bytes = SPL_FRAME_BYTES_MAX};
+}

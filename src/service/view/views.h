@@ -1,0 +1,53 @@
+/* The room of views: what renders them, what is kept of them, and the routes that make them. Owned by the loop's
+ * thread. */
+#ifndef SPL_SERVICE_VIEWS_H
+#define SPL_SERVICE_VIEWS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <sys/queue.h>
+
+#include "base/error.h"
+#include "service/request/request.h"
+#include "service/view/cache.h"
+#include "service/view/pipeline.h"
+
+struct spl_service;
+struct request;
+struct spl_call;
+struct batch;
+
+struct spl_views {
+    struct spl_pipeline *pipeline;      // NULL until the datasets at start are open, as is the cache
+    struct spl_catalog_entry **entries; /* of the catalog at start, for the pipeline */
+    struct spl_cache *cache;
+    LIST_HEAD(, flight) flights;
+    size_t reply_bytes;       /* of views that clients have not read yet and that are not in the cache */
+    size_t large_reply_bytes; /* the same of large views */
+};
+
+/* views.c: cache and pipeline, over the datasets that are served now. finish() takes what a start that failed has left,
+ * and comes once nobody else refers to an entry. */
+int spl_views_start(struct spl_service *service, struct spl_error *err);
+void spl_views_finish(struct spl_service *service);
+
+/* Hands out every job that is done. */
+void spl_views_complete(struct spl_service *service);
+
+/* What views, batches and tours of them check alike. */
+int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
+                           struct spl_error *err);
+bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view,
+                          struct spl_error *err); /* too much waits for clients */
+struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);
+
+/* route.c: /v1/datasets/{id}/view and /pick. */
+void spl_make_view(struct request *request, const struct spl_call *call);
+void spl_pick(struct request *request, const struct spl_call *call);
+
+/* batch.c: /v1/datasets/{id}/views. */
+void spl_make_views(struct request *request, const struct spl_call *call);
+void spl_batch_go_on(struct batch *batch);   /* asks for the next views where it may; never blocks */
+void spl_batch_abandon(struct batch *batch); /* its request no longer waits for it; NULL-safe */
+
+#endif

@@ -1,0 +1,163 @@
+/* One inner node over clusters whose parts are known: what the splat that stands for four of them is, by the numbers. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "clouds.h"
+#include "pack/tree.h"
+
+enum { groups = 16, parts = 4, count = groups * parts };
+
+static const double usual = 0.1; /* radius of most parts, so of the median */
+
+/* A cluster's cell is as wide as two splats of the median radius; groups lie in the middle of every eighth. */
+static double cell_size(void)
+{
+    return 2 * (double)(float)usual / 1.128379;
+}
+
+struct made {
+    struct spl_points points;
+    struct spl_tree tree;
+};
+
+static struct made make(void)
+{
+    double(*position)[3] = calloc(count, sizeof *position);
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = ((c ? 0 : 8 * (i / parts)) + 0.5) * cell_size();
+    struct made made = {.points = cloud_of((const double(*)[3])position, count)};
+    free(position);
+    struct spl_points *p = &made.points;
+    p->normal = calloc(count, sizeof *p->normal);
+    p->radius = calloc(count, sizeof *p->radius);
+    p->uncertainty = calloc(count, sizeof *p->uncertainty);
+    p->linear = calloc(count, 1);
+    for (int i = 0; i < count; i++) {
+        p->normal[i][2] = 1;
+        p->radius[i] = (float)usual;
+        p->color_class[i] = 0;
+    }
+    struct spl_tree_node *nodes = calloc(3, sizeof *nodes);
+    nodes[0] = (struct spl_tree_node){.size = 100, .end = count, .first_child = 1, .child_count = 2};
+    for (uint32_t k = 0; k < 2; k++)
+        nodes[1 + k] = (struct spl_tree_node){
+            .size = 50, .depth = 1, .begin = k * count / 2, .end = (k + 1) * count / 2, .splat_count = count / 2};
+    made.tree = (struct spl_tree){.nodes = nodes, .count = 3, .levels = 2};
+    return made;
+}
+
+static const struct spl_inner_splat *build(struct made *made, uint32_t clusters)
+{
+    struct spl_stage stage = quiet_stage(1);
+    assert_int_equal(spl_levels_build(&made->tree, &made->points, &stage, NULL), 0);
+    assert_int_equal(made->tree.nodes[0].splat_count, clusters);
+    return made->tree.nodes[0].splats;
+}
+
+static void done(struct made *made)
+{
+    spl_tree_finish(&made->tree);
+    spl_points_finish(&made->points);
+}
+
+/* The `nth` splat that stands for a group. */
+static const struct spl_inner_splat *of_group(const struct made *made, int group, int nth)
+{
+    const struct spl_tree_node *root = &made->tree.nodes[0];
+    for (uint32_t i = 0; i < root->splat_count; i++)
+        if (fabs((double)root->splats[i].position[0] / cell_size() - 8 * group - 0.5) < 1 && !nth--)
+            return &root->splats[i];
+    fail_msg("group %d has no splat", group);
+    return NULL;
+}
+
+static void set_colors(struct made *made, int group, const uint32_t colors[parts])
+{
+    for (int i = 0; i < parts; i++)
+        made->points.color_class[group * parts + i] = colors[i];
+}
+
+static void colours_are_rounded_means(void **state)
+{
+    (void)state;
+    struct made made = make();
+    set_colors(&made, 2, (uint32_t[]){10, 11, 11, 11}); /* 10.75 */
+    set_colors(&made, 3, (uint32_t[]){10, 10, 10, 11}); /* 10.25 */
+    set_colors(&made, 4, (uint32_t[]){0xff00fe, 0xff01ff, 0xff01ff, 0xff01ff});
+    set_colors(&made, 9, (uint32_t[]){200, 100, 100, 100});
+    made.points.radius[9 * parts] = 0.2f; /* as much as four of the others: 1100 / 7 */
+    build(&made, groups);
+    assert_int_equal(of_group(&made, 2, 0)->color_class, 11);
+    assert_int_equal(of_group(&made, 3, 0)->color_class, 10);
+    assert_int_equal(of_group(&made, 4, 0)->color_class, 0xff01ff);
+    assert_int_equal(of_group(&made, 9, 0)->color_class, 157);
+    done(&made);
+}
+
+static void most_parts_give_class_and_linear(void **state)
+{
+    (void)state;
+    struct made made = make();
+    set_colors(&made, 1, (uint32_t[]){5u << 24, 5u << 24, 5u << 24, 3u << 24});
+    set_colors(&made, 6, (uint32_t[]){3u << 24, 5u << 24, 5u << 24, 5u << 24});
+    for (int i = 0; i < 3; i++)
+        made.points.linear[10 * parts + i] = 1;
+    made.points.linear[11 * parts] = 1;
+    for (int i = 0; i < parts; i++)
+        made.points.uncertainty[7 * parts + i] = 0.1f * (float)(i + 1);
+    build(&made, groups);
+    assert_int_equal(of_group(&made, 1, 0)->color_class >> 24, 5);
+    assert_int_equal(of_group(&made, 6, 0)->color_class >> 24, 5);
+    assert_true(of_group(&made, 10, 0)->linear);
+    assert_false(of_group(&made, 11, 0)->linear);
+    assert_float_equal(of_group(&made, 7, 0)->uncertainty, 0.25, 1e-6);
+    done(&made);
+}
+
+/* A disc has the area of its parts, reaches over them, and is no smaller than the largest. */
+static void radii_hold_the_parts(void **state)
+{
+    (void)state;
+    struct made made = make();
+    double middle = (8 * 5 + 0.5) * cell_size();
+    for (int i = 0; i < parts; i++) { /* along a line of 0.12 */
+        made.points.axis[0][5 * parts + i] = middle + 0.04 * i - 0.06;
+        made.points.radius[5 * parts + i] = 0.01f;
+    }
+    made.points.radius[12 * parts] = 0.5f;
+    build(&made, groups);
+    assert_float_equal(of_group(&made, 0, 0)->radius, 2 * usual, 1e-6);
+    const struct spl_inner_splat *line = of_group(&made, 5, 0);
+    assert_float_equal(line->position[0], middle, 1e-6);
+    assert_true(line->radius >= 0.06f && line->radius < 0.1f);
+    assert_float_equal(of_group(&made, 12, 0)->radius, 0.5, 1e-6);
+    done(&made);
+}
+
+static void a_thin_wall_keeps_both_faces(void **state)
+{
+    (void)state;
+    struct made made = make();
+    for (int i = 0; i < parts; i += 2)
+        made.points.normal[8 * parts + i][2] = -1;
+    build(&made, groups + 1);
+    float first = of_group(&made, 8, 0)->normal[2], second = of_group(&made, 8, 1)->normal[2];
+    assert_float_equal(first * second, -1, 0);
+    done(&made);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(colours_are_rounded_means),
+        cmocka_unit_test(most_parts_give_class_and_linear),
+        cmocka_unit_test(radii_hold_the_parts),
+        cmocka_unit_test(a_thin_wall_keeps_both_faces),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
