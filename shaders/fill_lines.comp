@@ -1,25 +1,36 @@
-/* Method fill: wires, lines one sample wide between the points that src/dataset/wires.c joined, an invocation each.
- * They are linear, as their points are. */
+/* Method fill: wires, poles and cables, lines one sample wide from vertex to vertex of chunks of lines, an invocation
+ * for each piece. They are linear, as their points are. What a sample shows is of the nearer of the piece's two
+ * vertices. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
+#include "common/octahedral.glsl"
+#include "common/splat.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
-SPL_TEXEL_BUFFER(SPL_TEXELS_LINES) line_texels; /* struct spl_draw_line[] */
-
-uint line_word(uint line, int word)
+/* Of vertex `index`. */
+uint payload(spl_draw_chunk chunk, splat vertex)
 {
-    return imageLoad(line_texels, int(line) * SPL_LINE_WORDS + word).x;
+    if (GROUP == SPL_SUMS_COLOR) {
+        uvec3 c = load_color(chunk, vertex.index);
+        return c.x | c.y << 8 | c.z << 16;
+    }
+    if (GROUP == SPL_SUMS_NORMAL)
+        return pack_normal(vertex.normal);
+    return chunk.first_id + vertex.index;
 }
 
-vec3 line_end(uint line, int word)
+/* How much of the way from end `at` of a piece to the other one lies beyond the planes near and far. */
+float beyond(float at, float other)
 {
-    return uintBitsToFloat(uvec3(line_word(line, word), line_word(line, word + 1), line_word(line, word + 2)));
+    precise float share = (clamp(at, frame.near, frame.far) - at) / (other - at);
+    return at < frame.near || at > frame.far ? share : 0.0;
 }
 
-/* Along the image axis on which the line is longer, sample by sample. */
-void draw_line(vec3 from, vec3 to, uint payload)
+/* Along the image axis on which the piece is longer, sample by sample. `middle` is the share of the way from `from` to
+ * `to`, in space, up to which it is the first payload's. */
+void draw_piece(vec3 from, vec3 to, float middle, uvec2 payloads)
 {
     precise vec2 a = vec2(frame.fx * (from.x / from.z) + frame.cx, frame.fy * (from.y / from.z) + frame.cy);
     precise vec2 b = vec2(frame.fx * (to.x / to.z) + frame.cx, frame.fy * (to.y / to.z) + frame.cy);
@@ -39,19 +50,34 @@ void draw_line(vec3 from, vec3 to, uint payload)
             uint at = sample_index(upright ? ivec2(int(floor(across)), k) : ivec2(k, int(floor(across))));
             uint bits = (floatBitsToUint(z) & ~SPL_FILL_DEPTH_BITS) | SPL_FILL_LINEAR;
             if (wins(at, bits))
-                put(at, bits, payload);
+                put(at, bits, t * w1 * z < middle ? payloads.x : payloads.y);
         }
         if (++k > end)
             break;
     }
 }
 
+/* The piece between the planes. */
+void draw(spl_draw_chunk chunk, splat a, splat b)
+{
+    vec3 p = a.position, q = b.position;
+    float skip = beyond(p.z, q.z), rest = beyond(q.z, p.z);
+    precise vec3 from = p + skip * (q - p), to = q + rest * (p - q);
+    from.z = clamp(p.z, frame.near, frame.far);
+    to.z = clamp(q.z, frame.near, frame.far);
+    precise float middle = (0.5 - skip) / (1.0 - skip - rest);
+    draw_piece(from, to, middle, uvec2(payload(chunk, a), payload(chunk, b)));
+}
+
 void main()
 {
     load_frame();
-    uint line = frame.first_entry + min(gl_GlobalInvocationID.x, frame.entries - 1u);
-    uint payload = line_word(line, GROUP == SPL_SUMS_COLOR ? 6 : GROUP == SPL_SUMS_NORMAL ? 7 : 8);
-    vec3 from = line_end(line, 0), to = line_end(line, 3);
-    if (gl_GlobalInvocationID.x < frame.entries)
-        draw_line(from, to, payload);
+    splat_run run = load_run_of(gl_GlobalInvocationID.x / SPL_RUN_SPLATS);
+    uint i = run.first + gl_GlobalInvocationID.x % SPL_RUN_SPLATS;
+    if (i >= run.end || i + 1u >= bitfieldExtract(run.chunk.count, 0, SPL_COUNT_BITS) || !is_linear(run.chunk, i))
+        return;
+    splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL);
+    splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL);
+    if (max(a.position.z, b.position.z) > frame.near && min(a.position.z, b.position.z) < frame.far)
+        draw(run.chunk, a, b);
 }

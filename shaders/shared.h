@@ -122,7 +122,7 @@ struct spl_draw_chunk {
     SPL_U32 color_base;                   /* int16 base of u (low half) and v (high half) */
     SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
     SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
-    SPL_U32 count;                        /* SPL_COUNT_*: splats of the chunk that are drawn, and the window of the tile */
+    SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the tile */
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for */
 };
@@ -178,14 +178,6 @@ struct spl_draw_chunk {
 #define SPL_OCCLUSION_TILE 8
 #define SPL_OCCLUSION_TILES_MAX 32768
 
-/* A straight piece of a wire, view space, and its payload for each group of layers; made by the CPU. */
-struct spl_draw_line {
-    SPL_F32 from_x, from_y, from_z;
-    SPL_F32 to_x, to_y, to_z;
-    SPL_U32 color, normal, id; /* 8 bits a channel; octahedral.glsl; of a splat */
-};
-#define SPL_LINE_WORDS 9
-
 /* Where a drawn chunk can reach, made by the CPU. */
 struct spl_chunk_bounds {
     SPL_U32 first, last; /* occlusion tiles, x | y << 16, inclusive */
@@ -227,7 +219,6 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(sizeof(struct spl_draw_line) == 4 * SPL_LINE_WORDS, "spl_draw_line is 36 bytes on both sides");
 _Static_assert(sizeof(struct spl_frame_params) == 188, "spl_frame_params is 188 bytes on both sides");
 #endif
 

@@ -21,6 +21,7 @@ enum spl_attribute {
     SPL_ATTRIBUTE_COLOR,
     SPL_ATTRIBUTE_LINEAR,
     SPL_ATTRIBUTE_CLIP,    /* clip lines and the mask that says which splats have one */
+    SPL_ATTRIBUTE_LINES,   /* chunks of lines, with their headers: wires, poles and cables */
     SPL_ATTRIBUTE_CHUNK,   /* chunk, node and stream headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,
@@ -45,6 +46,8 @@ struct spl_dataset_info {
     uint64_t points;           /* read from the sources, before duplicates were dropped */
     uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
     uint64_t splats;           /* leaf splats plus those of the inner levels */
+    uint64_t pieces;           /* straight pieces of wires, poles and cables, of all levels */
+    uint64_t ids;              /* of splats and of the pieces' vertices: below it */
     uint32_t levels;           /* depth of the octree, 1 = a single node */
     uint64_t nodes, chunks;
     uint32_t pages;

@@ -76,7 +76,8 @@ struct spl_pack_options {
     unsigned threads;          /* 0 = all cores */
     const struct spl_photo_options *photos; /* NULL = the scan's own colours */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
-    /* Each thing in which scans disagree, once they have been read: a sentence or two without a newline. May be NULL. */
+    /* Each thing in which scans disagree, once they have been read, and wires that are too dear to join: a sentence or
+     * two without a newline. May be NULL. */
     void (*warn)(void *context, const char *text);
     void *progress_context; /* of both */
 };
@@ -84,6 +85,7 @@ struct spl_pack_options {
 struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
     uint64_t linear; /* leaf splats on wires, poles and cables */
+    uint64_t pieces; /* straight ones between them, of all levels */
     uint32_t levels, pages;
     uint64_t nodes, chunks;
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT];

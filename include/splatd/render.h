@@ -24,6 +24,8 @@ struct spl_view {
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
     struct spl_disc_params disc; /* of methods that draw discs, as SPL_METHOD_PARAMS says */
     struct spl_fill_params fill; /* of those that fill */
+    bool partial;               /* draws what is on the device now, coarser where pages are still to come; else waits for
+                                   them. A dataset's first page is waited for in any case */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
@@ -49,9 +51,11 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err);
 int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
 
 struct spl_frame_stats {
-    uint64_t splats_drawn, chunks_drawn, nodes_drawn, pages_loaded;
+    uint64_t splats_drawn, chunks_drawn, nodes_drawn;
+    uint64_t pages_loaded;      /* that the frame has waited for */
     uint32_t tiles;
-    bool complete;              /* every chosen page was resident; else coarser nodes stood in */
+    bool complete;              /* every chosen page was drawn; else coarser nodes stood in, as the memory limit or
+                                   spl_view.partial demanded */
     double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
                                    the device has timestamps, else host times */
 };
@@ -86,6 +90,8 @@ struct spl_renderer_options {
     uint64_t scratch_samples;   /* largest tile in samples, 0 = SPL_TILE_SAMPLES */
     uint64_t first_page_bytes;  /* largest first page of datasets to come, for the least limit; 0 = unknown */
     uint32_t first_page_chunks; /* most chunks in one of these pages: the draw list has room for them from the start */
+    void (*wake)(void *context); /* on a thread of the renderer's, whenever a page has been read; may be NULL */
+    void *wake_context;
 };
 #define SPL_TILE_SAMPLES (4ull << 20)
 
@@ -97,15 +103,26 @@ const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer 
 /* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the
  * memory limit. Refuses with both sizes when not even one frame's worth fits. */
 int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+/* remove() blocks while a page of it is being read, try_remove() never: false, and the dataset stays added with nothing on
+ * the device, to be removed after spl_renderer_options.wake was called. */
 void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
+bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
+
+/* Pages are read on a thread of the renderer's own and put on the device between tiles: by every step of a frame, and by
+ * upload(), for those who have no step to make. Errors as of spl_renderer_render(), the device's only. wait() blocks until
+ * there is something to put there: false where nothing is being read, or nothing came within a second at most or until
+ * `deadline_ns`. */
+int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err);
+bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns);
 
 /* Loads every page that fits, so that the first frame is as fast as the others. Only the first page, which views cannot
  * do without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when not. */
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* The same in steps, for a renderer that has frames to make in between: loads page `page` (0, 1, …; textures
- * follow); *more: go on with the next. */
-int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
+/* The same in steps that never block, for a renderer that has frames to make in between: *page (0 at first; textures
+ * follow) moves over those that are there, the next ones are asked for. *more: to be called again, where *page has not
+ * moved once a page has been read. */
+int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err);
 
 /* What is on the device: pages of `dataset` (NULL: none) and everything there. */
@@ -113,13 +130,17 @@ struct spl_residency_info {
     uint64_t bytes;         /* pages of `dataset` */
     uint64_t limit_bytes;   /* the memory limit */
     uint64_t taken_bytes;   /* of it; spl_renderer_get_memory() */
-    uint64_t pages_evicted; /* of all datasets, to make room for others, since the renderer was made */
+    uint64_t pages_loaded;  /* of all datasets, since the renderer was made */
+    uint64_t pages_evicted; /* the same, to make room for others */
+    uint64_t pages_pending; /* of all datasets, on their way */
 };
 void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                                 struct spl_residency_info *info);
 
-/* Renders one frame; blocks at most until the view's deadline. A dataset without surface is drawn by what stands in for
- * a method that needs one; where that finds no normals SPL_E_INPUT (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
+/* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs give
+ * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page has come for 10 s. A dataset without surface
+ * is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT (field "layer") refuses
+ * them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
  * destroy it and make a new one. */
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err);
@@ -131,10 +152,15 @@ struct spl_frame_steps;
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err);
 
-/* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count). *more: there are others. Times
+/* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count) or the frame waits: then it makes
+ * nothing and does not block. *more: there are others. Times
  * in the frame's stats are those of its own steps. Fails as spl_renderer_render() does; then the steps can only be
  * ended. */
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err);
+
+/* Does it wait for pages? A step has nothing to do then; others may have come, or room, after each
+ * spl_renderer_upload() and step of another frame. Who renders another frame to its end instead lets it wait again. */
+bool spl_frame_is_waiting(struct spl_frame_steps *steps);
 
 /* Of spl_view_get_samples(), what is still to be made: a guess for whoever shares out turns. */
 uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);

@@ -1,5 +1,5 @@
 /* How far a loop over outside input may go: what steps are left of those that its size allows, and whether somebody has
- * asked it to stop. Owned by the thread that works; only `cancelled` may change meanwhile. */
+ * asked it to stop. */
 #ifndef SPL_BASE_WORK_H
 #define SPL_BASE_WORK_H
 
@@ -9,9 +9,8 @@
 
 #include "base/error.h"
 
-struct spl_work {
-    uint64_t left;                /* steps */
-    const atomic_bool *cancelled; // may be NULL
+struct spl_work { // owned by: the thread that works
+    uint64_t left; /* steps */
 };
 
 static inline bool spl_is_cancelled(const atomic_bool *cancelled)
@@ -31,10 +30,10 @@ static inline void spl_work_take(struct spl_work *work, uint64_t steps)
     work->left -= steps < work->left ? steps : work->left;
 }
 
-/* SPL_E_CANCELLED, SPL_E_LIMIT when no step is left, or 0. Without a message: what stops is for the caller to say. */
+/* SPL_E_LIMIT when no step is left, or 0. Without a message: what stops is for the caller to say. */
 static inline int spl_work_check(const struct spl_work *work)
 {
-    return spl_is_cancelled(work->cancelled) ? SPL_E_CANCELLED : work->left ? SPL_OK : SPL_E_LIMIT;
+    return work->left ? SPL_OK : SPL_E_LIMIT;
 }
 
 #endif

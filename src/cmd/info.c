@@ -4,6 +4,7 @@
 
 #include <getopt.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -147,6 +148,8 @@ static void print_table(const struct spl_info_report *report)
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
+    printf("  lines         %s pieces between them, %.1f kB\n", grouped(info->pieces, a),
+           (double)report->bytes[SPL_CHUNK_LINES] / 1e3);
     printf("  clip lines    %s splats (%.2f %%)\n", grouped(report->clips, a),
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
@@ -161,11 +164,11 @@ static void print_table(const struct spl_info_report *report)
     printf("  splat radius  %.4g (median)\n", info->splat_radius);
     printf("  pages         %s, %.1f MB resident\n\n", grouped(info->pages, a), (double)info->page_bytes / 1e6);
 
-    printf("  %-6s%12s%14s%16s%12s\n", "level", "nodes", "chunks", "splats", "spacing");
+    printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
         const struct spl_info_level *l = &report->levels[level];
-        printf("  %-6u%12s%14s%16s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b), grouped(l->splats, d),
-               l->spacing);
+        printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b),
+               grouped(l->splats, c), grouped(l->pieces, d), l->spacing);
     }
     printf("\n  bytes a splat\n");
     for (int attribute = 0; attribute < spl_info_count(info); attribute++)
@@ -180,9 +183,8 @@ static void print_table(const struct spl_info_report *report)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
     }
-    if (!info->atoms)
-        return;
-    print_atoms(report);
+    if (info->atoms)
+        print_atoms(report);
 }
 
 static int print_json(const struct spl_info_report *report, struct spl_error *err)

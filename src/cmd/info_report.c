@@ -2,6 +2,7 @@
 #include "cmd/info_report.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 
 #include "dataset/chunk_clip.h"
@@ -31,6 +32,8 @@ static void gather_widths(struct spl_info_report *report)
     const struct spl_stream *streams = spl_dataset_get_streams(report->dataset, &stream_count);
     for (uint64_t c = 0; c < chunk_count; c++) {
         double share = chunks[c].count / (double)report->info->splats;
+        if (spl_chunk_kind(&chunks[c]) != SPL_CHUNK_DISCS)
+            continue;
         for (int k = 0; k < SPL_INFO_CODES; k++)
             for (unsigned s = 0; s < spl_info_codes[k].shift_count; s++) {
                 uint32_t width = code_word(&chunks[c], spl_info_codes[k].attribute) >> spl_info_codes[k].shifts[s];
@@ -55,15 +58,22 @@ int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *da
         level->nodes++;
         level->chunks += nodes[n].chunk_count;
         for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
-            uint32_t splats = chunks[nodes[n].first_chunk + c].count;
+            const struct spl_chunk *chunk = &chunks[nodes[n].first_chunk + c];
+            uint32_t splats = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
             level->splats += splats;
+            level->pieces += spl_chunk_count_pieces(chunk);
             level->spacing += (double)nodes[n].spacing * splats;
         }
     }
     for (uint32_t i = 0; i < report->level_count; i++)
-        report->levels[i].spacing /= (double)report->levels[i].splats;
-    for (uint64_t c = 0; c < chunk_count; c++)
+        report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
+    for (uint64_t c = 0; c < chunk_count; c++) {
+        uint32_t kind = spl_chunk_kind(&chunks[c]);
         report->clips += spl_clip_count(&chunks[c]);
+        report->chunks[kind]++;
+        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
+        report->bytes[kind] += SPL_CHUNK_BYTES + 4ull * spl_chunk_words(&chunks[c]);
+    }
     gather_widths(report);
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
@@ -113,6 +123,18 @@ static json_t *textures_to_json(const struct spl_info_report *report)
                      "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
 }
 
+/* Bytes with the chunks' headers. */
+static json_t *kinds_to_json(const struct spl_info_report *report)
+{
+    json_t *kinds = json_object();
+    for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
+        json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
+                            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
+                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
+                                      "bytes", (json_int_t)report->bytes[kind]));
+    return kinds;
+}
+
 /* NULL when memory is refused: json_pack passes it on. */
 json_t *spl_info_to_json(const struct spl_info_report *report)
 {
@@ -124,8 +146,9 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct spl_info_level *l = &report->levels[i];
         json_array_append_new(levels,
-                              json_pack("{s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "spacing", l->spacing));
+                              json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
+                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
+                                        (json_int_t)l->pieces, "spacing", l->spacing));
     }
     json_t *widths = json_object();
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
@@ -141,7 +164,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -150,7 +173,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "bytes_per_splat", bytes,
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds", kinds_to_json(report), "bytes_per_splat", bytes,
         "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",

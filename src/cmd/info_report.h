@@ -5,6 +5,7 @@
 #include <jansson.h>
 
 #include "base/error.h"
+#include "dataset/codec.h"
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
 
@@ -23,13 +24,14 @@ struct spl_info_report {
     const struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
     struct spl_info_level {
-        uint64_t nodes, chunks, splats;
+        uint64_t nodes, chunks, splats, pieces;
         double spacing;            /* mean over the splats */
     } levels[SPL_INFO_LEVELS_MAX]; /* deeper ones are counted with the last */
     uint32_t level_count;
     double widths[SPL_INFO_CODES + SPL_STREAMS_MAX][SPL_INFO_WIDTH_MAX + 1]; /* shares of the codes; streams last */
     uint64_t atoms[SPL_ATOMS_MAX + 1];                                       /* splats by number of atoms */
     uint64_t linear;                                                         /* points on wires, poles and cables */
+    uint64_t chunks[SPL_CHUNK_KINDS], items[SPL_CHUNK_KINDS], bytes[SPL_CHUNK_KINDS];
     uint64_t clips;                                                          /* splats that end at a clip line */
 };
 

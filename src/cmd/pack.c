@@ -84,7 +84,8 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
             r->normal_error);
     if (r->linear)
-        fprintf(stderr, "%llu points on wires, poles and cables\n", (unsigned long long)r->linear);
+        fprintf(stderr, "%llu points on wires, poles and cables, joined by %llu pieces of all levels\n",
+                (unsigned long long)r->linear, (unsigned long long)r->pieces);
     if (r->photos.photographs)
         fprintf(stderr, "%u photographs in %.1f s (%u could not be used); %.1f %% of the splats are on none\n",
                 r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);

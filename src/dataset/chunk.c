@@ -1,7 +1,7 @@
 /* One chunk's words. Colours are codes above the chunk's least, in as many bits as the largest needs; positions, normals
  * and radii come quantised (chunk_geometry.c), clip lines are added at the end (chunk_clip.c); optional attributes
  * follow them (streams.c). Pure functions; any thread. */
-#include "dataset/chunk.h"
+#include "dataset/codec.h"
 
 #include <math.h>
 #include <string.h>
@@ -106,13 +106,13 @@ static uint32_t write_clips(const struct spl_splat *splats, struct spl_chunk *ch
         struct spl_splat decoded = {0};
         clips[i] = splats[i].clip;
         if (clips[i].direction[0] != 0 || clips[i].direction[1] != 0 || clips[i].direction[2] != 0)
-            spl_chunk_decode(chunk, words, i, &decoded);
+            spl_discs_decode(chunk, words, i, &decoded);
         memcpy(normals[i], decoded.normal, sizeof normals[i]);
     }
     return spl_clip_encode(clips, (const float(*)[3])normals, chunk, words + used);
 }
 
-uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
+uint32_t spl_discs_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error)
 {

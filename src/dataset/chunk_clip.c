@@ -15,7 +15,7 @@ enum { directions = 1 << SPL_CLIP_DIRECTION_BITS, offsets = 1 << SPL_CLIP_OFFSET
 
 uint32_t spl_clip_count(const struct spl_chunk *chunk)
 {
-    return chunk->extra_bits >> SPL_EXTRA_CLIP & 255;
+    return spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->extra_bits >> SPL_EXTRA_CLIP & 255 : 0;
 }
 
 uint32_t spl_clip_words(const struct spl_chunk *chunk)

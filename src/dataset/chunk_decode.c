@@ -2,7 +2,7 @@
  * 32-bit integers and floats only, no fused operations, at most two words read a field. Nothing here checks the chunk:
  * open has (structure.c). Every splat decodes on its own, without a look at its neighbours. Pure functions; any
  * thread. */
-#include "dataset/chunk.h"
+#include "dataset/codec.h"
 
 #include <math.h>
 
@@ -60,12 +60,12 @@ uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk)
     return spl_chunk_color_word(chunk) + stream_words(chunk, spl_chunk_color_width(chunk));
 }
 
-uint32_t spl_chunk_words(const struct spl_chunk *chunk)
+uint32_t spl_discs_words(const struct spl_chunk *chunk)
 {
     return spl_chunk_clip_word(chunk) + spl_clip_words(chunk) - chunk->geometry_word;
 }
 
-void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
+void spl_discs_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
 {
     uint32_t geometry = chunk->geometry_bits;
     uint64_t count = chunk->count;
@@ -81,7 +81,7 @@ void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     bits[SPL_ATTRIBUTE_COLOR] += color;
     bits[SPL_ATTRIBUTE_LINEAR] += linear;
     bits[SPL_ATTRIBUTE_CLIP] += clip;
-    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_chunk_words(chunk) + 8 * SPL_CHUNK_BYTES - position - normal - radius -
+    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_discs_words(chunk) + 8 * SPL_CHUNK_BYTES - position - normal - radius -
                                  color - linear - clip;
 }
 
@@ -96,7 +96,7 @@ static uint8_t clamp_byte(int32_t value)
     return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
 }
 
-void spl_chunk_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat)
+void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat)
 {
     uint32_t bits = chunk->geometry_bits;
     const uint32_t *words = page + chunk->geometry_word;

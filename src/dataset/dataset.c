@@ -65,9 +65,7 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
     if (!dataset->name)
         goto done;
     strcpy(dataset->name, name);
-    rc = spl_late_wires_create(&dataset->wires, err);
-    if (!rc)
-        rc = spl_dataset_read_sections(dataset, verify, err);
+    rc = spl_dataset_read_sections(dataset, verify, err);
     if (!rc)
         rc = spl_dataset_check_sections(dataset, err);
     if (!rc)
@@ -88,7 +86,6 @@ void spl_dataset_close(struct spl_dataset *dataset)
         return;
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
-    spl_late_wires_destroy(dataset->wires);
     for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
         free(dataset->copies[i]);
     free(dataset->copies);
@@ -212,8 +209,8 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
         [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
         [SPL_ATTRIBUTE_LINEAR] = "linear",     [SPL_ATTRIBUTE_CLIP] = "clip",
-        [SPL_ATTRIBUTE_CHUNK] = "chunk",       [SPL_ATTRIBUTE_TEXTURE] = "texture",
-        [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
+        [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_CHUNK] = "chunk",
+        [SPL_ATTRIBUTE_TEXTURE] = "texture",   [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return names[attribute];
 }

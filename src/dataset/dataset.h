@@ -58,8 +58,8 @@ int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear
  * raises SIGBUS when the file was cut short in place. */
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
 
-/* Reads and decodes splat `id` of any level; false (*splat untouched) when there is none, or the file was cut short in
- * place. Its position is relative to its node. Any thread; blocks on disk. */
+/* Reads and decodes splat `id` of any level, or the vertex of a line that has this id; false (*splat untouched) when
+ * there is none, or the file was cut short in place. Its position is relative to its node. Any thread; blocks on disk. */
 struct spl_splat;
 bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat);
 

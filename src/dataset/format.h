@@ -61,16 +61,27 @@ struct spl_node {
     uint8_t depth;        /* root = 0 */
 };
 
-/* extra_bits: number of splats with a clip line 16..23; on disk, the number of splats 0..7. */
+/* extra_bits: number of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31; on disk, the
+ * number of splats 0..7. */
 #define SPL_EXTRA_COUNT 0
 #define SPL_EXTRA_CLIP 16
+#define SPL_EXTRA_LINES 16
+#define SPL_EXTRA_KIND 24
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
 #define SPL_PAGE_TAIL_WORDS 2
 
-/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order. Streams of fixed-width codes, each stream
- * starting on a word: geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional
- * attributes (streams.h). A splat's fields lie one after the other from the low bits up. */
+/* What a chunk holds; codec.h has a row for each. */
+enum spl_chunk_kind {
+    SPL_CHUNK_DISCS, /* splats */
+    SPL_CHUNK_LINES, /* vertices of wires, poles and cables; pieces go from one to the next */
+    SPL_CHUNK_KINDS
+};
+
+/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order of
+ * their lines, with the same fields but for clip lines. Streams of fixed-width codes, each stream starting on a word:
+ * geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional attributes (streams.h),
+ * which vertices do not have. A splat's fields lie one after the other from the low bits up. */
 struct spl_chunk {
     float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;
@@ -85,10 +96,16 @@ struct spl_chunk {
 
     /* Not on disk. */
     uint32_t count;    /* there in extra_bits, here taken out of them */
-    uint64_t first_id; /* dataset-wide index of its first splat: the sum of the counts before it */
+    uint64_t first_id; /* dataset-wide index of its first splat or vertex: the sum of the counts before it */
 };
 
 #define SPL_CHUNK_BYTES 60u /* of a chunk on disk */
+
+/* enum spl_chunk_kind, or SPL_CHUNK_KINDS and more in a file that opening refuses. */
+static inline uint32_t spl_chunk_kind(const struct spl_chunk *chunk)
+{
+    return chunk->extra_bits >> SPL_EXTRA_KIND;
+}
 
 /* ATOM: this header, then the stream of atoms.h. */
 struct spl_atoms_header {

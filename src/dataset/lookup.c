@@ -1,5 +1,5 @@
-/* One splat by its id: which chunk and node hold it; and the linear splats of all leaves. Chunks continue each other's
- * ids, so a binary search finds the chunk; nodes are looked through. Words are read from the
+/* One splat, or vertex of a line, by its id: which chunk and node hold it; and the linear splats of all leaves. Chunks
+ * continue each other's ids, so a binary search finds the chunk; nodes are looked through. Words are read from the
  * file, not through a map, so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
@@ -62,7 +62,7 @@ int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear
         for (uint32_t c = 0; c < node->chunk_count && !node->child_count; c++) {
             const struct spl_chunk *chunk = &dataset->chunks[node->first_chunk + c];
             uint32_t mask[SPL_LINEAR_WORDS];
-            if (!(chunk->geometry_bits >> SPL_GEOMETRY_LINEAR))
+            if (!(chunk->geometry_bits >> SPL_GEOMETRY_LINEAR) || spl_chunk_kind(chunk) != SPL_CHUNK_DISCS)
                 continue;
             if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME) {
                 uint64_t word = spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS; // which the page has, as opening saw

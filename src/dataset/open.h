@@ -1,9 +1,8 @@
-/* An open dataset from the inside, and the stages of opening one. Only the files that open one, textures.c and
- * wires.c include this. Each stage trusts what the ones before it have checked. */
+/* An open dataset from the inside, and the stages of opening one. Only the files that open one, lookup.c,
+ * attributes.c and textures.c include this. Each stage trusts what the ones before it have checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
 
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stddef.h>
 
@@ -13,7 +12,6 @@
 #include "base/work.h"
 #include "dataset/dataset.h"
 #include "dataset/source.h"
-#include "dataset/wires.h"
 #include "sparse/dictionary.h"
 
 /* What a file has sections of, in the order in which they are checked; the rows of sections.c say the rest. */
@@ -55,18 +53,7 @@ struct spl_dataset {
     uint64_t *page_nodes;             /* with textures: nodes by page, those of page p from page_first[p] on */
     uint64_t *page_first;             /* pages + 1 of them */
     json_t *meta;
-    struct spl_late_wires *wires;
 };
-
-/* Wires are found when they are first asked for. */
-struct spl_late_wires {
-    pthread_mutex_t mutex;
-    bool made;
-    struct spl_wires wires; /* once made for good */
-};
-
-int spl_late_wires_create(struct spl_late_wires **out, struct spl_error *err);
-void spl_late_wires_destroy(struct spl_late_wires *late);
 
 /* Reads bytes of the source; SPL_E_CORRUPT when it has become shorter. Any thread. */
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "dataset/chunk.h"
+#include "dataset/codec.h"
 #include "dataset/open.h"
 
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *item,
@@ -64,45 +64,6 @@ static const char *judge_child(const struct spl_node *parent, const struct spl_n
     return NULL;
 }
 
-static bool ends_finite(float origin, float step, unsigned bits)
-{
-    return isfinite(origin) && isfinite(step) && isfinite(origin + step * (float)((1u << bits) - 1));
-}
-
-/* What is wrong with a chunk in itself, or NULL. */
-static const char *judge_chunk(const struct spl_chunk *c)
-{
-    uint32_t g = c->geometry_bits, color = c->color_bits, extra = c->extra_bits;
-    unsigned u = g >> SPL_GEOMETRY_U & 15, v = g >> SPL_GEOMETRY_V & 15, radius = g >> SPL_GEOMETRY_RADIUS & 15;
-    if (c->count == 0 || c->count > SPL_CHUNK_SPLATS)
-        return "has no splats, or more than 128";
-    if (!positive(c->step) || !positive(c->radius_min) || !positive(c->radius_mean) || !positive(c->radius_step) ||
-        !positive(c->normal_step))
-        return "has a step or radius that is not positive";
-    for (int a = 0; a < 3; a++) {
-        unsigned bits = g >> (SPL_GEOMETRY_X + 5 * a) & 31;
-        if (bits > 24 || !ends_finite(c->origin[a], c->step, bits))
-            return "has positions that are not finite, or more than 24 bits wide";
-    }
-    if (u > 12 || v > 12 || radius > 12 || !ends_finite(c->normal_u, c->normal_step, u) ||
-        !ends_finite(c->normal_v, c->normal_step, v) || !ends_finite(c->radius_min, c->radius_step, radius))
-        return "has normals or radii that are not finite, or more than 12 bits wide";
-    if (fabsf(c->normal_u) > 4 || fabsf(c->normal_v) > 4 || c->normal_u + c->normal_step * (float)((1u << u) - 1) > 4 ||
-        c->normal_v + c->normal_step * (float)((1u << v) - 1) > 4)
-        return "has normals off the octahedron";
-    if ((g >> SPL_GEOMETRY_AXIS & 3) == 3 || g >> SPL_GEOMETRY_LINEAR > SPL_LINEAR_SOME)
-        return "has geometry bits that version 2 does not know";
-    int base_u = (int16_t)(c->color_base & 0xffff), base_v = (int16_t)(c->color_base >> 16);
-    if ((color >> SPL_COLOR_Y & 15) > 8 || (color >> SPL_COLOR_U & 15) > 9 || (color >> SPL_COLOR_V & 15) > 9 ||
-        color & 0xff00f000u || abs(base_u) > 255 || abs(base_v) > 255)
-        return "has colours wider than 8 bits";
-    if (extra & ~(255u << SPL_EXTRA_CLIP))
-        return "has extra bits that version 2 does not know";
-    if (extra >> SPL_EXTRA_CLIP > c->count)
-        return "has more clip lines than splats";
-    return NULL;
-}
-
 int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
@@ -112,13 +73,17 @@ int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
         memmove(chunk, from, SPL_CHUNK_BYTES); /* never beyond it: the rest lies behind */
         chunk->count = chunk->extra_bits >> SPL_EXTRA_COUNT & 255;
         chunk->extra_bits &= ~(255u << SPL_EXTRA_COUNT);
-        chunk->first_id = info->splats;
-        const char *what = judge_chunk(chunk);
+        chunk->first_id = info->ids;
+        const struct spl_chunk_codec *codec = spl_chunk_get_codec(spl_chunk_kind(chunk));
+        const char *what = codec ? codec->judge(chunk) : "is of a kind that this version does not know";
         if (what)
             return wrong(dataset, err, "CHNK", "chunk", i, what);
-        info->splats += chunk->count;
-        spl_chunk_add_bits(chunk, info->attribute_bits);
-        info->has_linear |= chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
+        info->ids += chunk->count;
+        codec->add_bits(chunk, info->attribute_bits);
+        bool discs = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS;
+        info->splats += discs ? chunk->count : 0;
+        info->pieces += spl_chunk_count_pieces(chunk);
+        info->has_linear |= discs && chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
     }
     info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 8ull * info->nodes * sizeof(struct spl_node);
     return SPL_OK;
@@ -143,7 +108,7 @@ static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *cl
         if (chunk->geometry_word > page_words || words > page_words - chunk->geometry_word)
             return wrong(dataset, err, "CHNK", "chunk", i, "reaches beyond the end of its page");
         claimed[i] = 1;
-        *splats += chunk->count;
+        *splats += spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
     }
     return SPL_OK;
 }

@@ -152,6 +152,8 @@ static int count_page(const struct spl_dataset *dataset, uint32_t index, const u
         const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
         for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
             uint32_t texture = dataset->chunk_textures[c];
+            if (spl_chunk_kind(&dataset->chunks[c]) != SPL_CHUNK_DISCS)
+                continue;
             spl_texture_count(words + spl_texture_word(texture), spl_texture_planes(texture), dataset->chunks[c].count,
                               histogram);
         }

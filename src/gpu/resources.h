@@ -9,7 +9,6 @@ enum spl_resource {
     SPL_RESOURCE_ENTRIES,   /* uint[], draw-list entries of this dispatch's page, front to back */
     SPL_RESOURCE_CHUNKS,    /* struct spl_draw_chunk[] */
     SPL_RESOURCE_BOUNDS,    /* struct spl_chunk_bounds[], parallel to the chunks */
-    SPL_RESOURCE_LINES,     /* struct spl_draw_line[] */
     SPL_RESOURCE_PAGE,      /* uint[], one page of the dataset as it lies in the file */
     SPL_RESOURCE_TEXTURES,  /* uint[], one page's section TEXP as it lies in the file */
     SPL_RESOURCE_ATOMS,     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */

@@ -73,7 +73,7 @@ static float *read_radii(const struct spl_dataset *dataset, struct spl_error *er
     uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    float *radii = spl_alloc(spl_dataset_get_info(dataset)->splats, sizeof *radii, err);
+    float *radii = spl_alloc(spl_dataset_get_info(dataset)->ids, sizeof *radii, err);
     for (uint64_t n = 0; radii && n < node_count; n++) {
         size_t bytes;
         const uint32_t *page = spl_dataset_get_page(dataset, nodes[n].page, &bytes);
@@ -91,7 +91,7 @@ static int find_widths(const struct spl_dataset *dataset, const struct spl_camer
                        float **width_px, struct spl_error *err)
 {
     size_t count = (size_t)camera->width * camera->height;
-    uint64_t splats = spl_dataset_get_info(dataset)->splats;
+    uint64_t splats = spl_dataset_get_info(dataset)->ids;
     const float *depth = frame->images[SPL_LAYER_DEPTH].pixels, *coverage = frame->images[SPL_LAYER_COVERAGE].pixels;
     const uint32_t *id = frame->images[SPL_LAYER_ID].pixels;
     float *radii = read_radii(dataset, err), *widths = radii ? spl_alloc_raw(count, sizeof *widths, err) : NULL;

@@ -131,7 +131,7 @@ static void compare_textures(struct work *w, const struct source *source)
     for (uint64_t n = 0; n < nodes; n++, node++) {
         const uint32_t *page = spl_dataset_get_page(dataset, node->page, &(size_t){0});
         for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++)
-            for (uint32_t i = 0; i < chunks[c].count; i++) {
+            for (uint32_t i = 0; i < chunks[c].count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS; i++) {
                 uint64_t id = chunks[c].first_id + i;
                 struct spl_splat splat;
                 double centre[3];
@@ -181,9 +181,9 @@ int spl_projected_measure(const struct spl_projected_options *o, struct spl_proj
     struct work w = {.options = o};
     const struct spl_dataset_info *info = spl_dataset_get_info(o->dataset);
     *report = (struct spl_projected_report){0};
-    if (info->splats != o->origin->splats)
+    if (info->ids != o->origin->splats)
         return spl_fail_field(err, SPL_E_INPUT, "splats", "%s has %llu splats, the textures are of %llu: pack again",
-                              info->id, (unsigned long long)info->splats, (unsigned long long)o->origin->splats);
+                              info->id, (unsigned long long)info->ids, (unsigned long long)o->origin->splats);
     int rc = spl_compared_views_choose(o, 4 * forms, &w.compared, err);
     for (size_t i = 0; !rc && i < w.compared.count; i++)
         rc = spl_compared_view_take(o, &w.compared.views[i], err);

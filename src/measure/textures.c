@@ -369,10 +369,10 @@ int spl_textures_measure(const struct spl_textures_options *o, struct spl_textur
                         "%llu textures of %u texels a side: nothing to compare; there must be some, of 8, 16 "
                         "or 32",
                         (unsigned long long)o->source->count, o->source->size);
-    if (o->dataset && spl_dataset_get_info(o->dataset)->splats != o->origin->splats)
+    if (o->dataset && spl_dataset_get_info(o->dataset)->ids != o->origin->splats)
         return spl_fail_field(err, SPL_E_INPUT, "splats", "%s has %llu splats, the textures are of %llu: pack again",
                               spl_dataset_get_info(o->dataset)->id,
-                              (unsigned long long)spl_dataset_get_info(o->dataset)->splats,
+                              (unsigned long long)spl_dataset_get_info(o->dataset)->ids,
                               (unsigned long long)o->origin->splats);
     report->geometry = o->dataset ? find_geometry_bytes(o->dataset) : 0;
     int rc = measure_colors(o, report, err);

@@ -26,12 +26,15 @@ struct encoded { /* one node of the batch; owned by the batch */
 struct scratch { /* of one worker, for the largest node */
     struct spl_cut *items;
     uint32_t *words;
+    size_t chunk_capacity; /* of `words` */
     float *radii;
+    struct spl_node_lines lines;
 };
 
 struct emit {
     const struct spl_tree *tree;
     const struct spl_points *points;
+    const struct spl_wires *wires;
     const struct spl_chunk_options *options;
     struct spl_stage *stage;
     struct scratch *scratch;
@@ -101,6 +104,71 @@ static void level_radii(struct spl_splat *splats, uint32_t count)
         splats[i].radius = (float)(sum / count);
 }
 
+/* Vertices from `at` on that a chunk takes: all of a line or, where it does not fit, what does; the next chunk begins
+ * with the vertex that this one ends with. */
+static uint32_t cut_lines(const struct spl_node_lines *lines, size_t at)
+{
+    const struct spl_wire_vertex *v = lines->vertices + at;
+    uint32_t count = lines->count - at < SPL_CHUNK_SPLATS ? (uint32_t)(lines->count - at) : SPL_CHUNK_SPLATS;
+    bool begins = v[count - 1].point != SPL_WIRE_END && v[count - 2].point == SPL_WIRE_END;
+    return begins ? count - 1 : count;
+}
+
+static void load_vertices(const struct spl_wire_vertex *from, uint32_t count, const struct spl_tree_node *node,
+                          struct spl_splat *vertices, double (*position)[3])
+{
+    for (uint32_t i = 0; i < count; i++) {
+        struct spl_splat *s = &vertices[i];
+        *s = (struct spl_splat){.radius = from[i].radius,
+                                .linear = i + 1 < count && from[i].point != SPL_WIRE_END};
+        for (int c = 0; c < 3; c++) {
+            position[i][c] = from[i].position[c] - node->origin[c];
+            s->normal[c] = from[i].normal[c];
+        }
+        set_color(s, from[i].color_class);
+    }
+}
+
+/* Adds the node's lines, which w->lines has, to its chunks. */
+static void encode_lines(struct emit *e, struct scratch *w, const struct spl_tree_node *node, struct spl_node *header,
+                         struct encoded *out)
+{
+    struct spl_node_lines *lines = &w->lines;
+    struct spl_chunk_options options = *e->options;
+    options.kind = SPL_CHUNK_LINES;
+    for (size_t at = 0; at < lines->count;) {
+        struct spl_splat vertices[SPL_CHUNK_SPLATS];
+        double position[SPL_CHUNK_SPLATS][3];
+        uint32_t count = cut_lines(lines, at);
+        struct spl_chunk *chunk = &out->chunks[out->chunk_count++];
+        load_vertices(lines->vertices + at, count, node, vertices, position);
+        uint32_t words = spl_chunk_encode(vertices, (const double(*)[3])position, count, &options, chunk,
+                                          w->words + out->word_count, NULL);
+        grow_box(header, vertices, position, chunk);
+        chunk->geometry_word = (uint32_t)out->word_count;
+        out->word_count += words;
+        at += lines->vertices[at + count - 1].point == SPL_WIRE_END ? count : count - 1;
+    }
+}
+
+/* Makes room for the discs' and the lines' chunks; each of these but the last takes at least so many vertices on. */
+static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, uint32_t streams, struct encoded *out)
+{
+    size_t most = discs + vertices / (SPL_CHUNK_SPLATS - 2) + 1;
+    if (most > w->chunk_capacity) {
+        free(w->words);
+        w->chunk_capacity = 0;
+        size_t words = SPL_CHUNK_WORDS_MAX + streams * SPL_STREAM_WORDS_MAX; /* of a chunk */
+        w->words = spl_alloc_raw(most, words * sizeof *w->words, NULL);
+        if (!w->words)
+            return false;
+        w->chunk_capacity = most;
+    }
+    out->chunks = spl_alloc_raw(most, sizeof *out->chunks, NULL);
+    out->codes = spl_alloc(most, sizeof *out->codes, NULL); /* those of lines stay 0: vertices have no attributes */
+    return out->chunks && out->codes;
+}
+
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
 {
     const struct spl_tree_node *node = &e->tree->nodes[index];
@@ -128,9 +196,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
 
     spl_chunks_cut(w->items, count);
     out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
-    out->chunks = spl_alloc_raw(out->chunk_count, sizeof *out->chunks, NULL);
-    out->codes = spl_alloc_raw(out->chunk_count, sizeof *out->codes, NULL);
-    if (!out->chunks || !out->codes)
+    if (!spl_wires_get_node(e->wires, node->begin, node->end, leaf ? 0 : header->spacing, &w->lines) ||
+        !reserve_chunks(w, out->chunk_count, w->lines.count, e->out->streams.count, out))
         return false;
     for (uint32_t c = 0; c < out->chunk_count; c++) {
         struct spl_splat splats[SPL_CHUNK_SPLATS];
@@ -157,6 +224,7 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }
+    encode_lines(e, w, node, header, out);
     out->words = spl_alloc_raw(out->word_count, sizeof *out->words, NULL);
     if (!out->words)
         return false;
@@ -191,8 +259,10 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
     const struct spl_tree_node *from = &e->tree->nodes[index];
     struct spl_node *node = &e->nodes[index];
     for (uint32_t c = 0; c < encoded->chunk_count; c++) {
-        encoded->chunks[c].first_id = out->splats;
-        out->splats += encoded->chunks[c].count;
+        encoded->chunks[c].first_id = out->ids;
+        out->ids += encoded->chunks[c].count;
+        out->splats += spl_chunk_kind(&encoded->chunks[c]) == SPL_CHUNK_DISCS ? encoded->chunks[c].count : 0;
+        out->pieces += spl_chunk_count_pieces(&encoded->chunks[c]);
         spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
     if (from->depth > UINT8_MAX)
@@ -256,9 +326,7 @@ static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *e
         struct scratch *w = &e->scratch[t];
         w->items = spl_alloc_raw(largest, sizeof *w->items, err);
         w->radii = spl_alloc_raw(largest, sizeof *w->radii, err);
-        size_t words = SPL_CHUNK_WORDS_MAX + out->streams.count * SPL_STREAM_WORDS_MAX; /* of a chunk */
-        w->words = spl_alloc_raw(chunks, words * sizeof *w->words, err);
-        if (!w->items || !w->radii || !w->words)
+        if (!w->items || !w->radii)
             return SPL_E_NOMEM;
     }
     return 0;
@@ -274,10 +342,12 @@ static void clear_batch(struct encoded *batch)
     }
 }
 
-int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_chunk_options *options,
-             struct spl_dataset_writer *writer, struct spl_stage *stage, struct spl_emitted *out, struct spl_error *err)
+int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_wires *wires,
+             const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,
+             struct spl_emitted *out, struct spl_error *err)
 {
-    struct emit e = {.tree = tree, .points = points, .options = options, .stage = stage, .out = out};
+    struct emit e = {
+        .tree = tree, .points = points, .wires = wires, .options = options, .stage = stage, .out = out};
     size_t chunk_capacity = 0, splats = 0;
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
@@ -303,6 +373,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
         free(e.scratch[t].items);
         free(e.scratch[t].radii);
         free(e.scratch[t].words);
+        spl_node_lines_finish(&e.scratch[t].lines);
     }
     if (e.batch)
         clear_batch(e.batch);

@@ -22,6 +22,7 @@
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
 #include "pack/view.h"
+#include "pack/wires/wires.h"
 
 struct pack {
     const struct spl_pack_options *options;
@@ -30,6 +31,7 @@ struct pack {
     struct spl_stage *stage;
     struct spl_scans scans;
     struct spl_points points;
+    struct spl_wires wires;
     struct spl_tree tree;
     struct spl_emitted emitted;
     struct spl_dataset_writer *writer;
@@ -126,7 +128,7 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     if (!rc)
         rc = median_radius(&p->points, &radius, err);
     if (!rc)
-        rc = spl_emit(&p->tree, &p->points, &p->chunk, p->writer, p->stage, &p->emitted, err);
+        rc = spl_emit(&p->tree, &p->points, &p->wires, &p->chunk, p->writer, p->stage, &p->emitted, err);
     if (rc)
         return rc;
     json_t *meta = make_meta(p, radius, &view);
@@ -148,6 +150,7 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
         .duplicates = p->points.duplicates,
         .leaf_splats = p->points.count,
         .splats = p->emitted.splats,
+        .pieces = p->emitted.pieces,
         .levels = p->tree.levels,
         .nodes = p->tree.count,
         .chunks = p->emitted.chunk_count,
@@ -174,8 +177,8 @@ static void plan(const struct pack *p, uint32_t photographs)
         double seconds;
         bool of_surface;
     } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
-                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"levels", 0.2, false},
-                 {"encoding", 0.25, false},      {"writing", 0.3, false}};
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"joining wires", 0.05, false},
+                 {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
     uint64_t points = 0;
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
@@ -184,6 +187,16 @@ static void plan(const struct pack *p, uint32_t photographs)
             spl_stage_plan(p->stage, parts[i].name, parts[i].seconds * 1e-6 * (double)points, i ? 0 : points);
     if (photographs)
         spl_photos_plan(p->options->photos, p->stage, photographs, (uint64_t)(1.33 * (double)points), 0);
+}
+
+static int join_wires(struct pack *p, struct spl_error *err)
+{
+    int rc = spl_wires_find(&p->wires, &p->points, p->stage, err);
+    if (!rc && p->wires.cut_short && p->options->warn)
+        p->options->warn(p->options->progress_context,
+                         "points on wires, poles and cables take more steps to join than those of a scan; the rest of "
+                         "them stays open: pack with --no-linear if there are none");
+    return rc;
 }
 
 static int pack_scan(const struct spl_pack_options *options, const char *output, uint32_t photographs,
@@ -211,6 +224,8 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
         rc = options->points_only ? spl_bare_points(&p.points, stage, err)
                                   : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
     if (!rc)
+        rc = join_wires(&p, err);
+    if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
         rc = spl_levels_build(&p.tree, &p.points, stage, err);
@@ -221,6 +236,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     spl_dataset_writer_destroy(p.writer);
     spl_emitted_finish(&p.emitted);
     spl_tree_finish(&p.tree);
+    spl_wires_finish(&p.wires);
     spl_points_finish(&p.points);
     spl_scans_finish(&p.scans);
     return rc;

@@ -3,9 +3,9 @@
 #include "render/draw_list.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/memory.h"
+#include "dataset/format.h" /* enum spl_chunk_kind */
 
 #define ENTRIES_MAX (1u << 28)
 
@@ -32,23 +32,31 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
     return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
 }
 
-/* Which row of the table of batches: number of planes, interpolation, whether apart, and phase. */
-static uint32_t row_of(const struct spl_draw_list *list, size_t chunk)
+/* Phases are told when all chunks are there. */
+static struct spl_draw_key key_of(uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk)
 {
-    bool apart = list->chunks[chunk].color_bits >> SPL_COLOR_CLIP;
-    return 4 * (list->chunks[chunk].texture >> SPL_CHUNK_TEXTURE_SMOOTH) + 2 * apart +
-           (chunk >= list->first_back_chunk);
+    return (struct spl_draw_key){.page = page,
+                                 .kind = (uint8_t)kind,
+                                 .planes = (uint8_t)(chunk->texture >> SPL_CHUNK_TEXTURE_PLANES),
+                                 .smooth = chunk->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1,
+                                 .apart = chunk->color_bits >> SPL_COLOR_CLIP};
+}
+
+static uint64_t word_of(const struct spl_draw_key *key)
+{
+    return (uint64_t)key->page << 32 | (uint32_t)key->kind << 16 | (uint32_t)key->planes << 8 |
+           (uint32_t)key->smooth << 2 | (uint32_t)key->apart << 1 | key->back;
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
-    list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = list->line_count = 0;
+    list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = 0;
     list->splats = list->listed_splats = list->sample_splats = 0;
     list->nodes = 0;
     list->complete = true;
 }
 
-int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct spl_draw_chunk *chunk,
+int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk,
                       const struct spl_chunk_bounds *bounds, struct spl_error *err)
 {
     if (list->entry_count + runs(chunk) > ENTRIES_MAX)
@@ -58,59 +66,96 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct sp
         size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a;
         if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
             grow((void **)&list->bounds, &b, wanted, sizeof *list->bounds, err) ||
-            grow((void **)&list->page_of_chunk, &c, wanted, sizeof *list->page_of_chunk, err))
+            grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err))
             return SPL_E_NOMEM;
         list->chunk_capacity = c;
     }
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
-    list->page_of_chunk[list->chunk_count++] = page;
+    list->key_of_chunk[list->chunk_count++] = key_of(page, kind, chunk);
     list->entry_count += runs(chunk);
-    list->listed_splats += splats(chunk);
+    list->listed_splats += kind == SPL_CHUNK_DISCS ? splats(chunk) : 0;
     return SPL_OK;
 }
 
-int spl_draw_list_reserve_lines(struct spl_draw_list *list, size_t count, struct spl_error *err)
+/* Batches by their keys, open addressing. */
+struct table {
+    uint32_t *batch; /* + 1; 0 = free */
+    size_t size;     /* a power of two, twice as many as there are batches and more */
+};
+
+/* Where `key` is or would be. */
+static uint32_t *find(const struct table *table, const struct spl_draw_list *list, const struct spl_draw_key *key)
 {
-    return grow((void **)&list->lines, &list->line_capacity, list->line_count + count, sizeof *list->lines, err);
+    uint64_t word = word_of(key);
+    size_t at = (size_t)(word * 0x9e3779b97f4a7c15ull >> 32) & (table->size - 1);
+    while (table->batch[at] && word_of(&list->batches[table->batch[at] - 1].key) != word)
+        at = (at + 1) & (table->size - 1);
+    return &table->batch[at];
+}
+
+static int grow_table(struct table *table, const struct spl_draw_list *list, struct spl_error *err)
+{
+    if (2 * (list->batch_count + 1) < table->size)
+        return SPL_OK;
+    free(table->batch);
+    table->size = table->size ? 4 * table->size : 256;
+    table->batch = spl_alloc(table->size, sizeof *table->batch, err);
+    for (size_t i = 0; table->batch && i < list->batch_count; i++)
+        *find(table, list, &list->batches[i].key) = (uint32_t)i + 1;
+    return table->batch ? SPL_OK : SPL_E_NOMEM;
+}
+
+/* The batch of `key`, which is made when it is met first. */
+static int get_batch(struct spl_draw_list *list, struct table *table, const struct spl_draw_key *key, uint32_t *batch,
+                     struct spl_error *err)
+{
+    int rc = grow_table(table, list, err);
+    uint32_t *place = rc ? NULL : find(table, list, key);
+    if (!rc && !*place) {
+        rc = grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err);
+        if (rc)
+            return rc;
+        list->batches[list->batch_count++] = (struct spl_draw_batch){.key = *key};
+        *place = (uint32_t)list->batch_count;
+    }
+    if (!rc)
+        *batch = *place - 1;
+    return rc;
 }
 
 /* The batch of every chunk, counted; batches keep the order in which they are met. */
-static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_page, uint32_t pages, struct spl_error *err)
+static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, struct spl_error *err)
 {
+    struct table table = {0};
     uint64_t before = 0;
+    int rc = SPL_OK;
     list->first_back_chunk = list->chunk_count;
-    for (size_t i = 0; i < list->chunk_count; i++) {
+    for (size_t i = 0; i < list->chunk_count && !rc; i++) {
+        struct spl_draw_key *key = &list->key_of_chunk[i];
         if (2 * before >= list->listed_splats && list->first_back_chunk == list->chunk_count)
             list->first_back_chunk = i;
-        before += splats(&list->chunks[i]);
-        uint32_t row = row_of(list, i), *batch = &batch_of_page[row * pages + list->page_of_chunk[i]];
-        if (*batch == UINT32_MAX) {
-            if (grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err))
-                return SPL_E_NOMEM;
-            *batch = (uint32_t)list->batch_count;
-            list->batches[list->batch_count++] = (struct spl_draw_batch){.page = list->page_of_chunk[i],
-                                                                         .planes = (uint8_t)(row / 8),
-                                                                         .smooth = row / 4 % 2,
-                                                                         .apart = row / 2 % 2,
-                                                                         .back = row % 2};
-        }
-        list->batches[*batch].entries += runs(&list->chunks[i]);
+        before += key->kind == SPL_CHUNK_DISCS ? splats(&list->chunks[i]) : 0;
+        key->back = i >= list->first_back_chunk;
+        if (i && word_of(key) == word_of(key - 1)) /* most are */
+            batch_of_chunk[i] = batch_of_chunk[i - 1];
+        else
+            rc = get_batch(list, &table, key, &batch_of_chunk[i], err);
+        if (!rc)
+            list->batches[batch_of_chunk[i]].entries += runs(&list->chunks[i]);
     }
-    return SPL_OK;
+    free(table.batch);
+    return rc;
 }
 
-int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err)
+int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
 {
-    enum { rows = 8 * (SPL_TEXTURE_ATOMS + 1) };
-    uint32_t *batch_of_page = spl_alloc_raw((size_t)pages * rows, sizeof *batch_of_page, err);
-    int rc = batch_of_page
+    uint32_t *batch_of_chunk = spl_alloc_raw(list->chunk_count + 1, sizeof *batch_of_chunk, err);
+    int rc = batch_of_chunk
                  ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)
                  : SPL_E_NOMEM;
-    if (!rc) {
-        memset(batch_of_page, 0xff, (size_t)pages * rows * sizeof *batch_of_page);
-        rc = count_batches(list, batch_of_page, pages, err);
-    }
+    if (!rc)
+        rc = count_batches(list, batch_of_chunk, err);
     uint32_t first = 0;
     for (size_t i = 0; i < list->batch_count && !rc; i++) {
         list->batches[i].first_entry = first;
@@ -118,22 +163,23 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl
         list->batches[i].entries = 0;
     }
     for (size_t i = 0; i < list->chunk_count && !rc; i++) {
-        struct spl_draw_batch *batch = &list->batches[batch_of_page[row_of(list, i) * pages + list->page_of_chunk[i]]];
+        struct spl_draw_batch *batch = &list->batches[batch_of_chunk[i]];
         for (uint32_t run = 0; run < runs(&list->chunks[i]); run++)
             list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_RUN_BITS | run;
     }
-    free(batch_of_page);
+    free(batch_of_chunk);
     return rc;
 }
 
-uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed)
+uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed, uint64_t most_lines)
 {
     uint64_t slots = 0;
     most = most < ENTRIES_MAX ? most : ENTRIES_MAX;
     for (size_t i = 0; i < list->batch_count; i++) {
         struct spl_draw_batch *batch = &list->batches[i];
         batch->first_slot = (uint32_t)slots;
-        batch->slot_entries = (uint32_t)(batch->smooth && most_summed < most ? most_summed : most);
+        uint64_t own = batch->key.smooth ? most_summed : batch->key.kind == SPL_CHUNK_LINES ? most_lines : most;
+        batch->slot_entries = (uint32_t)(own < most ? own : most);
         slots += (batch->entries + batch->slot_entries - 1) / batch->slot_entries;
     }
     return slots;
@@ -145,7 +191,6 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->bounds);
     free(list->entries);
     free(list->batches);
-    free(list->page_of_chunk);
-    free(list->lines);
+    free(list->key_of_chunk);
     *list = (struct spl_draw_list){0};
 }

@@ -10,15 +10,20 @@
 #include "base/error.h"
 #include "shared.h"
 
-/* The draw-list entries of one page, phase, number of planes of atoms, interpolated or not, apart or not:
- * what one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
+/* What one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
  * phase. */
-struct spl_draw_batch {
+struct spl_draw_key {
     uint32_t page;
-    uint8_t planes; /* 0 = no textures */
+    uint8_t kind;   /* enum spl_chunk_kind */
+    uint8_t planes; /* of atoms; 0 = no textures */
     bool smooth;    /* texels are interpolated, of sums */
     bool apart;     /* chunks with clip lines */
     bool back;
+};
+
+/* The draw-list entries of one key. */
+struct spl_draw_batch {
+    struct spl_draw_key key;
     uint32_t first_entry, entries;
     uint32_t first_slot, slot_entries; /* parameters: a slot for every so many entries, the same in every pass */
 };
@@ -28,11 +33,10 @@ struct spl_draw_list {
     struct spl_chunk_bounds *bounds; /* parallel to chunks */
     uint32_t *entries;               /* chunk index << SPL_RUN_BITS | run, batch after batch */
     struct spl_draw_batch *batches;  /* in the order in which their pages were first met */
-    struct spl_draw_line *lines;     /* pieces of wires, by spl_wires_draw() */
     size_t first_back_chunk;         /* chunks from here on are of the back phase */
-    size_t chunk_count, entry_count, batch_count, line_count;
-    size_t chunk_capacity, entry_capacity, batch_capacity, line_capacity;
-    uint32_t *page_of_chunk; /* chunk_count, scratch */
+    size_t chunk_count, entry_count, batch_count;
+    size_t chunk_capacity, entry_capacity, batch_capacity;
+    struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
     uint64_t splats;         /* that are drawn */
     uint64_t listed_splats;  /* the same, once for every window that they are drawn in */
     uint32_t nodes;          /* that the chunks came from */
@@ -43,20 +47,19 @@ struct spl_draw_list {
 /* Empties the list and keeps its memory. */
 void spl_draw_list_clear(struct spl_draw_list *list);
 
-/* Appends a chunk of page `page`. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
-int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, const struct spl_draw_chunk *chunk,
+/* Appends a chunk of `kind` (enum spl_chunk_kind) of page `page`; of lines `count` are vertices. SPL_E_NOMEM;
+ * SPL_E_LIMIT above 2^28 entries. */
+int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk,
                       const struct spl_chunk_bounds *bounds, struct spl_error *err);
 
-/* Makes room for `count` lines more. SPL_E_NOMEM. */
-int spl_draw_list_reserve_lines(struct spl_draw_list *list, size_t count, struct spl_error *err);
+/* Lays out entries and batches of all chunks added. SPL_E_NOMEM. */
+int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err);
 
-/* Lays out entries and batches of all chunks added; `pages` is the dataset's number of pages. */
-int spl_draw_list_lay_out(struct spl_draw_list *list, uint32_t pages, struct spl_error *err);
-
-/* Gives every batch its slots of parameters, of `most` entries at most, or of `most_summed` where texels are
- * interpolated (both 1 and more), and returns how many there are. All passes share them, so that a page takes at most
+/* Gives every batch its slots of parameters, of `most` entries at most, of `most_summed` where texels are interpolated,
+ * of `most_lines` of lines (all 1 and more), and returns how many there are. All passes share them, so that a page takes at most
  * one for each of its kinds of chunks, whatever layers a view has. */
-uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed);
+uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
+                                   uint64_t most_lines);
 
 void spl_draw_list_finish(struct spl_draw_list *list);
 

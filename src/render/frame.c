@@ -6,7 +6,7 @@
 #include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
-#include "render/wires.h"
+#include "render/slot.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -16,24 +16,44 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID,       [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
 };
 
-static bool ask_slot(struct spl_frame_job *job, uint32_t slot)
+/* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same answers.
+ * One that does not takes what is there, but for the first page. */
+static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
-    int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, &why);
-    if (rc && rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
+    bool awaited = !job->view->partial || slot == SPL_FIRST_SLOT;
+    int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
+    bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT); // for which a coarser one stands in
+    if (rc < 0 && !no_room)
         spl_fail(&job->page_error, rc, "%s", why.message);
-    return rc == SPL_OK;
+    if (rc == SPL_SLOT_PENDING && !awaited)
+        return SPL_SELECT_LATER;
+    return rc == SPL_SLOT_READY || rc == SPL_SLOT_PENDING ? SPL_SELECT_YES : SPL_SELECT_NO;
 }
 
-static bool ask_page(void *context, uint32_t page)
+static enum spl_select_answer ask_page(void *context, uint32_t page)
 {
     return ask_slot(context, page);
 }
 
-static bool ask_textures(void *context, uint32_t page)
+static enum spl_select_answer ask_textures(void *context, uint32_t page)
 {
     struct spl_frame_job *job = context;
-    return ask_slot(job, spl_dictionary_slot(job->resident)) && ask_slot(job, spl_textures_slot(job->resident, page));
+    enum spl_select_answer dictionary = ask_slot(job, spl_dictionary_slot(job->resident));
+    if (dictionary == SPL_SELECT_NO)
+        return SPL_SELECT_NO;
+    enum spl_select_answer textures = ask_slot(job, spl_textures_slot(job->resident, page));
+    return dictionary == SPL_SELECT_YES ? textures : dictionary;
+}
+
+/* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page among
+ * them. */
+static int end_walk(struct spl_frame_job *job, struct spl_error *err)
+{
+    int rc = spl_hold_end_walk(&job->renderer->residency, job->resident, &job->hold, &job->frame->stats.pages_loaded, err);
+    if (job->page_error.code)
+        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    return rc;
 }
 
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera)
@@ -53,20 +73,34 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
     };
 }
 
+int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *camera, double *spacing,
+                           struct spl_error *err)
+{
+    struct spl_select_params params = spl_frame_selection(job, camera);
+    struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
+    uint64_t clock = spl_now_ns();
+    bool complete = true;
+    spl_residency_begin_walk(&job->renderer->residency, &job->hold);
+    int rc = spl_select_spacing(&params, spacing, &complete, &why), waits = end_walk(job, err);
+    job->frame->stats.select_ms += spl_since_ms(&clock);
+    if (waits)
+        return waits;
+    job->frame->stats.complete &= complete;
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
 static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
     const struct spl_method_row *method = spl_method_row(job->view->method);
     struct spl_select_params params = spl_frame_selection(job, &tile->camera);
-    spl_residency_begin_frame(&r->residency);
+    spl_residency_begin_walk(&r->residency, &job->hold);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
-    int rc = spl_select(&params, &r->list, &why);
-    if (job->page_error.code)
-        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    int rc = spl_select(&params, &r->list, &why), waits = end_walk(job, err);
+    if (waits)
+        return waits;
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (method->lines && (rc = spl_wires_draw(job->wires, &tile->camera, &r->list, err)))
-        return rc;
     tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
     if (!tile->params.weight_max && method->sums)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
@@ -92,7 +126,7 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
-            spl_residency_begin_frame(&r->residency); // what this frame asked for may go, too
+            spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
             rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);

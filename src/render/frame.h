@@ -4,9 +4,9 @@
 #define SPL_RENDER_FRAME_H
 
 #include "base/clock.h"
+#include "render/hold.h"
 #include "render/renderer.h"
 #include "render/tiling.h"
-#include "render/wires.h"
 
 struct spl_frame_job {
     struct spl_renderer *renderer;
@@ -14,15 +14,19 @@ struct spl_frame_job {
     const struct spl_view *view;           /* at least one sample a pixel */
     struct spl_frame *frame;
     struct spl_tiling tiling;
-    const struct spl_wires *wires; /* method fill */
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
+    struct spl_hold hold;          /* what the frame waits with, between its steps */
 };
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera);
 
-/* Renders `tile` into the job's images and adds to its stats. Blocks until it is done; SPL_E_TIMEOUT where the view's
- * deadline had passed before. */
+/* spl_select_spacing() of what `camera` sees. SPL_SLOT_PENDING where it has pages to wait for: it is to be called again. */
+int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *camera, double *spacing,
+                           struct spl_error *err);
+
+/* Renders `tile` into the job's images and adds to its stats. Blocks until it is done; SPL_SLOT_PENDING where it has pages
+ * to wait for, and nothing was drawn; SPL_E_TIMEOUT where the view's deadline had passed before. */
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
 
 /* Milliseconds since *from, which becomes now. */

@@ -26,7 +26,8 @@ struct spl_method_row {
     bool sums;      /* adds up fragments: the weight is chosen so that no sum can wrap; else the nearest wins */
     uint32_t apron; /* samples around a tile that act on those in it; prepare() may set more */
 
-    /* Once a view, after its tiling was zeroed and `apron` set; may be NULL. */
+    /* Once a view, after its tiling was zeroed and `apron` set; may be NULL. SPL_SLOT_PENDING where it has pages to wait for
+     * (frame.h): it is called again, then. */
     int (*prepare)(struct spl_frame_job *job, struct spl_error *err);
     /* Fills in its own parameters of a tile; may be NULL. */
     void (*place)(struct spl_tile *tile);

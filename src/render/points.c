@@ -18,8 +18,11 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
             return rc;
         spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
         struct spl_kernel_key lines = {"fill_lines", true, {group, pass}};
-        if (filled && (rc = spl_tile_dispatch_lines(tile, &lines, err)))
+        if (filled && (rc = spl_kernels_get(&r->kernels, r->gpu, &lines, &kernel, err)))
             return rc;
+        if (filled)
+            spl_tile_dispatch_splats(
+                tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

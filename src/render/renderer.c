@@ -1,8 +1,14 @@
 /* Life of a renderer: device, scratch, residency. See include/splatd/render.h. */
 #include <stdlib.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
+#include "render/hold.h"
 #include "render/renderer.h"
+#include "render/slot.h"
+
+enum { preload_ahead = 8 }; // pages that are asked for at once
+static const uint64_t patience_ns = 10 * SPL_NS_PER_S, between_looks_ns = SPL_NS_PER_S;
 
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
 {
@@ -18,7 +24,9 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     };
     int rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
-        spl_residency_init(&renderer->residency, renderer->gpu);
+        rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
+    }
+    if (!rc) {
         uint64_t samples = options->scratch_samples ? options->scratch_samples : SPL_TILE_SAMPLES;
         rc = spl_scratch_init(&renderer->scratch, renderer->gpu, samples, options, err);
     }
@@ -56,33 +64,78 @@ int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *da
 
 void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
 {
-    spl_residency_remove(&renderer->residency, dataset);
+    spl_residency_remove(&renderer->residency, dataset, SPL_NEVER);
 }
 
-int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t page,
-                              bool *more, struct spl_error *err)
+bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
 {
-    struct spl_resident_dataset *resident = spl_residency_get(&renderer->residency, dataset);
+    return spl_residency_remove(&renderer->residency, dataset, 0);
+}
+
+int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err)
+{
+    return spl_residency_upload(&renderer->residency, err);
+}
+
+bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns)
+{
+    uint64_t look_ns = spl_now_ns() + between_looks_ns;
+    return spl_io_wait(renderer->residency.io, look_ns < deadline_ns ? look_ns : deadline_ns);
+}
+
+/* As spl_renderer_preload_page(); `asker` may be NULL. */
+static int preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_hold *asker,
+                   uint32_t *page, bool *more, struct spl_error *err)
+{
+    struct spl_residency *residency = &renderer->residency;
+    struct spl_resident_dataset *resident = spl_residency_get(residency, dataset);
     *more = false;
     if (!resident)
         return spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
-    if (page >= resident->slot_count || (page > 0 && !spl_residency_has_room(&renderer->residency, resident, page)))
-        return SPL_OK; /* the rest comes as views need it */
-    spl_residency_begin_frame(&renderer->residency);
-    struct spl_error why = {0};
-    int rc = spl_residency_ask(&renderer->residency, resident, page, &why);
-    if (page > 0 && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM))
-        return SPL_OK;
-    *more = !rc && page + 1 < resident->slot_count;
-    return rc ? spl_fail(err, rc, "%s", why.message) : SPL_OK;
+    int rc = spl_residency_upload(residency, err);
+    if (rc)
+        return rc;
+    spl_residency_begin_walk(residency, asker);
+    uint32_t next = *page;
+    for (; next < resident->slot_count && next < *page + preload_ahead; next++) {
+        bool first = next == SPL_FIRST_SLOT;
+        struct spl_error why = {0};
+        if (!first && !spl_residency_has_room(residency, resident, next))
+            break; // the rest comes as views need it
+        rc = spl_residency_ask(residency, resident, next, false, &why);
+        if (!first && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM || rc == SPL_SLOT_CROWDED))
+            break;
+        if (rc < 0)
+            return spl_fail(err, rc, "%s", why.message);
+        if (rc == SPL_SLOT_READY && next == *page)
+            ++*page;
+    }
+    *more = *page < next;
+    return SPL_OK;
+}
+
+int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
+                              bool *more, struct spl_error *err)
+{
+    return preload(renderer, dataset, NULL, page, more, err);
 }
 
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
 {
+    struct spl_hold asker = {.alone = true};
+    uint64_t moved_ns = spl_now_ns();
     bool more = true;
     int rc = SPL_OK;
-    for (uint32_t page = 0; more && !rc; page++)
-        rc = spl_renderer_preload_page(renderer, dataset, page, &more, err);
+    for (uint32_t page = 0, before = 0; more && !rc; before = page) {
+        rc = preload(renderer, dataset, &asker, &page, &more, err);
+        if (page != before)
+            moved_ns = spl_now_ns();
+        else if (!rc && more && spl_now_ns() - moved_ns > patience_ns)
+            rc = spl_fail(err, SPL_E_TIMEOUT, "page %u of the dataset has not come for %d s", page,
+                          (int)(patience_ns / SPL_NS_PER_S));
+        else if (!rc && more)
+            spl_renderer_wait(renderer, moved_ns + patience_ns);
+    }
     return rc;
 }
 
@@ -94,7 +147,9 @@ void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_
         .bytes = resident ? spl_residency_get_bytes(resident) : 0,
         .limit_bytes = spl_gpu_get_limits(renderer->gpu)->memory_bytes,
         .taken_bytes = spl_gpu_get_memory(renderer->gpu),
+        .pages_loaded = renderer->residency.pages_loaded,
         .pages_evicted = renderer->residency.pages_evicted,
+        .pages_pending = spl_io_count(renderer->residency.io),
     };
 }
 

@@ -25,7 +25,6 @@ struct spl_scratch {
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
     struct spl_gpu_buffer *bounds;   /* struct spl_chunk_bounds[], grown on demand */
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
-    struct spl_gpu_buffer *lines;    /* struct spl_draw_line[], grown on demand */
 };
 
 /* What the two blocks of scratch memory hold in turns. An area is begun, which asserts that its block is free, and
@@ -96,6 +95,7 @@ enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
  * chunks. */
 struct spl_dispatch {
     enum spl_phase phases;
+    uint32_t kind;     /* enum spl_chunk_kind */
     bool by_texture;   /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
@@ -109,8 +109,6 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool 
 /* Records a kernel, one invocation for each of `items`, and a barrier. */
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,
                             const struct spl_frame_params *params, uint32_t items, struct spl_error *err);
-/* Records the drawing of the list's lines by a kernel, and a barrier. */
-int spl_tile_dispatch_lines(struct spl_tile *tile, const struct spl_kernel_key *key, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */

@@ -1,5 +1,5 @@
-/* Pages on the device; see residency.h. A software device draws from host-visible memory, so its pages are filled by
- * one read of the file; a GPU's go through a staging buffer. */
+/* Pages on the device; see residency.h. A software device draws from host-visible memory, which pages are copied to; a
+ * GPU's go through a staging buffer, which has its room before they have theirs. */
 #include "render/residency.h"
 
 #include <stdlib.h>
@@ -7,36 +7,76 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "dataset/dictionary.h"
+#include "render/hold.h"
+#include "render/slot.h"
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
 
-void spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu)
+enum { failures_max = 16 }; // that are remembered where nobody waits: each takes a read's place
+
+int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
+                       void *wake_context, struct spl_error *err)
 {
     *residency = (struct spl_residency){.gpu = gpu, .frame = 1};
+    LIST_INIT(&residency->holds);
+    return spl_io_create(wake, wake_context, &residency->io, err);
 }
 
-static void drop_page(struct spl_residency *residency, struct spl_resident_page *page)
+static bool is_software(const struct spl_residency *residency)
 {
+    return spl_gpu_get_device(residency->gpu)->software;
+}
+
+/* What the account of device memory takes for a slot. */
+static uint64_t taken(const struct spl_resident_dataset *resident, uint32_t slot)
+{
+    return (spl_slot_get_bytes(resident->dataset, slot) + 15) / 16 * 16;
+}
+
+void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page)
+{
+    spl_io_end(residency->io, page->read);
     spl_gpu_buffer_destroy(residency->gpu, page->buffer);
+    page->read = NULL;
     page->buffer = NULL;
+    residency->failures -= page->failed;
+    page->filled = page->failed = false;
 }
 
 static void drop_dataset(struct spl_residency *residency, struct spl_resident_dataset *resident)
 {
+    spl_hold_let_go_dataset(residency, resident);
     for (uint32_t i = 0; i < resident->slot_count; i++)
-        drop_page(residency, &resident->pages[i]);
-    free(resident->pages);
+        spl_residency_drop_slot(residency, &resident->pages[i]);
 }
 
 void spl_residency_finish(struct spl_residency *residency)
 {
-    for (size_t i = 0; i < residency->dataset_count; i++)
+    if (!residency->gpu)
+        return;
+    spl_hold_let_go_all(residency);
+    for (size_t i = 0; i < residency->dataset_count; i++) {
         drop_dataset(residency, &residency->datasets[i]);
-    if (residency->gpu)
-        spl_gpu_buffer_destroy(residency->gpu, residency->staging);
+        free(residency->datasets[i].pages);
+    }
+    spl_io_destroy(residency->io);
+    spl_gpu_buffer_destroy(residency->gpu, residency->staging);
     free(residency->datasets);
+    free(residency->asked);
     *residency = (struct spl_residency){0};
+}
+
+/* Room for what a walk through a dataset of so many slots may ask for. */
+static int reserve_asked(struct spl_residency *residency, size_t slots, struct spl_error *err)
+{
+    if (slots <= residency->asked_capacity)
+        return SPL_OK;
+    uint32_t *larger = spl_realloc(residency->asked, slots, sizeof *larger, err);
+    if (!larger)
+        return SPL_E_NOMEM;
+    residency->asked = larger;
+    residency->asked_capacity = slots;
+    return SPL_OK;
 }
 
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err)
@@ -51,23 +91,28 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
         residency->datasets = larger;
         residency->dataset_capacity = capacity;
     }
-    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    struct spl_resident_dataset resident = {.dataset = dataset, .page_count = info->pages};
-    resident.slot_count = info->atoms ? 2 * info->pages + 1 : info->pages;
-    resident.pages = spl_alloc(resident.slot_count, sizeof *resident.pages, err);
+    struct spl_resident_dataset resident = {.dataset = dataset,
+                                            .page_count = spl_dataset_get_info(dataset)->pages,
+                                            .slot_count = spl_slot_count(dataset)};
+    int rc = reserve_asked(residency, resident.slot_count, err);
+    resident.pages = rc ? NULL : spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
         return SPL_E_NOMEM;
     residency->datasets[residency->dataset_count++] = resident;
     return SPL_OK;
 }
 
-void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset)
+bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns)
 {
     struct spl_resident_dataset *resident = spl_residency_get(residency, dataset);
     if (!resident)
-        return;
+        return true;
     drop_dataset(residency, resident);
+    if (!spl_io_wait_for(residency->io, dataset, deadline_ns))
+        return false;
+    free(resident->pages);
     *resident = residency->datasets[--residency->dataset_count];
+    return true;
 }
 
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset)
@@ -78,95 +123,64 @@ struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, 
     return NULL;
 }
 
-void spl_residency_begin_frame(struct spl_residency *residency)
+void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *asker)
 {
     residency->frame++;
+    residency->asker = asker;
+    residency->asked_count = 0;
+    residency->pending = residency->crowded = false;
 }
 
-static bool evict_one(struct spl_residency *residency)
+/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
+static bool gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
 {
-    struct spl_resident_page *oldest = NULL;
+    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
+}
+
+static bool evict_one(struct spl_residency *residency, bool held)
+{
+    struct spl_resident_page *first = NULL;
     for (size_t i = 0; i < residency->dataset_count; i++) {
         struct spl_resident_dataset *resident = &residency->datasets[i];
         for (uint32_t p = 0; p < resident->slot_count; p++) {
             struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->last_frame < residency->frame &&
-                (!oldest || page->last_frame < oldest->last_frame))
-                oldest = page;
+            if (page->buffer && page->last_frame < residency->frame && (held || !page->holds) &&
+                (!first || gives_way_before(page, first)))
+                first = page;
         }
     }
-    if (!oldest)
+    if (!first)
         return false;
-    drop_page(residency, oldest);
-    residency->pages_evicted++;
+    residency->pages_evicted += first->filled;
+    spl_residency_drop_slot(residency, first);
     return true;
 }
 
-int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
-                              struct spl_gpu_buffer **out, struct spl_error *err)
+static int make_buffer(struct spl_residency *residency, bool evict_held, enum spl_gpu_buffer_kind kind, uint64_t bytes,
+                       struct spl_gpu_buffer **out, struct spl_error *err)
 {
     for (;;) {
         struct spl_error why = {0};
         int rc = spl_gpu_buffer_create(residency->gpu, kind, bytes, out, &why);
         if (!rc)
             return SPL_OK;
-        if ((rc != SPL_E_LIMIT && rc != SPL_E_NOMEM) || !evict_one(residency))
+        if ((rc != SPL_E_LIMIT && rc != SPL_E_NOMEM) || !evict_one(residency, evict_held))
             return spl_fail(err, rc, "%s", why.message);
     }
 }
 
-/* What the file has of a slot; of a page the device takes a word more, 0: a zero-width field at its very end still
- * loads its word, and a forged mask may use it. */
-static size_t bytes_of(const struct spl_resident_dataset *resident, uint32_t slot)
+int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
+                              struct spl_gpu_buffer **out, struct spl_error *err)
 {
-    if (slot >= spl_dictionary_slot(resident))
-        return spl_dataset_get_info(resident->dataset)->dictionary_bytes;
-    if (slot >= resident->page_count)
-        return spl_dataset_get_texture_bytes(resident->dataset, slot - resident->page_count);
-    return spl_dataset_get_page_bytes(resident->dataset, slot) + 4;
-}
-
-static int read_slot(const struct spl_resident_dataset *resident, uint32_t slot, void *out, struct spl_error *err)
-{
-    if (slot < resident->page_count) {
-        memset((char *)out + bytes_of(resident, slot) - 4, 0, 4);
-        return spl_dataset_read_page(resident->dataset, slot, out, err);
-    }
-    if (slot < spl_dictionary_slot(resident))
-        return spl_dataset_read_textures(resident->dataset, slot - resident->page_count, out, err);
-    spl_dictionary_expand(spl_dataset_get_dictionary(resident->dataset), out);
-    return SPL_OK;
-}
-
-static int fill_through_staging(struct spl_residency *residency, struct spl_gpu_buffer *target,
-                                const struct spl_resident_dataset *resident, uint32_t slot, struct spl_error *err)
-{
-    size_t bytes = bytes_of(resident, slot);
-    if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) < bytes) {
-        spl_gpu_buffer_destroy(residency->gpu, residency->staging);
-        residency->staging = NULL;
-    }
-    int rc = residency->staging ? SPL_OK
-                                : spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
-    if (rc)
-        return rc;
-    uint64_t ticket;
-    if (!(rc = read_slot(resident, slot, spl_gpu_buffer_map(residency->staging), err)))
-        rc = spl_gpu_begin(residency->gpu, err);
-    if (rc)
-        return rc;
-    spl_gpu_copy(residency->gpu, residency->staging, 0, target, 0, bytes);
-    spl_gpu_barrier(residency->gpu);
-    rc = spl_gpu_submit(residency->gpu, &ticket, err);
-    return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
+    return make_buffer(residency, true, kind, bytes, out, err);
 }
 
 bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
-                            uint32_t page)
+                            uint32_t slot)
 {
-    bool staged = !spl_gpu_get_device(residency->gpu)->software && !residency->staging;
-    uint64_t needed = (bytes_of(resident, page) + 15) / 16 * 16 * (staged ? 2 : 1);
-    return resident->pages[page].buffer ||
+    bool staged = !is_software(residency) && !residency->staging;
+    uint64_t needed = taken(resident, slot) * (staged ? 2 : 1);
+    return resident->pages[slot].buffer ||
            spl_gpu_get_memory(residency->gpu) + needed <= spl_gpu_get_limits(residency->gpu)->memory_bytes;
 }
 
@@ -174,39 +188,163 @@ uint64_t spl_residency_get_reserve(const struct spl_residency *residency)
 {
     uint64_t most = 0;
     for (size_t i = 0; i < residency->dataset_count; i++) {
-        uint64_t bytes = (bytes_of(&residency->datasets[i], 0) + 15) / 16 * 16;
+        uint64_t bytes = taken(&residency->datasets[i], SPL_FIRST_SLOT);
         most = bytes > most ? bytes : most;
     }
-    return most * (spl_gpu_get_device(residency->gpu)->software ? 1 : 2);
+    return most * (is_software(residency) ? 1 : 2);
 }
 
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
 {
     uint64_t bytes = 0;
-    for (uint32_t page = 0; page < resident->slot_count; page++)
-        bytes += resident->pages[page].buffer ? bytes_of(resident, page) : 0;
+    for (uint32_t slot = 0; slot < resident->slot_count; slot++)
+        bytes += resident->pages[slot].buffer ? spl_slot_get_bytes(resident->dataset, slot) : 0;
     return bytes;
 }
 
-int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
-                      struct spl_error *err)
+/* Has the walk no room for a buffer of so many bytes only because other frames hold theirs? */
+static bool is_held(const struct spl_residency *residency, int rc, uint64_t bytes)
 {
-    struct spl_resident_page *slot = &resident->pages[page];
-    slot->last_frame = residency->frame;
-    if (slot->buffer)
+    uint64_t held = 0, limit = spl_gpu_get_limits(residency->gpu)->memory_bytes;
+    for (size_t i = 0; i < residency->dataset_count; i++) {
+        const struct spl_resident_dataset *resident = &residency->datasets[i];
+        for (uint32_t p = 0; p < resident->slot_count; p++) {
+            const struct spl_resident_page *page = &resident->pages[p];
+            if (page->buffer && page->holds && page->last_frame < residency->frame)
+                held += spl_gpu_buffer_get_bytes(page->buffer);
+        }
+    }
+    return held && (rc == SPL_E_NOMEM || spl_gpu_get_memory(residency->gpu) - held + bytes <= limit);
+}
+
+static int grow_staging(struct spl_residency *residency, bool evict_held, size_t bytes, struct spl_error *err)
+{
+    if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) >= bytes)
         return SPL_OK;
-    bool software = spl_gpu_get_device(residency->gpu)->software;
-    int rc = spl_residency_make_buffer(residency, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes_of(resident, page),
-                                       &slot->buffer, err);
+    spl_gpu_buffer_destroy(residency->gpu, residency->staging);
+    residency->staging = NULL;
+    return make_buffer(residency, evict_held, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
+}
+
+/* Takes the slot's room. */
+static int take_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                     struct spl_error *err)
+{
+    bool software = is_software(residency), alone = residency->asker && residency->asker->alone;
+    if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
+        return SPL_SLOT_CROWDED;
+    struct spl_error why = {0};
+    size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
+    struct spl_gpu_buffer *buffer = NULL;
+    int rc = make_buffer(residency, alone, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes, &buffer, &why);
+    if (!rc && !software)
+        rc = grow_staging(residency, alone, bytes, &why);
+    if (!rc) {
+        resident->pages[slot].buffer = buffer;
+        return SPL_OK;
+    }
+    spl_gpu_buffer_destroy(residency->gpu, buffer);
+    if ((rc == SPL_E_LIMIT || rc == SPL_E_NOMEM) && is_held(residency, rc, taken(resident, slot)))
+        return SPL_SLOT_CROWDED;
+    return spl_fail(err, rc, "%s", why.message);
+}
+
+bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
+                              struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank)
+{
+    struct spl_io_what what = {.read = spl_slot_read,
+                               .source = dataset,
+                               .index = slot,
+                               .bytes = spl_slot_get_bytes(dataset, slot),
+                               .owner = page};
+    if (page->read)
+        spl_io_raise(residency->io, page->read, rank);
+    else
+        page->read = spl_io_try_begin(residency->io, &what, rank);
+    return page->read;
+}
+
+/* Why its read failed. It is forgotten with the last frame that waits for it; where none does, once for all that failed of
+ * the dataset. */
+static int tell_failure(struct spl_residency *residency, struct spl_resident_dataset *resident,
+                        const struct spl_resident_page *page, struct spl_error *err)
+{
+    int rc = page->read->err.code;
+    spl_fail(err, rc, "%s", page->read->err.message);
+    for (uint32_t i = 0; i < resident->slot_count; i++)
+        if (resident->pages[i].failed && !resident->pages[i].holds)
+            spl_residency_drop_slot(residency, &resident->pages[i]);
+    return rc;
+}
+
+int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                      bool awaited, struct spl_error *err)
+{
+    struct spl_resident_page *page = &resident->pages[slot];
+    bool first = page->last_frame < residency->frame;
+    page->last_frame = residency->frame;
+    if (page->failed)
+        return tell_failure(residency, resident, page, err);
+    if (residency->crowded && !page->filled) // the walk will be made anew from its start
+        return SPL_SLOT_CROWDED;
+    int rc = page->buffer ? SPL_OK : take_room(residency, resident, slot, err);
+    if (rc) {
+        residency->crowded |= awaited && rc == SPL_SLOT_CROWDED;
+        return rc;
+    }
+    if (awaited && first)
+        residency->asked[residency->asked_count++] = slot;
+    if (page->filled)
+        return SPL_SLOT_READY;
+    residency->pending |= awaited;
+    struct spl_io_rank rank = {.awaited = awaited, .walk = residency->frame};
+    if (!spl_residency_begin_read(residency, resident->dataset, page, slot, rank) && !awaited)
+        spl_residency_drop_slot(residency, page); // its room is for those who wait
+    return SPL_SLOT_PENDING;
+}
+
+/* Copies what was read to where kernels see it. */
+static int fill(struct spl_residency *residency, struct spl_resident_page *page, const struct spl_io_read *read,
+                struct spl_error *err)
+{
+    size_t bytes = read->what.bytes;
+    uint64_t ticket;
+    if (is_software(residency)) {
+        memcpy(spl_gpu_buffer_map(page->buffer), read->data, bytes);
+        return SPL_OK;
+    }
+    page->last_frame = residency->frame; // it does not give way to its own staging
+    int rc = grow_staging(residency, true, bytes, err);
+    if (!rc)
+        rc = spl_gpu_begin(residency->gpu, err);
     if (rc)
         return rc;
-    if (software)
-        rc = read_slot(resident, page, spl_gpu_buffer_map(slot->buffer), err);
-    else
-        rc = fill_through_staging(residency, slot->buffer, resident, page, err);
-    if (rc)
-        drop_page(residency, slot);
-    else
+    memcpy(spl_gpu_buffer_map(residency->staging), read->data, bytes);
+    spl_gpu_copy(residency->gpu, residency->staging, 0, page->buffer, 0, bytes);
+    spl_gpu_barrier(residency->gpu);
+    rc = spl_gpu_submit(residency->gpu, &ticket, err);
+    return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
+}
+
+int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (struct spl_io_read *read; !rc && (read = spl_io_take(residency->io));) {
+        struct spl_resident_page *page = read->what.owner;
+        if (!read->data) {
+            page->failed = true;
+            if (residency->failures++ > failures_max && !page->holds)
+                spl_residency_drop_slot(residency, page);
+            continue;
+        }
+        if ((rc = fill(residency, page, read, err))) {
+            spl_residency_drop_slot(residency, page);
+            break;
+        }
+        spl_io_end(residency->io, read);
+        page->read = NULL;
+        page->filled = true;
         residency->pages_loaded++;
+    }
     return rc;
 }

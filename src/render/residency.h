@@ -1,22 +1,32 @@
-/* Which pages of which datasets are on the device. Pages are loaded when a view asks for them and evicted, least
- * recently drawn first, when the device's memory limit refuses another. Bookkeeping of the renderer's thread. */
+/* Which slots of which datasets are on the device. They are read when a view asks for them, on the io thread (io.h), and
+ * evicted, least recently drawn first, when the device's memory limit refuses another.
+ *
+ * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
+ * has no room depends on what the walk asks for, and not on what has come by then. A frame that waits holds what it
+ * asked for (hold.h). Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <sys/queue.h>
 
 #include "base/error.h"
 #include "dataset/dataset.h"
 #include "gpu/gpu.h"
+#include "render/io.h"
+
+struct spl_hold;
 
 struct spl_resident_page {
-    struct spl_gpu_buffer *buffer; /* NULL = not resident */
+    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way */
+    struct spl_io_read *read;      /* that is to fill it, or has failed; may be NULL */
     uint64_t last_frame;           /* when it was last asked for */
+    uint32_t holds;                /* frames that wait with it */
+    bool filled, failed;
 };
 
-/* A dataset's slots: its pages; where it has textures, as many of their codes by page, and one of the dictionary. Each
- * comes and goes on its own. */
+/* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
@@ -35,33 +45,51 @@ static inline uint32_t spl_dictionary_slot(const struct spl_resident_dataset *re
 
 struct spl_residency {
     struct spl_gpu *gpu;
+    struct spl_io *io;
     struct spl_gpu_buffer *staging;     /* hardware only: software draws from mapped memory */
     struct spl_resident_dataset *datasets;
     size_t dataset_count, dataset_capacity;
-    uint64_t frame;                     /* pages asked for in this frame are never evicted */
+    LIST_HEAD(, spl_hold) holds;
+    struct spl_hold *first_in_line; /* that others take no room before; may be NULL */
+    uint64_t releases;              /* of what was held, so far */
+    uint32_t failures;              /* slots whose read has failed and that nobody has asked for since */
     uint64_t pages_loaded, pages_evicted; /* since init */
+
+    /* The walk under way. */
+    uint64_t frame;          /* what it has asked for is not evicted */
+    struct spl_hold *asker;  /* may be NULL */
+    uint32_t *asked;         /* slots that it waits for or draws, in its order; room for those of any dataset */
+    size_t asked_count, asked_capacity;
+    bool pending, crowded;   /* some of them are on their way; have no room before another frame lets go */
 };
 
-void spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu);
+/* `wake` as spl_io_create(). */
+int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
+                       void *wake_context, struct spl_error *err);
+/* Blocks until the read under way has ended. Holds are let go of. */
 void spl_residency_finish(struct spl_residency *residency);
 
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err);
-void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset);
+
+/* Lets go of the dataset: true once nothing of it is being read, which is waited for until `deadline_ns` (0 = never
+ * blocks). False: it is as if it had just been added. */
+bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns);
 
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
 
-/* Is slot `page` resident, or does it fit without evicting another? */
+/* Is slot `slot` resident or on its way, or does it fit without evicting another? */
 bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
-                            uint32_t page);
+                            uint32_t slot);
 
-/* Bytes of the slots of `resident` that are on the device. */
+/* Bytes of the slots of `resident` that are on the device, or have their room there. */
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident);
 
-/* Starts a frame: what was asked for before may be evicted again. */
-void spl_residency_begin_frame(struct spl_residency *residency);
+/* Starts a walk, by a frame (or NULL): what was asked for before may be evicted again. */
+void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *asker);
 
-/* A buffer of `bytes` for the renderer itself, evicting pages that this frame has not asked for as the limit demands.
+/* A buffer of `bytes` for the renderer itself, evicting pages that this walk has not asked for as the limit demands,
+ * those last that frames wait with.
  */
 int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
                               struct spl_gpu_buffer **out, struct spl_error *err);
@@ -69,8 +97,27 @@ int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buff
 /* What the largest first page takes, on its way too: without it a dataset has no picture at all. */
 uint64_t spl_residency_get_reserve(const struct spl_residency *residency);
 
-/* Makes slot `page` resident for this frame. SPL_E_LIMIT when the memory limit leaves no room even after evictions. */
-int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t page,
-                      struct spl_error *err);
+/* What spl_residency_ask() says beside errors. */
+enum spl_slot_answer {
+    SPL_SLOT_READY,   /* it is there */
+    SPL_SLOT_PENDING, /* it has its room and is on its way */
+    SPL_SLOT_CROWDED, /* its room is held by frames that wait; later */
+};
+
+/* Asks for a slot of `resident` in the walk under way; `awaited`: the walk is good for nothing without it, its frame
+ * waits. Never blocks. SPL_E_LIMIT when the memory limit leaves no room even if nobody else had anything; why its read
+ * failed, after which it is read anew. */
+int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                      bool awaited, struct spl_error *err);
+
+/* Begins the read of a slot that has its room, unless it has begun; false when no more can be under way. */
+bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
+                              struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
+
+/* Gives up what has room and did not come. */
+void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
+
+/* Puts on the device what has been read since. Device errors only: a read that failed is told to who asks for it. */
+int spl_residency_upload(struct spl_residency *residency, struct spl_error *err);
 
 #endif

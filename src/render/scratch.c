@@ -8,7 +8,6 @@
 enum {
     chunks_at_start = 16384,
     chunk_entries_at_start = 16, // 128 splats in runs of 32 are 4; near ones are listed once a window
-    lines_at_start = 65536, // wires are drawn whole whatever pages there are: more than most scans have in view
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
 
@@ -47,7 +46,6 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_ENTRIES].buffer = scratch->entries;
     bindings[SPL_RESOURCE_CHUNKS].buffer = scratch->chunks;
     bindings[SPL_RESOURCE_BOUNDS].buffer = scratch->bounds;
-    bindings[SPL_RESOURCE_LINES].buffer = scratch->lines;
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
     for (int area = 0; area < SPL_AREA_COUNT; area++)
@@ -100,7 +98,6 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->chunks, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_draw_chunk)},
         {&scratch->bounds, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_chunk_bounds)},
         {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
-        {&scratch->lines, SPL_GPU_UPLOAD, lines_at_start * sizeof(struct spl_draw_line)},
     };
     uint64_t working = 0, mib = 1 << 20;
     uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
@@ -128,7 +125,7 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
     struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->large,  scratch->small,  scratch->output,
                                     scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
-                                    scratch->entries,  scratch->lines};
+                                    scratch->entries};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     *scratch = (struct spl_scratch){0};
@@ -183,7 +180,6 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
         {&scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks},
         {&scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds},
         {&scratch->entries, list->entries, list->entry_count * sizeof *list->entries},
-        {&scratch->lines, list->lines, list->line_count * sizeof *list->lines},
     };
     int rc = SPL_OK;
     for (size_t i = 0; i < sizeof all / sizeof *all && !rc; i++)

@@ -92,7 +92,7 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
             struct spl_draw_chunk part = *chunk;
             struct spl_chunk_bounds bounds = occlusion_bounds(camera, from, to, near);
             part.count |= (x + 1) << SPL_COUNT_BITS | y << (SPL_COUNT_BITS + SPL_WINDOW_BITS);
-            rc = spl_draw_list_add(w->list, page, &part, &bounds, err);
+            rc = spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &part, &bounds, err);
         }
     }
     return rc;
@@ -109,7 +109,7 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
     double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
     if (!texture || samples < least)
         return 0;
-    if (!params->textured(params->context, page)) {
+    if (params->textured(params->context, page) != SPL_SELECT_YES) {
         w->list->complete = false;
         return 0;
     }
@@ -119,17 +119,64 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
            (samples > size ? 1u : 0u) << SPL_CHUNK_TEXTURE_SMOOTH;
 }
 
-static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
-                      double radius_share, struct spl_error *err)
+/* The box of the chunk's positions, in view space, and where its origin lies from the eye. */
+static struct spl_view_box chunk_box(const struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk,
+                                     double origin[3])
 {
-    const struct spl_camera *camera = w->params->camera;
-    double origin[3], size[3];
+    double size[3];
     static const unsigned shifts[3] = {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z};
     for (int i = 0; i < 3; i++) {
         origin[i] = node_to_eye[i] + chunk->origin[i];
         size[i] = (double)chunk->step * ((1u << (chunk->geometry_bits >> shifts[i] & 31u)) - 1);
     }
-    struct spl_view_box box = spl_view_box(camera, origin, size);
+    return spl_view_box(w->params->camera, origin, size);
+}
+
+/* What any kind of chunk is drawn by; radii as they are. */
+static struct spl_draw_chunk begin_chunk(const struct walk *w, const struct spl_chunk *chunk, const double origin[3])
+{
+    struct spl_draw_chunk out = {
+        .step = chunk->step,
+        .radius_min = chunk->radius_min,
+        .radius_step = chunk->radius_step,
+        .geometry_word = chunk->geometry_word,
+        .color_word = spl_chunk_color_word(chunk),
+        .geometry_bits = chunk->geometry_bits,
+        .color_bits = chunk->color_bits,
+        .color_base = chunk->color_base,
+        .normal_u = chunk->normal_u,
+        .normal_v = chunk->normal_v,
+        .normal_step = chunk->normal_step,
+        .first_id = (uint32_t)chunk->first_id, // layer id is refused where they do not fit (view.c)
+        .count = chunk->count,
+        .texture_scale = 1,
+    };
+    float *view[3] = {&out.origin_x, &out.origin_y, &out.origin_z};
+    for (int i = 0; i < 3; i++) {
+        const double *r = w->params->camera->rotation + 3 * i;
+        *view[i] = (float)(r[0] * origin[0] + r[1] * origin[1] + r[2] * origin[2]);
+    }
+    return out;
+}
+
+/* Lines are drawn whole, one sample wide. */
+static int draw_lines(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
+                      struct spl_error *err)
+{
+    double origin[3];
+    struct spl_view_box box = chunk_box(w, node_to_eye, chunk, origin);
+    if (w->covered || !w->params->lines || !spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
+        return SPL_OK;
+    struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
+    return spl_draw_list_add(w->list, page, SPL_CHUNK_LINES, &out, &(struct spl_chunk_bounds){0}, err);
+}
+
+static int draw_discs(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
+                      double radius_share, struct spl_error *err)
+{
+    const struct spl_camera *camera = w->params->camera;
+    double origin[3];
+    struct spl_view_box box = chunk_box(w, node_to_eye, chunk, origin);
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
@@ -155,33 +202,19 @@ static int draw_chunk(struct walk *w, const double node_to_eye[3], const struct 
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
                         : 0; // at most 109
     uint32_t linear = 3u << SPL_GEOMETRY_LINEAR;
-    struct spl_draw_chunk out = {
-        .step = chunk->step,
-        .radius_min = (float)(chunk->radius_min * scale),
-        .radius_step = (float)(chunk->radius_step * scale),
-        .geometry_word = chunk->geometry_word,
-        .color_word = spl_chunk_color_word(chunk),
-        .geometry_bits = w->params->lines ? chunk->geometry_bits : chunk->geometry_bits & ~linear,
-        .color_bits = chunk->color_bits | clip << SPL_COLOR_CLIP,
-        .color_base = chunk->color_base,
-        .normal_u = chunk->normal_u,
-        .normal_v = chunk->normal_v,
-        .normal_step = chunk->normal_step,
-        .first_id = (uint32_t)chunk->first_id, // layer id is refused where they do not fit (view.c)
-        .count = count,
-        .texture = drawn_texture(w, chunk, page, near),
-        .texture_scale = (float)scale,
-    };
-    float *view[3] = {&out.origin_x, &out.origin_y, &out.origin_z};
-    for (int i = 0; i < 3; i++) {
-        const double *r = camera->rotation + 3 * i;
-        *view[i] = (float)(r[0] * origin[0] + r[1] * origin[1] + r[2] * origin[2]);
-    }
+    struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
+    out.radius_min = (float)(chunk->radius_min * scale);
+    out.radius_step = (float)(chunk->radius_step * scale);
+    out.geometry_bits &= w->params->lines ? ~0u : ~linear;
+    out.color_bits |= clip << SPL_COLOR_CLIP;
+    out.count = count;
+    out.texture = drawn_texture(w, chunk, page, near);
+    out.texture_scale = (float)scale;
     w->list->splats += count;
     if (w->params->discs && disc_side(camera, radius, near) > SPL_WINDOW)
         return add_windows(w, page, &out, low, high, near, err);
     struct spl_chunk_bounds bounds = occlusion_bounds(camera, low, high, near);
-    return spl_draw_list_add(w->list, page, &out, &bounds, err);
+    return spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &out, &bounds, err);
 }
 
 static int draw_node(struct walk *w, const struct spl_node *node, struct spl_error *err)
@@ -192,7 +225,10 @@ static int draw_node(struct walk *w, const struct spl_node *node, struct spl_err
     w->list->nodes++;
     double radius_share = node->child_count ? cluster_radius_share : 1;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
-        int rc = draw_chunk(w, node_to_eye, &w->chunks[node->first_chunk + i], node->page, radius_share, err);
+        const struct spl_chunk *chunk = &w->chunks[node->first_chunk + i];
+        int rc = spl_chunk_kind(chunk) == SPL_CHUNK_LINES
+                     ? draw_lines(w, node_to_eye, chunk, node->page, err)
+                     : draw_discs(w, node_to_eye, chunk, node->page, radius_share, err);
         if (rc)
             return rc;
     }
@@ -220,12 +256,15 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
     uint64_t order[8];
     uint32_t count = 0;
     double depths[8];
+    bool all = true;
     for (uint64_t child = node->first_child; child < node->first_child + node->child_count; child++) {
         struct spl_view_box box = node_box(w, &w->nodes[child]);
         if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
             continue;
-        if (!w->params->resident(w->params->context, w->nodes[child].page))
+        enum spl_select_answer answer = w->params->resident(w->params->context, w->nodes[child].page);
+        if (answer == SPL_SELECT_NO)
             return false;
+        all &= answer == SPL_SELECT_YES;
         uint32_t at = count++;
         for (; at > 0 && depths[at - 1] < box.center[2]; at--) {
             depths[at] = depths[at - 1];
@@ -234,6 +273,8 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
         depths[at] = box.center[2];
         order[at] = child;
     }
+    if (!all)
+        return false;
     memcpy(stack + *depth, order, count * sizeof *order);
     *depth += count;
     return true;
@@ -244,7 +285,7 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     const struct spl_camera *camera = w->params->camera;
     uint64_t stack[stack_max];
     size_t depth = 0;
-    if (!w->params->resident(w->params->context, w->nodes[0].page))
+    if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
         return spl_fail(err, SPL_E_LIMIT, "not even the coarsest level fits the device memory limit");
     stack[depth++] = 0;
     while (depth > 0) {
@@ -301,7 +342,6 @@ int spl_select_spacing(const struct spl_select_params *params, double *spacing, 
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err)
 {
     spl_draw_list_clear(list);
-    uint32_t pages = spl_dataset_get_info(params->dataset)->pages;
     struct walk w = begin_walk(params);
     w.list = list;
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
@@ -309,7 +349,7 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
         return rc;
     rc = walk_tree(&w, err);
     if (!rc)
-        rc = spl_draw_list_lay_out(list, pages, err);
+        rc = spl_draw_list_lay_out(list, err);
     list->sample_splats = spl_occupancy_bound(&w.occupancy);
     spl_occupancy_finish(&w.occupancy);
     return rc;

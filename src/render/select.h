@@ -18,17 +18,21 @@
 #include "dataset/dataset.h"
 #include "render/draw_list.h"
 
+/* Whether a page can be drawn. LATER: not yet, so a coarser node stands in, and what else the finer ones need is asked
+ * for. */
+enum spl_select_answer { SPL_SELECT_NO, SPL_SELECT_YES, SPL_SELECT_LATER };
+
 struct spl_select_params {
     const struct spl_dataset *dataset;
     const struct spl_camera *camera;                /* of the tile, in samples */
     double lod;                                     /* samples; 0 = leaves in full */
     double low_pass;                                /* samples */
     bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
-    bool lines;                                     /* chunks with linear splats are batches of their own */
-    bool (*resident)(void *context, uint32_t page); /* may the page be drawn? may load it */
+    bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
+    enum spl_select_answer (*resident)(void *context, uint32_t page); /* may the page be drawn? may ask for it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
-    bool (*textured)(void *context, uint32_t page); /* may the page's textures be drawn? may load them; may be NULL
-                                                       where atoms is 0 */
+    enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them; may
+                                                                         be NULL where atoms is 0 */
     void *context;
 };
 

@@ -25,6 +25,7 @@ struct spl_frame_steps {
     struct spl_frame_job job;
     uint32_t x, y; /* corner of the next tile; y = height: all are there */
     uint32_t row;  /* of `enlarged`, the next */
+    bool prepared; /* its plan is made, for which it may have waited */
 };
 
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
@@ -61,6 +62,7 @@ static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
     return steps->job.resident ? SPL_OK : spl_fail(err, SPL_E_NOT_FOUND, "the dataset was not added to this renderer");
 }
 
+/* SPL_SLOT_PENDING where it has pages to wait for; then it is to be called again. */
 static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 {
     struct spl_frame_job *job = &steps->job;
@@ -70,26 +72,27 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
-    if (!rc && method->lines)
-        rc = spl_dataset_get_wires(steps->dataset, &job->wires, err);
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
     if (!rc)
         rc = make_images(&steps->frame, view, err);
     if (!rc && steps->wanted.supersample < 1)
         rc = make_images(&steps->enlarged, &steps->wanted, err);
+    steps->prepared = !rc;
     return rc;
 }
 
-int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                    struct spl_frame_steps **out, struct spl_error *err)
+static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                 bool alone, struct spl_frame_steps **out, struct spl_error *err)
 {
-    uint64_t clock = spl_now_ns(), loaded = renderer->residency.pages_loaded;
+    uint64_t clock = spl_now_ns();
     *out = NULL;
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     int rc = spl_view_check(view, err);
     if (!rc)
         rc = spl_view_check_layers(view, info, err);
+    if (!rc)
+        rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
     struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
@@ -102,15 +105,21 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     if (view->supersample < 1)
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    steps->job.hold.alone = alone;
     steps->frame.stats.complete = true;
-    if ((rc = prepare(steps, err))) {
+    if ((rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
         return rc;
     }
-    steps->frame.stats.pages_loaded = renderer->residency.pages_loaded - loaded;
     steps->frame.stats.total_ms = spl_since_ms(&clock);
     *out = steps;
     return SPL_OK;
+}
+
+int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                    struct spl_frame_steps **out, struct spl_error *err)
+{
+    return begin(renderer, dataset, view, false, out, err);
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -144,25 +153,42 @@ static void enlarge(struct spl_frame_steps *steps)
     steps->row = end;
 }
 
+/* SPL_SLOT_PENDING: it waits. */
+static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl_error *err)
+{
+    uint64_t clock = spl_now_ns();
+    int rc = spl_residency_upload(&steps->job.renderer->residency, err);
+    if (!rc)
+        rc = spl_hold_poll(&steps->job.hold, err);
+    if (rc >= 0 && clock >= deadline_ns)
+        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered%s",
+                        rc ? ": its pages had not come" : "");
+    if (rc)
+        return rc;
+    spl_hold_release(&steps->job.hold);
+    if (!steps->prepared && (rc = prepare(steps, err)))
+        return rc;
+    if (steps->y < steps->view.camera.height)
+        return make_tile(steps, err);
+    clock = spl_now_ns();
+    enlarge(steps);
+    steps->frame.stats.readback_ms += spl_since_ms(&clock);
+    return SPL_OK;
+}
+
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
-    struct spl_frame_stats *stats = &steps->frame.stats;
-    struct spl_residency *residency = &steps->job.renderer->residency;
-    uint64_t clock = spl_now_ns(), enlarging = clock, loaded = residency->pages_loaded;
-    int rc = SPL_OK;
+    uint64_t clock = spl_now_ns();
     steps->view.deadline_ns = deadline_ns;
-    if (steps->y < steps->view.camera.height) {
-        rc = make_tile(steps, err);
-    } else if (clock >= deadline_ns) {
-        rc = spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
-    } else {
-        enlarge(steps);
-        stats->readback_ms += spl_since_ms(&enlarging);
-    }
-    stats->pages_loaded += residency->pages_loaded - loaded;
-    stats->total_ms += spl_since_ms(&clock);
-    *more = !rc && spl_frame_get_samples_left(steps);
-    return rc;
+    int rc = go_on(steps, deadline_ns, err);
+    steps->frame.stats.total_ms += spl_since_ms(&clock);
+    *more = rc >= 0 && spl_frame_get_samples_left(steps);
+    return rc < 0 ? rc : SPL_OK;
+}
+
+bool spl_frame_is_waiting(struct spl_frame_steps *steps)
+{
+    return spl_hold_poll(&steps->job.hold, NULL) == SPL_SLOT_PENDING;
 }
 
 uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
@@ -186,6 +212,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         *frame = *made;
         *made = (struct spl_frame){0};
     }
+    spl_hold_finish(&steps->job.hold);
     spl_frame_finish(&steps->frame);
     spl_frame_finish(&steps->enlarged);
     free(steps);
@@ -196,9 +223,12 @@ int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset 
 {
     struct spl_frame_steps *steps;
     bool more = true;
-    int rc = spl_frame_begin(renderer, dataset, view, &steps, err);
-    while (!rc && more)
+    int rc = begin(renderer, dataset, view, true, &steps, err);
+    while (!rc && more) {
         rc = spl_frame_step(steps, view->deadline_ns, &more, err);
+        if (!rc && more && spl_frame_is_waiting(steps))
+            spl_renderer_wait(renderer, view->deadline_ns);
+    }
     spl_frame_end(steps, rc ? NULL : frame);
     if (rc)
         memset(frame, 0, sizeof *frame);

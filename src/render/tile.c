@@ -11,7 +11,7 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
     struct spl_renderer *r = tile->renderer;
     bool any = false;
     for (size_t i = 0; i < r->list.batch_count; i++)
-        any |= r->list.batches[i].apart;
+        any |= r->list.batches[i].key.apart;
     *clipped = NULL;
     int rc = spl_kernels_get(&r->kernels, r->gpu, &key, plain, err);
     key.constants[clipped_constant] = 1;
@@ -42,7 +42,8 @@ static int next_params(struct spl_tile *tile, const struct spl_frame_params *par
     return SPL_OK;
 }
 
-enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES };
+/* A piece may be as long as the image, so that each has an invocation of its own. */
+enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES, line_entries_per_workgroup = SPL_WORKGROUP / SPL_RUN_SPLATS };
 
 int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
 {
@@ -52,7 +53,8 @@ int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
              summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
         summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
-    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed);
+    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed,
+                                               workgroups * line_entries_per_workgroup);
     if (slots > SPL_PARAMS_SLOTS)
         return too_many(err);
     tile->slots_used = (uint32_t)slots;
@@ -74,16 +76,19 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
+    const uint32_t per_workgroup = what->kind == SPL_CHUNK_LINES ? line_entries_per_workgroup : entries_per_workgroup;
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
     spl_tile_bind(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
-            (what->by_texture && (what->planes != batch->planes || what->smooth != batch->smooth)))
+        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
+            what->kind != batch->key.kind ||
+            (what->by_texture && (what->planes != batch->key.planes || what->smooth != batch->key.smooth)))
             continue;
-        bindings[SPL_RESOURCE_PAGE].buffer = resident->pages[batch->page].buffer;
+        bindings[SPL_RESOURCE_PAGE].buffer = resident->pages[batch->key.page].buffer;
         if (what->planes) {
-            bindings[SPL_RESOURCE_TEXTURES].buffer = resident->pages[spl_textures_slot(resident, batch->page)].buffer;
+            uint32_t textures = spl_textures_slot(resident, batch->key.page);
+            bindings[SPL_RESOURCE_TEXTURES].buffer = resident->pages[textures].buffer;
             bindings[SPL_RESOURCE_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
         }
         uint32_t slot = batch->first_slot;
@@ -95,8 +100,8 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, slot++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
-            spl_gpu_dispatch(tile->renderer->gpu, batch->apart && what->clipped ? what->clipped : kernel, bindings,
-                             (params.entries + entries_per_workgroup - 1) / entries_per_workgroup);
+            spl_gpu_dispatch(tile->renderer->gpu, batch->key.apart && what->clipped ? what->clipped : kernel, bindings,
+                             (params.entries + per_workgroup - 1) / per_workgroup);
         }
     }
 }
@@ -143,11 +148,6 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool 
                             tile->renderer->list.chunk_count, err);
     spl_tile_end_area(tile, SPL_AREA_OCCLUDERS);
     return rc;
-}
-
-int spl_tile_dispatch_lines(struct spl_tile *tile, const struct spl_kernel_key *key, struct spl_error *err)
-{
-    return dispatch_range(tile, key, 0, tile->renderer->list.line_count, err);
 }
 
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)

@@ -78,11 +78,11 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
 {
     if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, err);
-    if (info->splats > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
+    if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
-                              "dataset '%s' has %llu splats, more than the 32 bits of layer id number (%u): ask for "
+                              "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer id number (%u): ask for "
                               "other layers, or pack the scans as several datasets",
-                              info->id, (unsigned long long)info->splats, SPL_NOTHING);
+                              info->id, (unsigned long long)info->ids, SPL_NOTHING);
     return SPL_OK;
 }
 

@@ -166,7 +166,7 @@ static void decode_all(const struct spl_dataset *dataset)
             for (uint32_t i = 0; i < chunks[c].count; i++) {
                 struct spl_splat s;
                 spl_chunk_decode(&chunks[c], page, i, &s);
-                decoded += s.linear && !nodes[n].child_count;
+                decoded += s.linear && !nodes[n].child_count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS;
                 spl_assert(isfinite(s.position[0]) && isfinite(s.position[1]) && isfinite(s.position[2]));
                 spl_assert(s.radius > 0 && isfinite(s.radius));
                 float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];

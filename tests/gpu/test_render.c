@@ -267,7 +267,7 @@ static void clip_lines_match(void **state)
         int levels;
         double distance, lod;
     } rows[] = {
-        {"lines", 1, 3, 0}, {"lines, pruned", 1, 3, 12}, {"lines, coarse", 2, 3, 90}, {"among lines", 1, 0.4, 1}};
+        {"lines", 1, 3, 0}, {"lines, pruned", 1, 3, 12}, {"lines, coarse", 2, 8, 12}, {"among lines", 1, 0.4, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_dataset *dataset = make_dataset_levels(splats, 6000, rows[i].levels);
         assert_true(spl_dataset_get_info(dataset)->attribute_bits[SPL_ATTRIBUTE_CLIP] > 0);

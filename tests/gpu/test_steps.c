@@ -157,6 +157,10 @@ static void pages_driven_out_between_tiles_come_back(void **state)
     assert_int_equal(spl_frame_begin(tight, one, &view, &steps, NULL), SPL_OK);
     for (bool more = true; more;) {
         assert_int_equal(spl_frame_step(steps, UINT64_MAX, &more, NULL), SPL_OK);
+        if (more && spl_frame_is_waiting(steps)) {
+            spl_renderer_wait(tight, UINT64_MAX);
+            continue;
+        }
         assert_int_equal(spl_renderer_render(tight, other, &little, &small, NULL), SPL_OK);
         spl_frame_finish(&small);
     }
@@ -182,6 +186,7 @@ static void a_frame_may_be_given_up_between_tiles(void **state)
     struct spl_error err = {0};
     bool more;
     assert_int_equal(spl_renderer_add(renderer, one, NULL), SPL_OK);
+    assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
     assert_int_equal(spl_frame_begin(renderer, one, &view, &late, NULL), SPL_OK);
     assert_int_equal(spl_frame_begin(renderer, one, &view, &lost, NULL), SPL_OK);
     assert_int_equal(spl_frame_step(lost, UINT64_MAX, &more, NULL), SPL_OK);

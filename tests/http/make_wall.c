@@ -1,6 +1,6 @@
 /* make_wall [--small | --large | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
  * half; --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16
- * atoms. --knot makes what takes long to open. */
+ * atoms. --knot makes what once took long to open. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,10 @@
 /* Preloaded into a daemon: until the file that SLOW_DISK_GATE names is there, a dataset's file cannot be opened, and no
- * file gets a name that ends in SLOW_DISK_NAME; as on a disk that is slow or a share that does not answer. */
+ * file gets a name that ends in SLOW_DISK_NAME; while the one that SLOW_DISK_READS names is there, only as many reads end
+ * as the number in it says; as on a disk that is slow or a share that does not answer. */
 #include <fcntl.h>
 #include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/syscall.h>
@@ -31,4 +34,27 @@ __attribute__((visibility("default"))) int rename(const char *from, const char *
 {
     wait_for_gate(to, getenv("SLOW_DISK_NAME"));
     return (int)syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0);
+}
+
+/* How many reads may end; -1 = any number. */
+static int reads_allowed(void)
+{
+    const char *path = getenv("SLOW_DISK_READS");
+    FILE *file = path ? fopen(path, "r") : NULL;
+    int count = -1;
+    if (!file)
+        return -1;
+    if (fscanf(file, "%d", &count) != 1) // it is being written
+        count = 0;
+    fclose(file);
+    return count;
+}
+
+__attribute__((visibility("default"))) ssize_t pread(int fd, void *out, size_t bytes, off_t offset) /* pread64, too */
+{
+    static atomic_int begun; /* while the file is there */
+    int number = reads_allowed() < 0 ? (atomic_store(&begun, 0), 0) : atomic_fetch_add(&begun, 1);
+    for (int allowed; (allowed = reads_allowed()) >= 0 && number >= allowed;)
+        usleep(10000);
+    return (ssize_t)syscall(SYS_pread64, fd, out, bytes, offset);
 }

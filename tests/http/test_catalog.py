@@ -348,15 +348,13 @@ def test_sigterm_while_a_share_hangs():
             assert d.stop() == 0
 
 
-def test_sigterm_while_a_knot_is_opened():
+def test_a_knot_is_opened_like_any_other():
+    """Half a million points that all claim to lie on wires: joined by whoever opened them, they took two minutes."""
     with folder() as home, Daemon(FAKE, *WATCH, datasets=[home]) as d:
         subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--knot", os.path.join(home, ".knot")], check=True)
         os.rename(os.path.join(home, ".knot"), os.path.join(home, "knot.spld"))
-        eventually(lambda: listed(d).get("knot", {}).get("state") == "loading")
-        time.sleep(0.5)
-        assert listed(d)["knot"]["state"] == "loading"
+        eventually(lambda: listed(d).get("knot", {}).get("state") == "ready")
         assert d.stop() == 0
-        assert not any("does not answer" in line for line in d.lines), d.lines
 
 
 def test_sigterm_while_datasets_are_opened():

@@ -68,9 +68,7 @@ def main(arguments):
     text = RESULTS.read_text(encoding="utf-8")
     new = text
     for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL, "nearest": NEAREST}),
-                              (NEAREST = [("psnr", "nearest: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_through", "see-through", 100, 1),
-           ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
-BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
+                              (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
         if text.count(begin) != 1 or text.count(end) != 1:
             sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")
         head, rest = new.split(begin)

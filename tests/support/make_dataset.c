@@ -68,8 +68,13 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
                                               .normal_error = make_dataset_normal_error,
                                               .radius_error = 0.05};
     const size_t words_max = SPL_CHUNK_WORDS_MAX + SPL_STREAM_KNOWN_COUNT * SPL_STREAM_WORDS_MAX;
-    size_t chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS, used = 0;
-    spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity);
+    size_t splat_count = 0, used = 0;
+    while (splat_count < count && !splats[splat_count].vertex)
+        splat_count++;
+    size_t disc_chunks = (splat_count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
+    size_t chunk_count = disc_chunks + (count > splat_count);
+    spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity &&
+               count - splat_count <= SPL_CHUNK_SPLATS);
     uint32_t *words = must_have(malloc(chunk_count * words_max * sizeof *words));
     struct spl_chunk *chunks = b->chunks + b->chunk_count;
     double radius_sum = 0;
@@ -80,9 +85,11 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
     for (size_t c = 0; c < chunk_count; c++) {
         struct spl_splat part[SPL_CHUNK_SPLATS];
         double position[SPL_CHUNK_SPLATS][3];
-        const struct make_splat *from = splats + c * SPL_CHUNK_SPLATS;
-        size_t left = count - c * SPL_CHUNK_SPLATS;
+        const struct make_splat *from = splats + (c < disc_chunks ? c * SPL_CHUNK_SPLATS : splat_count);
+        size_t left = c < disc_chunks ? splat_count - c * SPL_CHUNK_SPLATS : count - splat_count;
         uint32_t n = left < SPL_CHUNK_SPLATS ? (uint32_t)left : SPL_CHUNK_SPLATS;
+        struct spl_chunk_options own = options;
+        own.kind = c < disc_chunks ? SPL_CHUNK_DISCS : SPL_CHUNK_LINES;
         for (uint32_t i = 0; i < n; i++) {
             part[i] = (struct spl_splat){.radius = from[i].radius,
                                          .linear = from[i].linear,
@@ -94,7 +101,7 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
                 position[i][a] = from[i].position[a] - node->origin[a];
         }
         uint32_t length =
-            spl_chunk_encode(part, (const double(*)[3])position, n, &options, &chunks[c], words + used, NULL);
+            spl_chunk_encode(part, (const double(*)[3])position, n, &own, &chunks[c], words + used, NULL);
         for (uint32_t i = 0; i < n; i++) {
             struct spl_splat out;
             spl_chunk_decode(&chunks[c], words + used, i, &out);
@@ -164,6 +171,10 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
 {
     struct build b = {.node_count = 1, .chunk_capacity = 2 * (count / SPL_CHUNK_SPLATS) + 10};
     double low[3], high[3], middle[3], size = 1e-3;
+    size_t discs = 0;
+    for (size_t i = 0; i < count; i++)
+        discs += !splats[i].vertex;
+    spl_assert(discs && (levels == 1 || discs == count));
     b.chunks = must_have(malloc(b.chunk_capacity * sizeof *b.chunks));
     struct spl_stream streams[SPL_STREAM_KNOWN_COUNT];
     for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
@@ -191,8 +202,8 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
     json_t *meta =
         json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:s, s:s, "
                   "s:[s], s:{}}",
-                  "points", (json_int_t)count, "leaf_splats", (json_int_t)count, "levels", levels, "splat_radius",
-                  (double)splats[count / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
+                  "points", (json_int_t)discs, "leaf_splats", (json_int_t)discs, "levels", levels, "splat_radius",
+                  (double)splats[discs / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
                   high[2], "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target",
                   middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "unit",
                   "us-ft", "crs", "EPSG:2263", "sources", "made by a test", "pack");

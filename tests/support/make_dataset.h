@@ -16,10 +16,12 @@ struct make_splat {
     uint8_t classification;
     float uncertainty;
     bool linear;
+    bool vertex; /* of a line, not a splat; `linear` then says that a piece goes to the next vertex */
     float clip[3], clip_offset; /* struct spl_clip: all 0 = no line */
 };
 
-/* Writes `count` (> 0) splats to `path` at default errors, with classes and uncertainties.
+/* Writes `count` (> 0) splats to `path` at default errors, with classes and uncertainties. Vertices of lines, at
+ * most 128, stand behind the splats and are for one level only.
  * One level: a single node that keeps the order given, so that a splat's id is its index (at most 524,288 splats).
  * Two levels: the root holds every k-th splat, k <= 8, of radius * sqrt(k); its children are the cube's octants (their
  * splats in the order given), of at most 524,288 splats each. */

@@ -5,8 +5,8 @@
 #include <stddef.h>
 
 /* `count` (at most 524,288) points in a cube, in no order, that all claim to lie on wires, 6 bytes each. Radii are 1 cm
- * but for those of every twentieth chunk, which says 1 km: so these points look at all others, along whatever has been
- * joined already, at every distance up to 200 km. */
+ * but for those of every twentieth chunk, which says 1 km: so to join these points, one would look at all others, along
+ * whatever has been joined already, at every distance up to 200 km. */
 void make_knot_file(const char *path, size_t count);
 
 #endif

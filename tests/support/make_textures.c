@@ -96,14 +96,18 @@ struct making {
     const struct spl_dataset *from;
     const struct spl_dictionary *dictionary;
     uint32_t planes, seed;
+    uint32_t discs; /* chunks of them so far: codes do not depend on how many lines there are */
 };
 
 static int code_chunk(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
-    const struct making *m = context;
-    uint64_t count;
+    struct making *m = context;
+    const struct spl_chunk *header = &spl_dataset_get_chunks(m->from, &(uint64_t){0})[chunk];
     (void)err;
-    make_code(m->dictionary, m->planes, m->seed, chunk, spl_dataset_get_chunks(m->from, &count)[chunk].count, code);
+    if (spl_chunk_kind(header) == SPL_CHUNK_DISCS)
+        make_code(m->dictionary, m->planes, m->seed, m->discs++, header->count, code);
+    else
+        *code = (struct spl_chunk_code){.splats = header->count};
     return SPL_OK;
 }
 
@@ -118,7 +122,7 @@ static void must(int rc, const struct spl_error *err)
 void make_textured_file(const struct spl_dataset *from, const struct spl_dictionary *dictionary, uint32_t planes,
                         uint32_t seed, const char *path)
 {
-    struct making making = {from, dictionary, planes, seed};
+    struct making making = {from, dictionary, planes, seed, 0};
     struct spl_retexture what = {.from = from, .dictionary = dictionary, .code_chunk = code_chunk, .context = &making};
     struct spl_error err = {0};
     must(spl_dataset_retexture(&what, path, &err), &err);

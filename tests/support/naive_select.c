@@ -82,6 +82,10 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
     corners_of(camera, least, size, corners);
     struct naive_chunk *out = &s->out[s->count++];
     *out = (struct naive_chunk){.node = node_index, .chunk = index, .count = chunk->count, .near = INFINITY};
+    out->lines = spl_chunk_kind(chunk) == SPL_CHUNK_LINES;
+    out->scale = 1;
+    if (out->lines)
+        return;
     for (int k = 0; k < 8; k++) {
         out->near = fmin(out->near, corners[k][2]);
         out->middle += corners[k][2] / 8;

@@ -28,6 +28,7 @@ struct naive_chunk {
     bool beside;            /* its discs, or its node's, are all on one outer side of the image */
     uint32_t planes;        /* of its textures, 0 = plain */
     bool smooth;            /* texels wider than a sample */
+    bool lines;             /* whose vertices are drawn all, and have no extent */
 };
 
 /* All of them, `*count`; the caller frees. */

@@ -13,7 +13,6 @@
 #include "dataset/texture.h"
 #include "geom/octahedral.h"
 #include "geom/tangent.h"
-#include "render/wires.h"
 #include "support/naive_select.h"
 #include "support/reference_fill.h"
 
@@ -34,7 +33,6 @@ struct scene {
     const struct spl_view *view;
     struct spl_camera camera; /* in samples, with what method fill draws around the image */
     uint32_t guard;           /* samples of it */
-    struct spl_draw_list list; /* the lines of wires alone */
     struct naive_chunk *chunks;
     size_t chunk_count;
     struct sample *samples;
@@ -280,14 +278,14 @@ static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
     put(s, place, d->p[2], d, low_bits);
 }
 
-/* From the disc's centre, a sample a column or, where the line is upright, a row. */
-static void line(struct scene *s, const struct disc *d, const float to[3])
+/* From one vertex to the other, a sample a column or, where the line is upright, a row; `middle` as in fill_lines.comp. */
+static void line(struct scene *s, const struct disc ends[2], const float from[3], const float to[3], float middle)
 {
     float a[2], b[2];
-    project(s, d->p, a);
+    project(s, from, a);
     project(s, to, b);
     int main_axis = fabsf(b[1] - a[1]) > fabsf(b[0] - a[0]), other = 1 - main_axis;
-    float inverse = 1 / (b[main_axis] - a[main_axis]), w0 = 1 / d->p[2], w1 = 1 / to[2];
+    float inverse = 1 / (b[main_axis] - a[main_axis]), w0 = 1 / from[2], w1 = 1 / to[2];
     int size = (int)(main_axis ? s->camera.height : s->camera.width);
     for (int k = 0; k < size; k++) {
         float t = ((float)k + 0.5f - a[main_axis]) * inverse, place[2];
@@ -295,8 +293,29 @@ static void line(struct scene *s, const struct disc *d, const float to[3])
             continue;
         place[main_axis] = (float)k;
         place[other] = a[other] + t * (b[other] - a[other]);
-        put(s, place, 1 / (w0 + t * (w1 - w0)), d, SPL_FILL_LINEAR);
+        float z = 1 / (w0 + t * (w1 - w0));
+        put(s, place, z, &ends[!(t * w1 * z < middle)], SPL_FILL_LINEAR);
     }
+}
+
+/* A piece, without what lies beyond the planes near and far. */
+static void piece(struct scene *s, const struct disc ends[2])
+{
+    const float *p = ends[0].p, *q = ends[1].p, near = (float)s->camera.near, far = (float)s->camera.far;
+    float from[3], to[3], skip = 0, rest = 0;
+    if (fmaxf(p[2], q[2]) <= near || fminf(p[2], q[2]) >= far)
+        return;
+    if (p[2] < near || p[2] > far)
+        skip = (fminf(fmaxf(p[2], near), far) - p[2]) / (q[2] - p[2]);
+    if (q[2] < near || q[2] > far)
+        rest = (fminf(fmaxf(q[2], near), far) - q[2]) / (p[2] - q[2]);
+    for (int c = 0; c < 3; c++) {
+        from[c] = p[c] + skip * (q[c] - p[c]);
+        to[c] = q[c] + rest * (p[c] - q[c]);
+    }
+    from[2] = fminf(fmaxf(p[2], near), far);
+    to[2] = fminf(fmaxf(q[2], near), far);
+    line(s, ends, from, to, (0.5f - skip) / (1 - skip - rest));
 }
 
 /* The codes of a chunk into s->code. */
@@ -320,20 +339,7 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
     s->coded = chunk;
 }
 
-/* Where wires.c has joined points; what is linear has no spacing. */
-static void lines(struct scene *s)
-{
-    for (size_t i = 0; i < s->list.line_count; i++) {
-        const struct spl_draw_line *l = &s->list.lines[i];
-        struct disc d = {.p = {l->from_x, l->from_y, l->from_z}, .id = l->id};
-        spl_octahedral_decode((float)(l->normal & 0xffff) / 32767 - 1, (float)(l->normal >> 16) / 32767 - 1, d.n);
-        for (int c = 0; c < 3; c++)
-            d.color[c] = l->color >> 8 * c & 255;
-        line(s, &d, (float[3]){l->to_x, l->to_y, l->to_z});
-    }
-}
-
-/* Splat `index` of a chunk as it is drawn; false where it lies before or behind what is. */
+/* Splat or vertex `index` of a chunk as it is drawn; false where it lies before or behind what is. */
 static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t index, struct disc *d,
                       uint32_t *low_bits)
 {
@@ -376,10 +382,24 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
     return d->p[2] >= (float)s->camera.near && d->p[2] <= (float)s->camera.far;
 }
 
+/* Pieces from one vertex to the next, wherever they lie. */
+static void for_each_piece(struct scene *s)
+{
+    for (size_t c = 0; c < s->chunk_count; c++)
+        for (uint32_t index = 0; s->chunks[c].lines && index + 1 < s->chunks[c].count; index++) {
+            struct disc ends[2];
+            uint32_t goes_on, ignored;
+            load_disc(s, &s->chunks[c], index, &ends[0], &goes_on);
+            load_disc(s, &s->chunks[c], index + 1, &ends[1], &ignored);
+            if (goes_on & SPL_FILL_LINEAR)
+                piece(s, ends);
+        }
+}
+
 static void for_each_disc(struct scene *s, bool shade)
 {
     for (size_t c = 0; c < s->chunk_count; c++) {
-        for (uint32_t index = 0; index < s->chunks[c].count; index++) {
+        for (uint32_t index = 0; !s->chunks[c].lines && index < s->chunks[c].count; index++) {
             struct disc d;
             uint32_t low_bits;
             if (!load_disc(s, &s->chunks[c], index, &d, &low_bits))
@@ -578,7 +598,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
                                           .camera = &s.camera,
                                           .lod = view->lod,
                                           .atoms = view->method == SPL_METHOD_SPLAT ? view->disc.atoms : 0};
-    const struct spl_wires *wires = NULL;
     struct fill_plan plan = {0};
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
@@ -592,8 +611,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         s.camera.cy += plan.guard;
     }
     s.chunks = naive_select(&options, &s.chunk_count);
-    if (view->method == SPL_METHOD_FILL && !(rc = spl_dataset_get_wires(dataset, &wires, err)))
-        rc = spl_wires_draw(wires, &s.camera, &s.list, err);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
     if (!rc && !s.samples)
@@ -613,7 +630,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for (size_t i = 0; i < count; i++)
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
-        lines(&s);
+        if (view->method == SPL_METHOD_FILL)
+            for_each_piece(&s);
         s.weight_max = naive_weight(most_fragments(&s));
         if (sums(&s))
             for_each_disc(&s, true);
@@ -627,7 +645,6 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     free(s.samples);
     free(s.textures);
     free(s.atoms);
-    spl_draw_list_finish(&s.list);
     if (rc)
         spl_frame_finish(frame);
     return rc;

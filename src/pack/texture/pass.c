@@ -153,8 +153,9 @@ static json_t *describe_source(const struct spl_photo_pass *pass)
     json_int_t points = 0;
     for (uint32_t chunk = 0; chunk < pass->splats.chunk_count; chunk++) {
         uint64_t first = pass->splats.chunks[chunk].first_id;
-        bool leaf = !pass->splats.nodes[pass->splats.node_of[chunk]].child_count;
-        for (uint64_t id = first; leaf && id < first + pass->splats.chunks[chunk].count; id++)
+        bool point = !pass->splats.nodes[pass->splats.node_of[chunk]].child_count &&
+                     spl_chunk_kind(&pass->splats.chunks[chunk]) == SPL_CHUNK_DISCS;
+        for (uint64_t id = first; point && id < first + pass->splats.chunks[chunk].count; id++)
             points += pass->chosen.photo[id] != SPL_NO_PHOTO;
     }
     while (end > cameras + 1 && end[-1] == '/')

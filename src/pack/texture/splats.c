@@ -8,7 +8,7 @@
 
 int spl_splats_init(struct spl_splats *splats, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    *splats = (struct spl_splats){.dataset = dataset, .count = spl_dataset_get_info(dataset)->splats};
+    *splats = (struct spl_splats){.dataset = dataset, .count = spl_dataset_get_info(dataset)->ids};
     uint64_t node_count, chunk_count; /* no more than splats */
     splats->nodes = spl_dataset_get_nodes(dataset, &node_count);
     splats->chunks = spl_dataset_get_chunks(dataset, &chunk_count);

@@ -64,10 +64,11 @@ static struct spl_tone find_tone(const struct take *take, uint64_t id)
     return spl_tone_find(&take->gains[take->index], &list[k], take->chosen->color[id]);
 }
 
+/* Whether the photograph is that of any splat; a line has no area for a texture. */
 static bool is_chosen(const struct take *take, uint32_t chunk)
 {
     const struct spl_chunk *header = &take->splats->chunks[chunk];
-    for (uint32_t i = 0; i < header->count; i++)
+    for (uint32_t i = 0; i < header->count && spl_chunk_kind(header) == SPL_CHUNK_DISCS; i++)
         if (take->chosen->photo[header->first_id + i] == take->index)
             return true;
     return false;

@@ -2,7 +2,6 @@
  * screen-space filter over what is not linear. Paper: screen-space-filling. */
 #include <math.h>
 
-#include "base/clock.h"
 #include "render/fill.h"
 #include "render/frame.h"
 #include "render/method.h"
@@ -35,16 +34,11 @@ static int prepare(struct spl_frame_job *job, struct spl_error *err)
     struct spl_camera camera;
     double spacing = 1;
     spl_tiling_get_camera(job->view, &camera);
-    struct spl_select_params params = spl_frame_selection(job, &camera);
-    uint64_t clock = spl_now_ns();
-    spl_residency_begin_frame(&job->renderer->residency);
-    int rc = job->view->fill.kernel > 0 ? SPL_OK
-                                        : spl_select_spacing(&params, &spacing, &job->frame->stats.complete, err);
-    job->frame->stats.select_ms += spl_since_ms(&clock);
-    if (job->page_error.code)
-        return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
+    int rc = job->view->fill.kernel > 0 ? SPL_OK : spl_frame_find_spacing(job, &camera, &spacing, err);
+    if (rc)
+        return rc;
     spl_fill_plan_init(&job->tiling.fill, &job->tiling.reach, job->view, spacing);
-    return rc ? rc : check_work(job, &camera, err);
+    return check_work(job, &camera, err);
 }
 
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)

@@ -41,7 +41,7 @@ static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, str
     const struct spl_draw_list *list = &tile->renderer->list;
     uint64_t seen = 0;
     for (size_t i = 0; i < list->batch_count; i++)
-        seen |= 1ull << (2 * list->batches[i].planes + list->batches[i].smooth);
+        seen |= 1ull << (2 * list->batches[i].key.planes + list->batches[i].key.smooth);
     struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true, .clipped = clipped};
     spl_tile_dispatch_splats(tile, plain, &what);
     int rc = SPL_OK;

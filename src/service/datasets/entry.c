@@ -8,10 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 #include "dataset/dataset.h"
-#include "dataset/wires.h"
 
 static void encode_uri(char *out, size_t capacity, const char *id)
 {
@@ -30,12 +28,8 @@ int spl_catalog_entry_open(const char *path, const char *place, bool verify, con
     if (!(entry = spl_alloc(1, sizeof *entry, err)))
         return rc;
     atomic_init(&entry->references, 1);
-    const struct spl_wires *wires;
-    if ((rc = spl_dataset_open_until(path, verify, cancelled, &entry->dataset, err)) ||
-        (rc = spl_dataset_get_wires(entry->dataset, &wires, err))) /* joined here, or the first frame would wait */
+    if ((rc = spl_dataset_open_until(path, verify, cancelled, &entry->dataset, err)))
         goto done;
-    if (wires->cut_short)
-        spl_log_warn("%s: its wires take more steps to join than those of a scan; the rest of them stays open", path);
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))
         goto done;

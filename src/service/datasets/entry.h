@@ -41,7 +41,7 @@ struct spl_catalog_entry {
     enum spl_entry_state state;
     struct spl_error err;
     TAILQ_ENTRY(spl_catalog_entry) resident; // owned by: gpu
-    uint32_t pages_wanted;                   // owned by: gpu; first page that was not asked for yet
+    uint32_t pages_wanted;                   // owned by: gpu; first page that is not there yet
     bool loading;                            // owned by: gpu
 };
 

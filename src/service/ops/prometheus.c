@@ -62,6 +62,8 @@ static void print_pipeline(FILE *out, struct spl_service *service)
     gauge(out, "splatd_device_memory_bytes", "Device memory that the renderer holds.", (double)status.device_bytes);
     gauge(out, "splatd_device_memory_limit_bytes", "Device memory that it may hold.",
           (double)status.device_limit_bytes);
+    gauge(out, "splatd_pages_pending", "Pages of datasets that are to be read, or are being read.",
+          (double)status.pages_pending);
     gauge(out, "splatd_frame_mean_seconds", "Moving mean of the time a frame takes.", status.frame_ms / 1000);
     gauge(out, "splatd_standstill_seconds", "For how long nothing has moved although there is work; 0 when idle.",
           (double)spl_pipeline_get_still_ns(service->views->pipeline) / SPL_NS_PER_S);

@@ -14,7 +14,8 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
 {
     if (kind < SPL_KIND_END)
         return spl_value_from_json(value, (enum spl_value_kind)kind, json, name, err);
-    if (kind == SPL_KIND_FLAG && json_is_boolean(json)) {
+    bool flag = kind == SPL_KIND_FLAG || kind == SPL_KIND_SWITCH;
+    if (flag && json_is_boolean(json)) {
         value->n[0] = json_is_true(json);
         return 0;
     }
@@ -34,9 +35,9 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
         }
         return rc;
     }
-    if (kind == SPL_KIND_FLAG || !json_is_string(json))
+    if (flag || !json_is_string(json))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name,
-                              kind == SPL_KIND_FLAG ? "true or false" : "text", spl_json_type_name(json));
+                              flag ? "true or false" : "text", spl_json_type_name(json));
     return spl_value_from_text(value, kind, name, json_string_value(json), err);
 }
 

@@ -165,6 +165,7 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
         (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
+    out->view.partial = get(values, PARAM_wait, 1) == 0;
     rc = spl_view_check(&out->view, err);
     return rc ? rc : check_cost(&out->view, limits, err);
 }

@@ -145,6 +145,11 @@ static int flag_from_name(const char *name)
     return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
 }
 
+static int switch_from_name(const char *name)
+{
+    return !strcmp(name, "0") ? 0 : !strcmp(name, "1") ? 1 : -1;
+}
+
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err)
 {
     const struct {
@@ -152,6 +157,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         const char *choices;
     } table[] = {
         [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
+        [SPL_KIND_SWITCH] = {switch_from_name, "0, 1"},
         [SPL_KIND_METHOD] = {spl_method_from_name, spl_method_names()},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)

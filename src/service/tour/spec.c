@@ -120,6 +120,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
         view->container = SPL_CONTAINER_ZIP;
     if (view->versioned)
         return spl_fail_field(err, SPL_E_INPUT, "settings.v", "a tour stays with the version that it began with");
+    if (view->view.partial)
+        return spl_fail_field(err, SPL_E_INPUT, "settings.wait", "frames of a tour wait for what they show; leave it out");
     if (view->planned)
         return spl_fail_field(err, SPL_E_INPUT, isnan(view->demand.budget_ms) ? "settings.psnr" : "settings.budget",
                               "frames of a tour look alike only with one setting: give method, lod and supersample");

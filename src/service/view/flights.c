@@ -57,11 +57,14 @@ static void finish(struct flight *flight)
     free(flight);
 }
 
-static struct flight *find(struct spl_service *service, const struct spl_key *key)
+/* One whose bytes will do: what is there now does not for who waits, nor the other way round. */
+static struct flight *find(struct spl_service *service, const struct spl_view_request *request,
+                           const struct spl_key *key)
 {
     struct flight *flight;
     LIST_FOREACH(flight, &service->views->flights, link)
-    if (!flight->request.planned && spl_key_equal(&flight->key, key))
+    if (!flight->request.planned && flight->request.view.partial == request->view.partial &&
+        spl_key_equal(&flight->key, key))
         return flight;
     return NULL;
 }
@@ -75,7 +78,7 @@ static void board(struct ticket *ticket, struct flight *flight)
 int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct spl_catalog_entry *entry,
                      const struct spl_view_request *request, const struct spl_key *key, struct spl_error *err)
 {
-    struct flight *flight = request->planned ? NULL : find(service, key);
+    struct flight *flight = request->planned ? NULL : find(service, request, key);
     ticket->shared = flight != NULL;
     if (flight) {
         if (flight->job->deadline_ns < ticket->deadline_ns)

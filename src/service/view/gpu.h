@@ -17,7 +17,9 @@ struct gpu {
     struct spl_turns turns;                  /* large views */
     struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
     TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
-    uint64_t pages_evicted;                  /* of this renderer, as counted so far */
+    STAILQ_HEAD(, spl_catalog_entry) leaving; /* of these, that a page is still being read of */
+    uint64_t pages_loaded, pages_evicted;    /* of this renderer, as published */
+    bool loading_waits;                      /* for a page to be read */
 };
 
 /* A renderer with the entries, and their pages on the device. What has no room is refused at start, when nobody has
@@ -25,13 +27,14 @@ struct gpu {
 int spl_gpu_build(struct gpu *gpu, struct spl_error *err);
 void spl_gpu_tear_down(struct gpu *gpu); /* idempotent; the entries stay */
 
-/* Takes up what the loop wants added and lets go of what nobody refers to any more. */
+/* Takes up what the loop wants added and lets go of what nobody refers to any more. Never blocks. */
 void spl_gpu_take_orders(struct gpu *gpu);
 
 /* The entry whose pages are to be loaded next, or NULL. */
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
 
-/* Loads one of them and reports the entry with the last. SPL_E_DEVICE_LOST; everything else is the entry's fault. */
+/* Takes up those that have come, asks for the next and reports the entry with the last. SPL_E_DEVICE_LOST; everything else
+ * is the entry's fault. */
 int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err);
 
 /* Gives back what is still to be loaded when the service stops. */
@@ -39,5 +42,8 @@ void spl_gpu_refuse_loading(struct gpu *gpu);
 
 /* Publishes what is on the device; a page that came may have driven out those of any dataset. */
 void spl_gpu_publish_residency(struct gpu *gpu);
+
+/* Puts on the device what has been read since, and publishes it. SPL_E_DEVICE_LOST. */
+int spl_gpu_upload(struct gpu *gpu, struct spl_error *err);
 
 #endif

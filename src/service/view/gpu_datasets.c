@@ -1,9 +1,12 @@
 /* Datasets on the gpu thread's device: which ones the renderer knows, their pages, and what has no room. Versions are
  * added a page at a time between frames, so that nobody waits for them. Owned by the gpu thread. */
+#include "base/clock.h"
 #include "base/log.h"
 #include "dataset/dataset.h"
 #include "service/view/gpu.h"
 #include "service/view/key.h"
+
+static const uint64_t look_around_ns = 100 * SPL_NS_PER_MS; // while pages are read before anybody is served
 
 void spl_gpu_publish_residency(struct gpu *gpu)
 {
@@ -19,7 +22,28 @@ void spl_gpu_publish_residency(struct gpu *gpu)
     atomic_store(&pipeline->device_bytes, info.taken_bytes);
     atomic_store(&pipeline->device_limit_bytes, info.limit_bytes);
     atomic_fetch_add(&pipeline->options.counters->pages_evicted, info.pages_evicted - gpu->pages_evicted);
+    gpu->pages_loaded = info.pages_loaded;
     gpu->pages_evicted = info.pages_evicted;
+}
+
+int spl_gpu_upload(struct gpu *gpu, struct spl_error *err)
+{
+    struct spl_residency_info info;
+    int rc = spl_renderer_upload(gpu->renderer, err);
+    if (rc)
+        return rc;
+    spl_renderer_get_residency(gpu->renderer, NULL, &info);
+    atomic_store(&gpu->pipeline->pages_pending, info.pages_pending);
+    if (info.pages_loaded != gpu->pages_loaded || info.pages_evicted != gpu->pages_evicted)
+        spl_gpu_publish_residency(gpu);
+    return 0;
+}
+
+/* On the renderer's io thread. */
+static void on_page_read(void *context)
+{
+    struct spl_pipeline *pipeline = context;
+    spl_queue_interrupt(pipeline->render);
 }
 
 /* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place costs its own
@@ -29,9 +53,12 @@ static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struc
     struct spl_error why = {0};
     bool more = true;
     int rc = 0;
-    for (uint32_t page = 0; more && !rc && !spl_queue_is_closed(gpu->pipeline->render); page++) {
-        rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, page, &more, &why);
-        spl_pipeline_touch(gpu->pipeline);
+    for (uint32_t page = 0, before = 0; more && !rc && !spl_queue_is_closed(gpu->pipeline->render); before = page) {
+        rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, &page, &more, &why);
+        if (page != before)
+            spl_pipeline_touch(gpu->pipeline);
+        else if (more)
+            spl_renderer_wait(gpu->renderer, spl_now_ns() + look_around_ns);
     }
     if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
         spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
@@ -40,11 +67,30 @@ static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struc
     return rc ? spl_fail(err, rc, "%s", why.message) : 0;
 }
 
+/* Waits for the page that is being read of it, if there is one. */
 static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
 {
     spl_renderer_remove(gpu->renderer, entry->dataset);
     TAILQ_REMOVE(&gpu->entries, entry, resident);
     spl_gpu_publish_residency(gpu);
+}
+
+/* Lets go of those that nothing is being read of. */
+static void let_leaving_go(struct gpu *gpu)
+{
+    STAILQ_HEAD(, spl_catalog_entry) looked_at = STAILQ_HEAD_INITIALIZER(looked_at);
+    STAILQ_CONCAT(&looked_at, &gpu->leaving);
+    for (struct spl_catalog_entry *entry; (entry = STAILQ_FIRST(&looked_at));) {
+        STAILQ_REMOVE_HEAD(&looked_at, link);
+        if (gpu->renderer && !spl_renderer_try_remove(gpu->renderer, entry->dataset)) {
+            STAILQ_INSERT_TAIL(&gpu->leaving, entry, link);
+            continue;
+        }
+        TAILQ_REMOVE(&gpu->entries, entry, resident);
+        if (gpu->renderer)
+            spl_gpu_publish_residency(gpu);
+        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+    }
 }
 
 /* Gives back an entry that was to be added; the last unref() need not come here any more. */
@@ -87,6 +133,8 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     struct spl_pipeline *pipeline = gpu->pipeline;
     struct spl_catalog_entry *entry, *next;
     struct spl_renderer_options options = pipeline->options.renderer;
+    options.wake = on_page_read;
+    options.wake_context = pipeline;
     TAILQ_FOREACH(entry, &gpu->entries, resident)
     {
         size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
@@ -100,7 +148,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     spl_pipeline_touch(pipeline);
     if (rc)
         return rc;
-    gpu->pages_evicted = 0;
+    gpu->pages_loaded = gpu->pages_evicted = 0;
     pthread_mutex_lock(&pipeline->mutex);
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
@@ -131,14 +179,15 @@ void spl_gpu_tear_down(struct gpu *gpu)
     spl_renderer_destroy(gpu->renderer);
     gpu->renderer = NULL;
     atomic_store(&gpu->pipeline->device_bytes, 0);
+    atomic_store(&gpu->pipeline->pages_pending, 0);
+    let_leaving_go(gpu);
 }
 
 void spl_gpu_take_orders(struct gpu *gpu)
 {
     for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
         if (entry->state == SPL_ENTRY_LEAVING) {
-            let_entry_go(gpu, entry);
-            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+            STAILQ_INSERT_TAIL(&gpu->leaving, entry, link);
             continue;
         }
         spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
@@ -151,6 +200,7 @@ void spl_gpu_take_orders(struct gpu *gpu)
             refuse_entry(gpu, entry, &err);
         }
     }
+    let_leaving_go(gpu);
 }
 
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu)
@@ -166,7 +216,11 @@ int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct s
 {
     bool more;
     struct spl_error why = {0};
-    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, entry->pages_wanted++, &more, &why);
+    uint32_t before = entry->pages_wanted;
+    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, &entry->pages_wanted, &more, &why);
+    gpu->loading_waits = !rc && more && entry->pages_wanted == before;
+    if (gpu->loading_waits)
+        return 0;
     if (rc == SPL_E_DEVICE_LOST)
         return spl_fail(err, rc, "%s", why.message);
     spl_gpu_publish_residency(gpu);

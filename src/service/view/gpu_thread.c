@@ -20,6 +20,7 @@
 #include "service/view/gpu.h"
 
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
+static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
 {
@@ -156,7 +157,7 @@ static int begin(struct gpu *gpu, struct spl_job *job)
     return spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
 }
 
-/* What others took, before the first tile and between tiles, was waiting and no part of the frame. */
+/* What others took, before the first tile and between tiles, was waiting and no part of the frame; what pages took, is. */
 static void resume(struct spl_job *job)
 {
     uint64_t now = spl_now_ns(), waited = now - (job->steps ? job->paused_ns : job->accepted_ns);
@@ -189,13 +190,16 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     job->renderer = atomic_load(&pipeline->renderer);
     snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
     bool usual = !job->request.picks && !job->request.container;
-    if (job->plan && usual && !job->stats.pages_loaded) // loading is no property of the setting
+    bool cut_short = job->request.view.partial && !job->stats.complete;
+    if (job->plan && usual && !job->stats.pages_loaded && !cut_short) // loading is no property of the setting
         spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
 }
 
-/* The job waits for its next turn, where it waited before or, if it was small, among the large ones. */
+/* The job waits for its next turn, or for pages first, where it waited before or, if it was small, among the large
+ * ones. */
 static void put_aside(struct gpu *gpu, struct spl_job *job)
 {
+    job->waits = spl_frame_is_waiting(job->steps);
     job->paused_ns = spl_now_ns();
     job->samples_left = spl_frame_get_samples_left(job->steps);
     if (!job->behind && !job->in_turns)
@@ -227,7 +231,8 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
         leave(gpu, job);
         return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
     }
-    follow(&pipeline->turn_ns, took);
+    if (!spl_frame_is_waiting(job->steps))
+        follow(&pipeline->turn_ns, took);
     if (more) {
         put_aside(gpu, job);
         return true;
@@ -239,7 +244,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     return true;
 }
 
-/* Views that nobody waits for give back their memory, whether it is their turn or not. */
+/* Views that nobody waits for give back their memory, and pages on their way, whether it is their turn or not. */
 static void drop_over(struct gpu *gpu)
 {
     struct spl_job *job, *next;
@@ -248,18 +253,60 @@ static void drop_over(struct gpu *gpu)
         if (is_over(gpu, job))
             leave(gpu, job);
     }
+    if (gpu->behind && gpu->behind->waits && is_over(gpu, gpu->behind))
+        leave(gpu, gpu->behind);
 }
 
-/* Waits for a job, unless there is something else to do. NULL: there is, or somebody has come by another way. */
+/* Has the job what it waited for? */
+static void look_after(struct spl_job *job)
+{
+    if (!job->waits || spl_frame_is_waiting(job->steps))
+        return;
+    uint64_t now = spl_now_ns();
+    job->pages_ms += (double)(now - job->paused_ns) / SPL_NS_PER_MS;
+    job->paused_ns = now;
+    job->waits = false;
+}
+
+/* When there is something to do at the latest if nothing comes: SPL_NEVER where no view waits for pages. */
+static uint64_t look_after_all(struct gpu *gpu)
+{
+    struct spl_job *job;
+    uint64_t until = SPL_NEVER, soon = spl_now_ns() + look_around_ns;
+    TAILQ_FOREACH(job, &gpu->turns.jobs, turn)
+    {
+        look_after(job);
+        if (job->waits && until > soon)
+            until = soon;
+        if (job->waits && until > job->deadline_ns)
+            until = job->deadline_ns;
+    }
+    if (gpu->behind)
+        look_after(gpu->behind);
+    return gpu->behind && gpu->behind->waits && until > soon ? soon : until;
+}
+
+/* Waits for a job, unless there is something else to do. NULL: there is, somebody has come by another way, or a page. */
 static struct spl_job *choose(struct gpu *gpu, bool idle)
 {
     struct spl_queue *render = gpu->pipeline->render;
     take_large(gpu);
     drop_over(gpu);
+    uint64_t until = look_after_all(gpu);
+    struct spl_job *behind = gpu->behind && !gpu->behind->waits ? gpu->behind : NULL;
     struct spl_job *job = spl_turns_next(&gpu->turns, spl_queue_get_length(render) > 0);
     if (!job)
-        job = spl_queue_pop(render, idle && !gpu->behind ? SPL_NEVER : 0);
-    return job ? job : gpu->behind;
+        job = spl_queue_pop(render, idle && !behind ? until : 0);
+    return job ? job : behind;
+}
+
+/* Do views wait for pages that are inside? Once the queue is closed, it no longer waits with them. */
+static bool wait_for_pages(struct gpu *gpu)
+{
+    if (TAILQ_EMPTY(&gpu->turns.jobs) && !gpu->behind)
+        return false;
+    spl_renderer_wait(gpu->renderer, spl_now_ns() + look_around_ns);
+    return true;
 }
 
 static void run(struct gpu *gpu)
@@ -267,11 +314,16 @@ static void run(struct gpu *gpu)
     for (;;) {
         struct spl_error err = {0};
         spl_gpu_take_orders(gpu);
+        if (spl_gpu_upload(gpu, &err) && !recover(gpu, &err))
+            break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
-        struct spl_job *job = choose(gpu, !loading);
-        if (!job && closed)
-            break;
+        struct spl_job *job = choose(gpu, !loading || gpu->loading_waits);
+        if (!job && closed) {
+            if (!wait_for_pages(gpu))
+                break;
+            continue;
+        }
         if (job && !serve(gpu, job))
             break;
         if (loading && spl_gpu_load_page(gpu, loading, &err) && !recover(gpu, &err))
@@ -289,6 +341,7 @@ void *spl_gpu_thread_run(void *argument)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
     TAILQ_INIT(&gpu.entries);
+    STAILQ_INIT(&gpu.leaving);
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);

@@ -274,6 +274,7 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
     *status = (struct spl_pipeline_status){
         .device_bytes = atomic_load(&pipeline->device_bytes),
         .device_limit_bytes = atomic_load(&pipeline->device_limit_bytes),
+        .pages_pending = atomic_load(&pipeline->pages_pending),
         .render_length = spl_queue_get_length(pipeline->render),
         .render_capacity = spl_queue_get_capacity(pipeline->render),
         .encode_length = spl_queue_get_length(pipeline->encode),

@@ -35,17 +35,19 @@ struct spl_job {
     void *owner;                       // owned by: loop
     void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
 
-    TAILQ_ENTRY(spl_job) turn; // owned by: gpu, as the next two; while it waits for one
+    TAILQ_ENTRY(spl_job) turn; // owned by: gpu, as the next three; while it waits for one
     bool in_turns;
+    bool waits; /* for pages */
     struct spl_frame_steps *steps; // may be NULL: not begun, or done
     uint64_t samples_left;         /* of the frame, for its turns */
-    uint64_t paused_ns;            /* when its last tile was done */
+    uint64_t paused_ns;            /* when its last tile was done, or its pages had come */
     struct spl_frame frame;        /* between gpu and encode */
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
     bool large; /* the way that it goes; set by submit(), with what it counts for there */
     uint64_t samples, bytes;
     double queue_ms, encode_ms;     /* queue: what it waited for the device, between its tiles too */
+    double pages_ms;                /* what it waited for pages */
     uint64_t renderer;              /* spl_renderer_hash() of what rendered it */
     char device[300];               /* the same in words */
     const char *route;              /* for statistics; static, NULL: none */
@@ -118,7 +120,7 @@ const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);
 
 struct spl_pipeline_status {
     struct spl_device_info device; /* of the last renderer that worked; zero before the first */
-    uint64_t device_bytes, device_limit_bytes;
+    uint64_t device_bytes, device_limit_bytes, pages_pending;
     size_t render_length, render_capacity, encode_length, encode_capacity;
     size_t large_length;                                    /* views, from submit() to take() */
     uint64_t large_samples, large_samples_max, large_bytes; /* theirs */

@@ -14,7 +14,7 @@ struct spl_rendering {
     struct spl_key key;
     struct spl_encoded encoded;
     char *headers;    /* name, NUL, value, NUL, …, NUL */
-    char timing[256]; /* of Server-Timing, without the total */
+    char timing[320]; /* of Server-Timing, without the total */
     size_t bytes;     /* of memory, all told */
     size_t *account;  /* holds `bytes` of each that lives and is not in the cache */
     bool cached;      /* the members below are the cache's */

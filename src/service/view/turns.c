@@ -29,12 +29,18 @@ void spl_turns_remove(struct spl_turns *turns, struct spl_job *job)
 
 struct spl_job *spl_turns_next(struct spl_turns *turns, bool small_waits)
 {
-    struct spl_job *first = TAILQ_FIRST(&turns->jobs), *least = first, *job;
+    struct spl_job *first = NULL, *least = NULL, *job;
+    TAILQ_FOREACH(job, &turns->jobs, turn)
+    {
+        if (job->waits)
+            continue;
+        if (!first)
+            first = job;
+        if (!least || job->samples_left < least->samples_left)
+            least = job;
+    }
     if (!first)
         return NULL;
-    TAILQ_FOREACH(job, &turns->jobs, turn)
-    if (job->samples_left < least->samples_left)
-        least = job;
     turns->count++;
     if (turns->count % SPL_TURNS_EVERY && small_waits)
         return NULL;

@@ -69,13 +69,17 @@ static void test_json(void **state)
     (void)state;
     static const char *const attributes[] = {"position", "radius",      "normal", "color",
                                              "class",    "uncertainty", "linear", "clip",
-                                             "chunk"};
+                                             "lines",    "chunk"};
     char output[8192];
     assert_int_equal(run("--json two.spld", output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL);
     assert_string_equal(json_string_value(json_object_get(json, "id")), "two");
     assert_true(number(json, "linear") == 400);
     assert_true(number(json, "clip_lines") == 500);
+    const json_t *discs = json_object_get(json_object_get(json, "kinds"), "discs");
+    const json_t *lines = json_object_get(json_object_get(json, "kinds"), "lines");
+    assert_true(number(discs, "splats") == 4500 && number(discs, "chunks") == number(json, "chunks"));
+    assert_true(number(discs, "bytes") > 4500 && number(lines, "pieces") == 0 && number(lines, "bytes") == 0);
     assert_true(json_is_true(json_object_get(json_object_get(json, "attributes"), "surface")));
     const json_t *streams = json_object_get(json, "streams");
     assert_int_equal(json_array_size(streams), 2);

@@ -177,7 +177,8 @@ FORGE(many_lines, p->chunks[0].extra_bits |= 255u << SPL_EXTRA_CLIP)
 FORGE(lines_past_page,
       p->chunks[p->chunk_count - 1].extra_bits |= p->chunks[p->chunk_count - 1].count << SPL_EXTRA_CLIP)
 FORGE(unknown_extra, p->chunks[0].extra_bits |= 1u << 8)
-FORGE(unknown_kind, p->chunks[0].extra_bits |= 1u << 24)
+FORGE(unknown_kind, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_KINDS << SPL_EXTRA_KIND)
+FORGE(discs_as_lines, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND)
 FORGE(uncertainty_nan, p->bases[1][0] = 0x7fc00000)
 FORGE(past_page, p->chunks[p->chunk_count - 1].geometry_word += 1 + 16)
 FORGE(word_wraps, p->chunks[0].geometry_word = UINT32_MAX)
@@ -266,7 +267,8 @@ static const struct {
     {many_lines, "section CHNK: chunk 0 has more clip lines than splats"},
     {lines_past_page, "reaches beyond the end of its page"},
     {unknown_extra, "section CHNK: chunk 0 has extra bits"},
-    {unknown_kind, "section CHNK: chunk 0 has extra bits"},
+    {unknown_kind, "section CHNK: chunk 0 is of a kind"},
+    {discs_as_lines, "section CHNK: chunk 0 has fields that lines"},
     {uncertainty_nan, "section STRM 1: chunk 0 has a largest value"},
     {past_page, "reaches beyond the end of its page"},
     {word_wraps, "section CHNK: chunk 0 reaches beyond"},

@@ -393,7 +393,7 @@ static void kernels_bind_what_they_declare(void **state)
     dispatch_with(&gpu, "selftest", binding, SPL_RESOURCE_SUMS, binding, 1);
     assert_int_equal(fake.dispatches, 8);
     dispatch_with(&gpu, "resolve", binding, SPL_RESOURCE_IDS, (struct spl_gpu_binding){0}, 1);
-    dispatch_with(&gpu, "selftest", binding, SPL_RESOURCE_LINES, (struct spl_gpu_binding){0}, 1);
+    dispatch_with(&gpu, "selftest", binding, SPL_RESOURCE_BOUNDS, (struct spl_gpu_binding){0}, 1);
     assert_int_equal(fake.dispatches, 18);
     assert_int_equal(spl_gpu_submit(&gpu, &ticket, NULL), 0);
     fake.ended = ticket;

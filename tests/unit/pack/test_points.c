@@ -483,6 +483,10 @@ static void test_threads_do_not_matter(void **state)
     (void)state;
     for (int shape = 0; shape < SHAPES; shape++) {
         size_t count = 80000; /* two blocks */
+#ifdef __SANITIZE_THREAD__ /* what threads share is the same in every shape */
+        if (shape != SHAPE_CUBE && shape != SHAPE_CLUSTERS)
+            continue;
+#endif
         double(*position)[3] = shape_points((enum shape)shape, count, 8);
         struct spl_points a = sorted((const double(*)[3])position, count, 1);
         struct spl_points b = sorted((const double(*)[3])position, count, 3);

@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "dataset/format.h"
 #include "render/draw_list.h"
 #include "render/renderer.h"
 
@@ -12,7 +13,49 @@ static void add(struct spl_draw_list *list, uint32_t page, uint32_t splats, uint
 {
     const struct spl_draw_chunk chunk = {
         .count = splats, .texture = texture, .color_bits = clipped ? 1u << SPL_COLOR_CLIP : 0};
-    assert_int_equal(spl_draw_list_add(list, page, &chunk, &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+    assert_int_equal(spl_draw_list_add(list, page, SPL_CHUNK_DISCS, &chunk, &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+}
+
+static void add_lines(struct spl_draw_list *list, uint32_t page, uint32_t vertices)
+{
+    const struct spl_draw_chunk chunk = {.count = vertices};
+    assert_int_equal(spl_draw_list_add(list, page, SPL_CHUNK_LINES, &chunk, &(struct spl_chunk_bounds){0}, NULL),
+                     SPL_OK);
+}
+
+/* Batches are of one key each, in the order in which these were met, and keep the order of their chunks. */
+static void batches_are_of_one_key(void **state)
+{
+    struct spl_draw_list list = {0};
+    enum { pages = 700, rounds = 3 };
+    uint32_t entries = 0;
+    (void)state;
+    spl_draw_list_clear(&list);
+    for (uint32_t round = 0; round < rounds; round++)
+        for (uint32_t page = 0; page < pages; page++) {
+            add(&list, page, 40, (page % 9) << SPL_CHUNK_TEXTURE_PLANES, page % 2);
+            add_lines(&list, page, 7);
+        }
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    for (size_t b = 0; b < list.batch_count; b++) {
+        const struct spl_draw_batch *batch = &list.batches[b];
+        for (size_t other = 0; other < b; other++) {
+            const struct spl_draw_key *a = &list.batches[other].key, *k = &batch->key;
+            assert_true(a->page != k->page || a->kind != k->kind || a->back != k->back);
+        }
+        for (uint32_t e = 0; e < batch->entries; e++) {
+            uint32_t entry = list.entries[batch->first_entry + e], chunk = entry >> SPL_RUN_BITS;
+            bool lines = batch->key.kind == SPL_CHUNK_LINES;
+            assert_int_equal(chunk / 2 % pages, batch->key.page);
+            assert_int_equal(chunk % 2, lines);
+            assert_true(lines || (batch->key.planes == batch->key.page % 9 && batch->key.apart == batch->key.page % 2));
+            assert_int_equal(batch->key.back, chunk >= list.first_back_chunk);
+            assert_true(!e || entry > list.entries[batch->first_entry + e - 1]);
+            entries++;
+        }
+    }
+    assert_int_equal(entries, rounds * pages * 3);
+    spl_draw_list_finish(&list);
 }
 
 /* Chunks with and without clip lines in each of 4,000 pages: depth and every group of layers share the slots of the
@@ -27,8 +70,8 @@ static void pages_take_two_slots(void **state)
         add(&list, page, 128, 0, false);
         add(&list, page, 128, 0, true);
     }
-    assert_int_equal(spl_draw_list_lay_out(&list, pages, NULL), SPL_OK);
-    uint64_t slots = spl_draw_list_count_slots(&list, 1 << 20, 1 << 10);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    uint64_t slots = spl_draw_list_count_slots(&list, 1 << 20, 1 << 10, 1 << 10);
     assert_int_equal(slots, 2 * pages);
     assert_true(slots < SPL_PARAMS_SLOTS);
     spl_draw_list_finish(&list);
@@ -45,20 +88,23 @@ static void slots_cover_the_entries(void **state)
         add(&list, 0, 128, 0, false); /* 100 entries */
     for (int i = 0; i < 25; i++)
         add(&list, 1, 100, smooth, false);
-    assert_int_equal(spl_draw_list_lay_out(&list, 2, NULL), SPL_OK);
+    for (int i = 0; i < 25; i++) /* of the same page, but for another kernel */
+        add_lines(&list, 1, 50);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
     static const uint64_t limits[][2] = {{UINT64_MAX, UINT64_MAX}, {100, 100}, {99, 7}, {1, 1}, {3, 1000}};
     for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
-        uint64_t slots = spl_draw_list_count_slots(&list, limits[l][0], limits[l][1]), next = 0, entries = 0;
+        uint64_t slots = spl_draw_list_count_slots(&list, limits[l][0], limits[l][1], limits[l][1]), next = 0, entries = 0;
         for (size_t i = 0; i < list.batch_count; i++) {
             const struct spl_draw_batch *batch = &list.batches[i];
             assert_int_equal(batch->first_slot, next);
             assert_true(batch->slot_entries >= 1 && batch->slot_entries <= limits[l][0] &&
-                        (!batch->smooth || batch->slot_entries <= limits[l][1]));
+                        (!batch->key.smooth || batch->slot_entries <= limits[l][1]) &&
+                        (batch->key.kind != SPL_CHUNK_LINES || batch->slot_entries <= limits[l][1]));
             next += (batch->entries + batch->slot_entries - 1) / batch->slot_entries;
             entries += batch->entries;
         }
         assert_int_equal(next, slots);
-        assert_int_equal(entries, 200);
+        assert_int_equal(entries, 250);
     }
     spl_draw_list_finish(&list);
 }
@@ -71,7 +117,7 @@ static void runs_hold_every_splat(void **state)
     for (uint32_t splats = 1; splats <= SPL_CHUNK_SPLATS; splats++) {
         spl_draw_list_clear(&list);
         add(&list, 0, splats, 0, false);
-        assert_int_equal(spl_draw_list_lay_out(&list, 1, NULL), SPL_OK);
+        assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
         assert_int_equal(list.batch_count, 1);
         uint32_t runs = list.batches[0].entries;
         assert_true(runs * SPL_RUN_SPLATS >= splats && (runs - 1) * SPL_RUN_SPLATS < splats);
@@ -90,11 +136,11 @@ static void the_nearer_half_goes_first(void **state)
         spl_draw_list_clear(&list);
         for (uint32_t i = 0; i < chunks; i++)
             add(&list, i % 2, 128, 0, false);
-        assert_int_equal(spl_draw_list_lay_out(&list, 2, NULL), SPL_OK);
+        assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
         assert_int_equal(list.first_back_chunk, (chunks + 1) / 2);
         for (size_t b = 0; b < list.batch_count; b++)
             for (uint32_t e = 0; e < list.batches[b].entries; e++)
-                assert_true(list.batches[b].back ==
+                assert_true(list.batches[b].key.back ==
                             (list.entries[list.batches[b].first_entry + e] >> SPL_RUN_BITS >= list.first_back_chunk));
     }
     spl_draw_list_finish(&list);
@@ -103,6 +149,7 @@ static void the_nearer_half_goes_first(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(batches_are_of_one_key),
         cmocka_unit_test(pages_take_two_slots),
         cmocka_unit_test(slots_cover_the_entries),
         cmocka_unit_test(runs_hold_every_splat),

@@ -25,11 +25,11 @@ static double uniform(void)
 }
 
 /* Grants as many nodes as are left. */
-static bool take_one(void *context, uint32_t page)
+static enum spl_select_answer take_one(void *context, uint32_t page)
 {
     int *left = context;
     (void)page;
-    return (*left)-- > 0;
+    return (*left)-- > 0 ? SPL_SELECT_YES : SPL_SELECT_NO;
 }
 
 static void a_spacing_of_stand_ins_is_not_complete(void **state)
@@ -304,12 +304,51 @@ static void nodes_are_listed_front_to_back(void **state)
     spl_dataset_close(dataset);
 }
 
+/* The root is there, the others later: all of them are asked for. */
+static enum spl_select_answer take_later(void *context, uint32_t page)
+{
+    int *asked = context;
+    (void)page;
+    return (*asked)++ ? SPL_SELECT_LATER : SPL_SELECT_YES;
+}
+
+static void what_comes_later_is_asked_for_at_once(void **state)
+{
+    (void)state;
+    static struct make_splat grid[side * side];
+    for (int i = 0; i < side * side; i++)
+        grid[i] =
+            (struct make_splat){.position = {i % side * 0.1, i / side * 0.1, 0}, .normal = {0, 0, 1}, .radius = 0.05f};
+    struct spl_dataset *dataset = make_dataset_levels(grid, side * side, 2);
+    uint64_t nodes;
+    spl_dataset_get_nodes(dataset, &nodes);
+    struct spl_view view;
+    spl_view_init(&view);
+    view.camera.near = 0.1;
+    view.camera.far = 100;
+    const double eye[3] = {2, 2, 8}, target[3] = {2, 2, 0}, up[3] = {0, 1, 0};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 40, 256, 256, NULL), SPL_OK);
+    int asked = 0;
+    struct spl_select_params params = {
+        .dataset = dataset, .camera = &view.camera, .lod = 0, .resident = take_later, .context = &asked};
+    struct spl_draw_list list = {0};
+    assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
+    assert_int_equal(asked, nodes); // four children lie in view
+    assert_int_equal(nodes, 5);
+    assert_int_equal(list.nodes, 1);
+    assert_false(list.complete);
+    spl_draw_list_finish(&list);
+    spl_dataset_close(dataset);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_spacing_of_stand_ins_is_not_complete),
         cmocka_unit_test(every_splat_that_is_seen_is_drawn_at_its_level),
         cmocka_unit_test(nodes_are_listed_front_to_back),
+        cmocka_unit_test(what_comes_later_is_asked_for_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,7 +12,7 @@
 static const char *refusal(enum spl_method method, enum spl_layer layer, bool surface, uint64_t splats)
 {
     static struct spl_error err;
-    struct spl_dataset_info info = {.id = "hall", .has_surface = surface, .splats = splats};
+    struct spl_dataset_info info = {.id = "hall", .has_surface = surface, .splats = splats, .ids = splats};
     struct spl_view view;
     spl_view_init(&view);
     view.method = method;

@@ -43,6 +43,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"height=180", "{\"width\":320,\"height\":180}"},
         {"width=1280", ""},
         {"background=white", "background=%23FFFFFF"},
+        {"wait=0", "wait=1"},
         {"format=png&background=transparent", "format=png&background=00000000"},
         {"quality=95", "quality=95&chroma=444"},
         {"format=png", "format=png&chroma=444"},

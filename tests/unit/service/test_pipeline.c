@@ -243,6 +243,43 @@ static void a_frame_behind_does_not_hold_up_the_end(void **state)
     assert_int_equal(counters.frames, 1);
 }
 
+/* With pages that take a while, or never come. */
+static void views_that_wait_for_pages_end(void **state)
+{
+    (void)state;
+    setenv("FAKE_PAGES_MS", "300", 1);
+    struct spl_pipeline *pipeline = start(8);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, i ? make_job(60000) : make_large(2), NULL), 0);
+    spl_pipeline_destroy(pipeline); // they are finished, side by side
+    assert_int_equal(counters.frames, 3);
+
+    setenv("FAKE_PAGES_MS", "3600000", 1);
+    pipeline = start(8);
+    struct spl_job *left = make_job(3600000), *late = make_job(100), *behind = make_job(3600000);
+    behind->behind = true;
+    assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, behind, NULL), 0);
+    struct spl_job *job = take(pipeline);
+    assert_ptr_equal(job, late);
+    assert_int_equal(job->err.code, SPL_E_TIMEOUT);
+    spl_job_destroy(job);
+    atomic_store(&left->dropped, true);
+    job = take(pipeline);
+    assert_ptr_equal(job, left);
+    assert_int_equal(job->err.code, SPL_E_CANCELLED);
+    spl_job_destroy(job);
+    unsetenv("FAKE_PAGES_MS");
+    job = make_job(10000);
+    assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0); // the one behind still waits
+    assert_ptr_equal(take(pipeline), job);
+    assert_int_equal(job->err.code, 0);
+    spl_job_destroy(job);
+    spl_pipeline_destroy(pipeline);
+    assert_int_equal(counters.frames, 1);
+}
+
 static void a_full_queue_refuses(void **state)
 {
     (void)state;
@@ -401,6 +438,37 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
+/* Of which a page is being read: nobody waits for that but they. */
+static void versions_leave_when_nothing_of_them_is_read(void **state)
+{
+    (void)state;
+    for (int way = 0; way < 3; way++) {
+        setenv("FAKE_READS_ON", way ? "1000000000" : "20", 1);
+        struct spl_pipeline *pipeline = start(8);
+        struct spl_catalog_entry *entry = open_entry();
+        spl_pipeline_add(pipeline, entry);
+        assert_ptr_equal(take_change(pipeline), entry);
+        spl_catalog_entry_unref(entry);
+        for (int i = 0; i < 2; i++) {
+            struct spl_job *job = make_job(10000);
+            if (way == 1 && i == 1)
+                setenv("FAKE_LOSE", "1", 1);
+            assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0);
+            assert_ptr_equal(take(pipeline), job);
+            assert_int_equal(job->err.code, way == 1 && i == 1 ? SPL_E_DEVICE_LOST : 0);
+            spl_job_destroy(job);
+        }
+        unsetenv("FAKE_LOSE");
+        if (way < 2) { // read, or the device went
+            assert_ptr_equal(take_change(pipeline), entry);
+            assert_int_equal(entry->state, SPL_ENTRY_GONE);
+            spl_catalog_entry_destroy(entry);
+        }
+        spl_pipeline_destroy(pipeline);
+    }
+    unsetenv("FAKE_READS_ON");
+}
+
 static void a_pipeline_ends_with_versions_in_every_state(void **state)
 {
     (void)state;
@@ -430,10 +498,12 @@ int main(void)
         cmocka_unit_test(a_large_view_ends_between_tiles_when_nobody_waits),
         cmocka_unit_test(a_loss_between_tiles_ends_the_large_view_too),
         cmocka_unit_test(a_frame_behind_does_not_hold_up_the_end),
+        cmocka_unit_test(views_that_wait_for_pages_end),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
         cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
+        cmocka_unit_test(versions_leave_when_nothing_of_them_is_read),
         cmocka_unit_test(a_pipeline_ends_with_versions_in_every_state),
         cmocka_unit_test(losses_are_bounded),
         cmocka_unit_test(a_device_that_does_not_open_is_a_failure),

@@ -28,6 +28,22 @@ static void the_least_left_goes_first(void **state)
     assert_null(spl_turns_next(&turns, false));
 }
 
+static void who_waits_for_pages_has_no_turn(void **state)
+{
+    (void)state;
+    struct spl_turns turns;
+    struct spl_job jobs[2] = {{.accepted_ns = 1, .samples_left = 10, .waits = true}, {.accepted_ns = 2, .samples_left = 20}};
+    spl_turns_init(&turns);
+    spl_turns_add(&turns, &jobs[0]);
+    for (int i = 0; i < 4 * SPL_TURNS_EVERY; i++) // nor does it count as one
+        assert_null(spl_turns_next(&turns, true));
+    spl_turns_add(&turns, &jobs[1]);
+    for (int i = 0; i < 4 * SPL_TURNS_EVERY; i++) // not even as the oldest
+        assert_ptr_equal(spl_turns_next(&turns, false), &jobs[1]);
+    jobs[0].waits = false;
+    assert_ptr_equal(spl_turns_next(&turns, false), &jobs[0]);
+}
+
 /* However many small and nearly finished ones come, the oldest has every eighth turn; those between have as many. */
 static void nobody_is_starved(void **state)
 {
@@ -56,6 +72,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_least_left_goes_first),
+        cmocka_unit_test(who_waits_for_pages_has_no_turn),
         cmocka_unit_test(nobody_is_starved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -248,13 +248,14 @@ static void a_power_line_is_sparse(void **state)
     spl_scene_destroy(scene);
 }
 
-/* A plate of 5 × 10 m 3 m above a floor: beams of 10 mm meet both within half of their width of its edge. */
-static struct spl_scene *plate_over_floor(unsigned returns)
+/* A plate of 5 × 10 m above a floor: beams of 10 mm meet both within half of their width of its edge. */
+static struct spl_scene *plate_over_floor(unsigned returns, double above)
 {
     struct spl_scene *scene = under_a_sweep(10);
     scene->scanner.returns = returns;
     spl_build_rectangle(scene, (struct spl_skin){1, 0}, (double[3]){5, 5, 0}, x_axis, y_axis, (double[2]){6, 6}, NULL);
-    spl_build_rectangle(scene, (struct spl_skin){0}, (double[3]){2, 5, 3}, x_axis, y_axis, (double[2]){3, 6}, NULL);
+    spl_build_rectangle(scene, (struct spl_skin){0}, (double[3]){2, 5, above}, x_axis, y_axis,
+                        (double[2]){3, 6}, NULL);
     complete(scene);
     return scene;
 }
@@ -262,7 +263,7 @@ static struct spl_scene *plate_over_floor(unsigned returns)
 static void mixed_pixels_lie_between_two_surfaces(void **state)
 {
     (void)state;
-    struct spl_scene *scene = plate_over_floor(1);
+    struct spl_scene *scene = plate_over_floor(1, 3);
     const struct spl_scan_grid grid = {.columns = 1000, .rows = 200};
     size_t between[3] = {0};
     for (int i = 0; i < 3; i++) {
@@ -288,10 +289,28 @@ static void mixed_pixels_lie_between_two_surfaces(void **state)
     spl_scene_destroy(scene);
 }
 
+/* Surfaces within two widths of the beam are one to it. */
+static void surfaces_that_nearly_touch_do_not_mix(void **state)
+{
+    (void)state;
+    struct spl_scene *scene = plate_over_floor(1, 0.015);
+    const struct spl_scan_grid grid = {.columns = 1000, .rows = 200};
+    struct spl_return *points;
+    size_t count = cast_all(scene, &grid, &(struct spl_scan_faults){.seed = 1, .mixed = 1}, &points), on_plate = 0;
+    for (size_t k = 0; k < count; k++) {
+        double z = points[k].scene[2];
+        assert_true(fabs(z) < 1e-9 || fabs(z - 0.015) < 1e-9);
+        on_plate += z > 0.01;
+    }
+    assert_true(on_plate > count / 3 && on_plate < count);
+    free(points);
+    spl_scene_destroy(scene);
+}
+
 static void returns_of_a_pulse_are_surfaces_apart(void **state)
 {
     (void)state;
-    struct spl_scene *scene = plate_over_floor(3);
+    struct spl_scene *scene = plate_over_floor(3, 3);
     const struct spl_scan_grid grid = {.columns = 1000, .rows = 200};
     struct spl_return *points;
     size_t count = cast_all(scene, &grid, &(struct spl_scan_faults){0}, &points), doubles = 0;
@@ -379,6 +398,7 @@ int main(void)
         cmocka_unit_test(density_grows_as_it_says),
         cmocka_unit_test(a_power_line_is_sparse),
         cmocka_unit_test(mixed_pixels_lie_between_two_surfaces),
+        cmocka_unit_test(surfaces_that_nearly_touch_do_not_mix),
         cmocka_unit_test(returns_of_a_pulse_are_surfaces_apart),
         cmocka_unit_test(dropouts_come_where_little_light_returns),
         cmocka_unit_test(every_pass_is_off_by_what_was_asked),

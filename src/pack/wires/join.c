@@ -4,9 +4,9 @@
  * know their direction they must meet as an arc does, with the same bend at both (a sagging wire), not as an S (two
  * wires beside each other). Distances count in the points' own spacing; there is no length in metres.
  *
- * Points that a file only claims to lie on wires may be looked at by all others and walked along for ever, so each look
- * and each point on a walk is a step of `work`, and where they end, so does joining. */
-#include "dataset/wire_join.h"
+ * Points that are only taken for a wire's, as of noise, may be looked at by all others and walked along for ever, so
+ * each look and each point on a walk is a step of `work`, and where they end, so does joining. */
+#include "pack/wires/join.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* Points on wires, poles and cables, joined along them. */
-#ifndef SPL_DATASET_WIRE_JOIN_H
-#define SPL_DATASET_WIRE_JOIN_H
+#ifndef SPL_PACK_WIRES_JOIN_H
+#define SPL_PACK_WIRES_JOIN_H
 
 #include <stdint.h>
 
@@ -18,8 +18,8 @@ struct spl_wire_point {
 };
 
 /* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or
- * loops. Points that lie beside another one are left alone. SPL_E_NOMEM; as spl_work_check() when no step is left or
- * somebody wants it to stop: the links hold then, but are not all. Pure function but for `work`; any thread. */
+ * loops. Points that lie beside another one are left alone. SPL_E_NOMEM; as spl_work_check() when no step is left: the
+ * links hold then, but are not all. Pure function but for `work`; any thread. */
 int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_work *work, struct spl_error *err);
 
 /* How `point` lies off what it is joined with on the other side of `avoid` (one of its links; SPL_WIRE_END at an end):

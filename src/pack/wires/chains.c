@@ -1,0 +1,197 @@
+/* Wires are found once, after the radii, for the whole scan: which points belong together depends on no level of detail.
+ * A join of two points is a straight piece; over a gap it is several, which follow the arc that the stretches on both
+ * sides are parts of. A piece belongs to the node of the nearer of its two points. One thread. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "pack/median.h"
+#include "pack/stage.h"
+#include "pack/wires/join.h"
+#include "pack/wires/wires.h"
+#include "shared.h" /* SPL_CHUNK_SPLATS, SPL_FILL_STRAY */
+
+enum { pieces_most = 31 };         /* of a join; odd, so that colours change within one */
+static const double straight = 8;  /* spacings that a piece over a gap is long */
+enum { point_steps = 8192 };       /* 10 to 20 ns each; a scan of nothing but wires takes a twentieth */
+
+struct gathered {
+    struct spl_wire_point *points;
+    uint32_t *index; /* in the scan, of each */
+    size_t count;
+};
+
+/* Points that lie close together in Morton order: one whose radius is several times that of most linear ones among them
+ * strays, and reaches no farther. The least of all, which the kernels go by, would be too little: ground beside a
+ * pylon's foot is scanned more densely than what hangs from its head. */
+static void gather_run(struct gathered *g, const struct spl_points *p, size_t begin, size_t end)
+{
+    float radii[SPL_CHUNK_SPLATS];
+    size_t linear = 0;
+    for (size_t i = begin; i < end; i++)
+        if (p->linear[i])
+            radii[linear++] = p->radius[i];
+    double most = linear ? SPL_FILL_STRAY * (double)spl_median(radii, linear) : 0;
+    for (size_t i = begin; i < end; i++) {
+        if (!p->linear[i])
+            continue;
+        struct spl_wire_point *point = &g->points[g->count];
+        point->spacing = fmin(p->radius[i], most);
+        for (int c = 0; c < 3; c++)
+            point->position[c] = p->axis[c][i];
+        g->index[g->count++] = (uint32_t)i;
+    }
+}
+
+static int gather(struct gathered *g, const struct spl_points *p, struct spl_error *err)
+{
+    size_t linear = 0;
+    for (size_t i = 0; i < p->count; i++)
+        linear += p->linear[i];
+    g->points = spl_alloc_raw(linear + 1, sizeof *g->points, err);
+    g->index = spl_alloc_raw(linear + 1, sizeof *g->index, err);
+    if (!g->points || !g->index)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < p->count; i += SPL_CHUNK_SPLATS)
+        gather_run(g, p, i, p->count - i < SPL_CHUNK_SPLATS ? p->count : i + SPL_CHUNK_SPLATS);
+    return SPL_OK;
+}
+
+/* The way from the middle of the straight line between two points to that of the arc on which both and what they are
+ * joined with lie: over `length` between stretches of `base` on average, whose directions an end lies `aside` of, its
+ * curvature is 2 aside / (length (length + base)), its height length^2 / 8 times that. */
+static void find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, double length, double rise[3],
+                     struct spl_work *work)
+{
+    double base = 0, aside[3] = {0};
+    uint32_t ends[2] = {a, b};
+    memset(rise, 0, 3 * sizeof *rise);
+    for (int k = 0; k < 2; k++) {
+        uint32_t own = ends[k], far = ends[1 - k];
+        double heading[3], along = 0, behind = spl_wires_heading(p, own, far, length, heading, work);
+        if (!(behind > 0))
+            return;
+        base += behind / 2;
+        for (int c = 0; c < 3; c++)
+            along += (p[far].position[c] - p[own].position[c]) * heading[c];
+        for (int c = 0; c < 3; c++)
+            aside[c] += (p[far].position[c] - p[own].position[c] - along * heading[c]) / 2;
+    }
+    for (int c = 0; c < 3; c++)
+        rise[c] = -aside[c] * length / (4 * (length + base));
+}
+
+/* Adds a vertex that looks like wire point `like`. */
+static int add_vertex(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t like,
+                      const double position[3], float length, struct spl_error *err)
+{
+    if (w->count == w->capacity) {
+        size_t larger = 2 * w->capacity + 1024;
+        struct spl_wire_vertex *vertices = spl_realloc(w->vertices, larger, sizeof *vertices, err);
+        if (!vertices)
+            return SPL_E_NOMEM;
+        w->vertices = vertices;
+        w->capacity = larger;
+    }
+    uint32_t index = g->index[like];
+    struct spl_wire_vertex *vertex = &w->vertices[w->count++];
+    *vertex = (struct spl_wire_vertex){.radius = (float)g->points[like].spacing,
+                                       .length = length,
+                                       .color_class = p->color_class[index],
+                                       .point = SPL_WIRE_END};
+    memcpy(vertex->position, position, sizeof vertex->position);
+    memcpy(vertex->normal, p->normal[index], sizeof vertex->normal);
+    return SPL_OK;
+}
+
+/* From the last vertex, which is that of point `a`, to one of point `b`. */
+static int add_join(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t a, uint32_t b,
+                    float chain, struct spl_work *work, struct spl_error *err)
+{
+    const double *from = g->points[a].position, *to = g->points[b].position;
+    double rise[3] = {0}, spacing = fmax(g->points[a].spacing, g->points[b].spacing);
+    double length = sqrt((to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1]) +
+                         (to[2] - from[2]) * (to[2] - from[2]));
+    int pieces = (int)fmin(ceil(length / (straight * spacing)), pieces_most) | 1, rc = SPL_OK;
+    if (pieces > 1)
+        find_arc(g->points, a, b, length, rise, work);
+    for (int i = 1; i <= pieces && !rc; i++) {
+        double t = (double)i / pieces, at[3];
+        for (int c = 0; c < 3; c++)
+            at[c] = i < pieces ? from[c] + t * (to[c] - from[c]) + 4 * t * (1 - t) * rise[c] : to[c];
+        w->vertices[w->count - 1].point = g->index[2 * i <= pieces + 1 ? a : b];
+        rc = add_vertex(w, p, g, 2 * i < pieces ? a : b, at, chain, err);
+    }
+    return rc;
+}
+
+static int add_chains(struct spl_wires *w, const struct spl_points *points, const struct gathered *g,
+                      struct spl_work *work, struct spl_error *err)
+{
+    const struct spl_wire_point *p = g->points;
+    int rc = SPL_OK;
+    for (uint32_t i = 0; i < g->count && !rc; i++) {
+        if (p[i].next[0] == SPL_WIRE_END || p[i].next[1] != SPL_WIRE_END || p[i].other < i)
+            continue;
+        float length = (float)p[i].length;
+        rc = add_vertex(w, points, g, i, p[i].position, length, err);
+        for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc;) {
+            uint32_t next = p[at].next[p[at].next[0] == before];
+            rc = add_join(w, points, g, at, next, length, work, err);
+            before = at;
+            at = next;
+        }
+    }
+    return rc;
+}
+
+static int compare_pieces(const void *a, const void *b, void *context)
+{
+    const struct spl_wire_vertex *vertices = context;
+    uint32_t i = *(const uint32_t *)a, k = *(const uint32_t *)b, p = vertices[i].point, q = vertices[k].point;
+    return p != q ? (p > q) - (p < q) : (i > k) - (i < k);
+}
+
+static int sort_pieces(struct spl_wires *w, struct spl_error *err)
+{
+    w->pieces = spl_alloc_raw(w->count + 1, sizeof *w->pieces, err);
+    if (!w->pieces)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < w->count; i++)
+        if (w->vertices[i].point != SPL_WIRE_END)
+            w->pieces[w->piece_count++] = (uint32_t)i;
+    qsort_r(w->pieces, w->piece_count, sizeof *w->pieces, compare_pieces, w->vertices);
+    return SPL_OK;
+}
+
+int spl_wires_find(struct spl_wires *wires, const struct spl_points *points, struct spl_stage *stage,
+                   struct spl_error *err)
+{
+    struct gathered g = {0};
+    *wires = (struct spl_wires){0};
+    if (!points->linear)
+        return SPL_OK;
+    spl_stage_begin(stage, "joining wires", NULL, 2);
+    int rc = gather(&g, points, err);
+    struct spl_work joining = {point_steps * ((uint64_t)g.count + 128)}, cutting = joining;
+    if (!rc)
+        rc = spl_wires_join(g.points, (uint32_t)g.count, &joining, err);
+    wires->cut_short = rc == SPL_E_LIMIT; /* the links hold */
+    spl_stage_add(stage, 1, 0);
+    if (!rc || rc == SPL_E_LIMIT)
+        rc = add_chains(wires, points, &g, &cutting, err);
+    if (!rc)
+        rc = sort_pieces(wires, err);
+    spl_stage_finish(stage);
+    free(g.points);
+    free(g.index);
+    return rc;
+}
+
+void spl_wires_finish(struct spl_wires *wires)
+{
+    free(wires->vertices);
+    free(wires->pieces);
+    *wires = (struct spl_wires){0};
+}

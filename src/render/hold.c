@@ -1,0 +1,161 @@
+/* Frames that wait for pages; see hold.h.
+ *
+ * Invariant: page->holds counts the holds in residency->holds that list the page. Who holds slots has taken the room of
+ * all of them, so it waits for reads only, never for another frame; who waits for room holds nothing. */
+#include "render/hold.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+
+static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
+
+static void begin_reads(struct spl_hold *hold)
+{
+    for (; hold->begun < hold->count; hold->begun++) {
+        uint32_t slot = hold->slots[hold->begun];
+        struct spl_resident_page *page = &hold->pages[slot];
+        struct spl_io_rank rank = {.awaited = true};
+        if (page->buffer && !page->filled && !page->failed &&
+            !spl_residency_begin_read(hold->residency, hold->dataset, page, slot, rank))
+            return;
+    }
+}
+
+static void start_wait(struct spl_hold *hold, struct spl_residency *residency, struct spl_resident_dataset *resident)
+{
+    if (!hold->residency)
+        LIST_INSERT_HEAD(&residency->holds, hold, link);
+    hold->residency = residency;
+    hold->waits = true;
+    hold->dataset = resident->dataset;
+    hold->pages = resident->pages;
+    hold->moved_ns = spl_now_ns();
+    hold->begun = hold->come = 0;
+}
+
+/* Others may ask again. */
+static void leave_line(struct spl_residency *residency, const struct spl_hold *hold)
+{
+    if (residency->first_in_line != hold)
+        return;
+    residency->first_in_line = NULL;
+    residency->releases++;
+}
+
+int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_dataset *resident, struct spl_hold *hold,
+                      uint64_t *awaited, struct spl_error *err)
+{
+    spl_assert(!hold->waits);
+    hold->crowded = residency->crowded;
+    hold->count = 0;
+    if (residency->crowded) {
+        if (!residency->first_in_line)
+            residency->first_in_line = hold;
+        hold->releases = residency->releases;
+        start_wait(hold, residency, resident);
+        return SPL_SLOT_PENDING;
+    }
+    leave_line(residency, hold);
+    if (!residency->pending)
+        return SPL_OK;
+    uint32_t *slots = spl_realloc(hold->slots, residency->asked_count, sizeof *slots, err);
+    if (!slots)
+        return SPL_E_NOMEM;
+    hold->slots = slots;
+    hold->count = residency->asked_count;
+    memcpy(slots, residency->asked, hold->count * sizeof *slots);
+    start_wait(hold, residency, resident);
+    for (size_t i = 0; i < hold->count; i++) {
+        hold->pages[slots[i]].holds++;
+        *awaited += !hold->pages[slots[i]].filled;
+    }
+    begin_reads(hold);
+    return SPL_SLOT_PENDING;
+}
+
+/* Has every slot come? 1 = yes, or one was driven out; 0 = no. */
+static int follow(struct spl_hold *hold, struct spl_error *err)
+{
+    for (; hold->come < hold->count; hold->come++) {
+        const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
+        if (page->failed)
+            return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
+        if (!page->buffer)
+            return 1;
+        if (!page->filled)
+            return 0;
+        hold->moved_ns = spl_now_ns();
+    }
+    return 1;
+}
+
+int spl_hold_poll(struct spl_hold *hold, struct spl_error *err)
+{
+    if (!hold->waits)
+        return SPL_OK;
+    if (!hold->crowded) {
+        int rc = follow(hold, err);
+        if (rc)
+            return rc < 0 ? rc : SPL_OK;
+        begin_reads(hold);
+    } else if (hold->residency->releases != hold->releases) {
+        return SPL_OK;
+    }
+    if (spl_now_ns() - hold->moved_ns < patience_ns)
+        return SPL_SLOT_PENDING;
+    return spl_fail(err, SPL_E_TIMEOUT, "no page of the dataset has come for %d s",
+                    (int)(patience_ns / SPL_NS_PER_S));
+}
+
+/* Ends a wait. Why reads failed is forgotten; where `all`, reads that nobody waits for any more are dropped. */
+static void let_go(struct spl_hold *hold, bool all)
+{
+    if (!hold->waits)
+        return;
+    struct spl_residency *residency = hold->residency;
+    for (size_t i = 0; i < hold->count; i++) {
+        struct spl_resident_page *page = &hold->pages[hold->slots[i]];
+        if (!--page->holds && (page->failed || (all && page->buffer && !page->filled)))
+            spl_residency_drop_slot(residency, page);
+    }
+    residency->releases += hold->count > 0;
+    hold->count = 0;
+    hold->waits = false;
+}
+
+void spl_hold_release(struct spl_hold *hold)
+{
+    let_go(hold, false);
+}
+
+void spl_hold_finish(struct spl_hold *hold)
+{
+    if (hold->residency) {
+        let_go(hold, true);
+        leave_line(hold->residency, hold);
+        LIST_REMOVE(hold, link);
+    }
+    free(hold->slots);
+    *hold = (struct spl_hold){0};
+}
+
+void spl_hold_let_go_dataset(struct spl_residency *residency, const struct spl_resident_dataset *resident)
+{
+    struct spl_hold *hold;
+    LIST_FOREACH(hold, &residency->holds, link)
+    if (hold->pages == resident->pages)
+        let_go(hold, true);
+}
+
+void spl_hold_let_go_all(struct spl_residency *residency)
+{
+    for (struct spl_hold *hold; (hold = LIST_FIRST(&residency->holds));) {
+        let_go(hold, true);
+        LIST_REMOVE(hold, link);
+        hold->residency = NULL;
+    }
+    residency->first_in_line = NULL;
+}

@@ -1,0 +1,75 @@
+/* Reads on a thread of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
+ * memory that is counted before it is taken.
+ *
+ * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that waits
+ * is forgotten, the bytes of one that is being read are dropped when they have come.
+ *
+ * Threads: every function is called by the one that owns the renderer; `read` and `wake` are called by the io thread. */
+#ifndef SPL_RENDER_IO_H
+#define SPL_RENDER_IO_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/queue.h>
+
+#include "base/error.h"
+
+enum { SPL_IO_READS = 256 };       /* that may be under way, ended ones that were not given back among them */
+#define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
+
+struct spl_io_what {
+    int (*read)(const void *source, uint32_t index, void *out, struct spl_error *err); /* may block */
+    const void *source; /* borrowed until spl_io_wait_for() */
+    uint32_t index;
+    size_t bytes; /* that `read` writes, at least 1 */
+    void *owner;  /* of the read; not looked at */
+};
+
+/* What goes first: what a frame waits for, in the order that it was asked for; then what the latest walk asked for. */
+struct spl_io_rank {
+    bool awaited;
+    uint64_t walk;
+};
+
+struct spl_io_read {
+    TAILQ_ENTRY(spl_io_read) link; // guarded by: io.mutex, as all but `what` until the read was taken
+    struct spl_io_what what;
+    struct spl_io_rank rank;
+    uint64_t number; /* among those of its rank, the least goes first */
+    int state;       /* enum state of io.c */
+    bool unwanted;   /* ended by its owner while it was being read */
+    void *data;      /* once taken: what.bytes; NULL: `err` says why not */
+    struct spl_error err;
+};
+
+struct spl_io;
+
+/* `wake` (may be NULL) is called after each read has ended. */
+int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io **out, struct spl_error *err);
+
+/* Forgets all reads; blocks until the one under way has ended. NULL-safe. */
+void spl_io_destroy(struct spl_io *io);
+
+/* NULL when as many as may be are under way. */
+struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what *what, struct spl_io_rank rank);
+
+/* It was asked for again: it moves up to `rank` where that goes before its own. */
+void spl_io_raise(struct spl_io *io, struct spl_io_read *read, struct spl_io_rank rank);
+
+/* A read that has ended, well or not, in the order that they did; NULL: none. Never blocks. */
+struct spl_io_read *spl_io_take(struct spl_io *io);
+
+/* Gives back a read, with its data; whatever its state. NULL-safe. */
+void spl_io_end(struct spl_io *io, struct spl_io_read *read);
+
+/* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
+bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
+
+/* Blocks until no read of `source` is being read: true; false at `deadline_ns` (0 = never blocks). */
+bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns);
+
+/* Reads that wait, are being read, or were not taken yet. */
+size_t spl_io_count(struct spl_io *io);
+
+#endif

@@ -1,0 +1,39 @@
+/* Slots in the file; see slot.h. Of a page the device takes a word more than the file has, 0: a zero-width field at its
+ * very end still loads its word, and a forged mask may use it. */
+#include "render/slot.h"
+
+#include <string.h>
+
+#include "dataset/dictionary.h"
+
+uint32_t spl_slot_count(const struct spl_dataset *dataset)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    return info->atoms ? 2 * info->pages + 1 : info->pages;
+}
+
+size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    size_t bytes;
+    if (slot >= 2 * info->pages)
+        return info->dictionary_bytes;
+    if (slot >= info->pages)
+        return spl_dataset_get_texture_bytes(dataset, slot - info->pages);
+    spl_dataset_get_page(dataset, slot, &bytes);
+    return bytes + 4;
+}
+
+int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error *err)
+{
+    const struct spl_dataset *dataset = source;
+    uint32_t pages = spl_dataset_get_info(dataset)->pages;
+    if (slot < pages) {
+        memset((char *)out + spl_slot_get_bytes(dataset, slot) - 4, 0, 4);
+        return spl_dataset_read_page(dataset, slot, out, err);
+    }
+    if (slot < 2 * pages)
+        return spl_dataset_read_textures(dataset, slot - pages, out, err);
+    spl_dictionary_expand(spl_dataset_get_dictionary(dataset), out);
+    return SPL_OK;
+}

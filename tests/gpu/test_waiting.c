@@ -1,0 +1,520 @@
+/* Pages that come late, or never: reads of the file pass a gate of the test's. A frame waits without holding up others, has
+ * the bytes that it has alone, and leaves nothing behind when it is given up. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include <splatd/render.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "support/make_dataset.h"
+
+enum { few = 6000, many = 4000000, width = 96, height = 64, open_gate = 1 << 30 };
+
+static const char *device;
+static atomic_int may_pass = open_gate, fault; /* reads that go through; what one of those to come answers: errno, -1 = 0 bytes */
+static atomic_int reads, wakes;
+static struct spl_dataset *large, *one, *other;
+
+/* In place of the C library's. */
+__attribute__((visibility("default"))) ssize_t pread(int fd, void *out, size_t bytes, off_t offset)
+{
+    atomic_fetch_add(&reads, 1);
+    while (atomic_load(&may_pass) <= 0)
+        usleep(500);
+    if (atomic_load(&may_pass) < open_gate)
+        atomic_fetch_sub(&may_pass, 1);
+    int answer = atomic_load(&fault);
+    errno = answer;
+    return answer ? answer < 0 ? 0 : -1 : (ssize_t)syscall(SYS_pread64, fd, out, bytes, offset);
+}
+
+static void *open_later(void *unused)
+{
+    (void)unused;
+    usleep(50000);
+    atomic_store(&may_pass, open_gate);
+    return NULL;
+}
+
+static void on_read(void *context)
+{
+    atomic_fetch_add((atomic_int *)context, 1);
+}
+
+static double uniform(void)
+{
+    static uint64_t state = 7;
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(state >> 11) / 9007199254740992.0;
+}
+
+static struct spl_dataset *cube(size_t count, int levels)
+{
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (size_t i = 0; i < count; i++) {
+        struct make_splat *s = &splats[i];
+        *s = (struct make_splat){.normal = {0, 0, 1}, .radius = count > few ? 0.01f : 0.03f};
+        for (int c = 0; c < 3; c++) {
+            s->position[c] = 2 * uniform() - 1;
+            s->color[c] = (uint8_t)(256 * uniform());
+        }
+    }
+    struct spl_dataset *dataset = make_dataset_levels(splats, count, levels);
+    free(splats);
+    return dataset;
+}
+
+static struct spl_view looking(void)
+{
+    struct spl_view view;
+    const double eye[3] = {4, 1.4, 1.3}, target[3] = {0}, up[3] = {0, 0, 1};
+    spl_view_init(&view);
+    view.camera.near = 0.01;
+    view.camera.far = 100;
+    view.lod = 0;
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 50, width, height, NULL), SPL_OK);
+    return view;
+}
+
+static struct spl_renderer *open_renderer(uint64_t memory_limit)
+{
+    struct spl_renderer *renderer = NULL;
+    struct spl_renderer_options options = {.device = device,
+                                           .memory_limit = memory_limit,
+                                           .scratch_samples = 1 << 16,
+                                           .first_page_chunks = 100000, // draw lists need not grow
+                                           .wake = on_read,
+                                           .wake_context = &wakes};
+    struct spl_error err = {0};
+    if (spl_renderer_create(&options, &renderer, &err))
+        fprintf(stderr, "%s\n", err.message);
+    return renderer;
+}
+
+static struct spl_renderer *open_with(uint64_t memory_limit, const struct spl_dataset *a, const struct spl_dataset *b)
+{
+    struct spl_renderer *renderer = open_renderer(memory_limit);
+    assert_non_null(renderer);
+    assert_int_equal(spl_renderer_add(renderer, a, NULL), SPL_OK);
+    if (b)
+        assert_int_equal(spl_renderer_add(renderer, b, NULL), SPL_OK);
+    return renderer;
+}
+
+static void render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                   struct spl_frame *frame)
+{
+    struct spl_error err = {0};
+    if (spl_renderer_render(renderer, dataset, view, frame, &err))
+        fail_msg("%s", err.message);
+}
+
+static struct spl_frame alone(const struct spl_dataset *dataset, const struct spl_view *view)
+{
+    struct spl_frame frame;
+    struct spl_renderer *renderer = open_with(0, dataset, NULL);
+    render(renderer, dataset, view, &frame);
+    spl_renderer_destroy(renderer);
+    return frame;
+}
+
+/* Finishes `got`. */
+static void assert_same(struct spl_frame *got, const struct spl_frame *expected)
+{
+    assert_memory_equal(got->images[SPL_LAYER_COLOR].pixels, expected->images[SPL_LAYER_COLOR].pixels, width * height * 4);
+    spl_frame_finish(got);
+}
+
+static struct spl_residency_info look(struct spl_renderer *renderer, const struct spl_dataset *dataset)
+{
+    struct spl_residency_info info;
+    spl_renderer_get_residency(renderer, dataset, &info);
+    return info;
+}
+
+static void settle(struct spl_renderer *renderer)
+{
+    while (look(renderer, NULL).pages_pending) {
+        spl_renderer_wait(renderer, SPL_NEVER);
+        assert_int_equal(spl_renderer_upload(renderer, NULL), SPL_OK);
+    }
+}
+
+static void finish_steps(struct spl_renderer *renderer, struct spl_frame_steps *steps, struct spl_frame *frame)
+{
+    struct spl_error err = {0};
+    for (bool more = true; more;) {
+        if (spl_frame_is_waiting(steps))
+            spl_renderer_wait(renderer, SPL_NEVER);
+        if (spl_frame_step(steps, SPL_NEVER, &more, &err))
+            fail_msg("%s", err.message);
+    }
+    spl_frame_end(steps, frame);
+}
+
+static void a_frame_that_waits_holds_up_nobody(void **state)
+{
+    (void)state;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct spl_view view = looking();
+        view.method = (enum spl_method)method;
+        struct spl_frame expected = alone(one, &view), expected_other = alone(other, &view), frame;
+        struct spl_renderer *renderer = open_with(0, one, other);
+        struct spl_frame_steps *steps;
+        bool more;
+        assert_int_equal(spl_renderer_preload(renderer, other, NULL), SPL_OK);
+        atomic_store(&may_pass, 0);
+        assert_int_equal(spl_frame_begin(renderer, one, &view, &steps, NULL), SPL_OK);
+        uint64_t left = spl_frame_get_samples_left(steps);
+        for (int i = 0; i < 4; i++) {
+            assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+            assert_true(more && spl_frame_is_waiting(steps));
+            assert_int_equal(spl_frame_get_samples_left(steps), left);
+            assert_int_equal(look(renderer, NULL).pages_pending, 1);
+            render(renderer, other, &view, &frame);
+            assert_true(frame.stats.pages_loaded == 0);
+            assert_same(&frame, &expected_other);
+        }
+        int before = atomic_load(&wakes);
+        atomic_store(&may_pass, open_gate);
+        while (atomic_load(&wakes) == before)
+            usleep(500);
+        assert_int_equal(spl_renderer_upload(renderer, NULL), SPL_OK);
+        assert_false(spl_frame_is_waiting(steps));
+        finish_steps(renderer, steps, &frame);
+        assert_true(frame.stats.complete && frame.stats.pages_loaded == 1);
+        assert_same(&frame, &expected);
+        spl_renderer_destroy(renderer);
+        spl_frame_finish(&expected);
+        spl_frame_finish(&expected_other);
+    }
+}
+
+static void a_partial_frame_draws_what_is_there(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_frame expected = alone(large, &view), frame, again;
+    struct spl_renderer *renderer = open_with(0, large, NULL);
+    view.partial = true;
+    atomic_store(&may_pass, 1); // the first page, which is waited for
+    render(renderer, large, &view, &frame);
+    assert_true(!frame.stats.complete && frame.stats.splats_drawn > 0);
+    assert_true(look(renderer, NULL).pages_pending >= 2);
+    render(renderer, large, &view, &again);
+    assert_false(again.stats.complete);
+    assert_same(&again, &frame);
+    spl_frame_finish(&frame);
+    atomic_store(&may_pass, open_gate);
+    settle(renderer); // what it asked for is read on
+    render(renderer, large, &view, &frame);
+    assert_true(frame.stats.complete);
+    assert_same(&frame, &expected);
+    spl_frame_finish(&expected);
+    spl_renderer_destroy(renderer);
+}
+
+static void a_read_that_fails_fails_its_frames_until_it_is_well_again(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_frame expected = alone(large, &view), frame;
+    for (int partial = 0; partial < 2; partial++) {
+        struct spl_renderer *renderer = open_with(0, large, one);
+        const struct {
+            int fault, code;
+        } cases[] = {{EIO, SPL_E_IO}, {-1, SPL_E_CORRUPT}};
+        for (size_t i = 0; i < 2; i++) {
+            struct spl_error err = {0};
+            view.partial = partial;
+            if (partial) { // reads behind the reply: the next one is told
+                atomic_store(&may_pass, !i);
+                if (i)
+                    atomic_store(&fault, cases[i].fault);
+                render(renderer, large, &view, &frame);
+                assert_false(frame.stats.complete);
+                spl_frame_finish(&frame);
+            }
+            atomic_store(&fault, cases[i].fault);
+            atomic_store(&may_pass, open_gate);
+            if (partial)
+                settle(renderer);
+            assert_int_equal(spl_renderer_render(renderer, large, &view, &frame, &err), cases[i].code);
+            assert_null(frame.images[SPL_LAYER_COLOR].pixels);
+            atomic_store(&fault, 0);
+            render(renderer, one, &view, &frame); // nobody else is touched
+            spl_frame_finish(&frame);
+        }
+        view.partial = false;
+        render(renderer, large, &view, &frame);
+        assert_true(frame.stats.complete);
+        assert_same(&frame, &expected);
+        spl_renderer_destroy(renderer);
+    }
+    spl_frame_finish(&expected);
+}
+
+static void a_read_that_hangs_costs_its_frame_only(void **state)
+{
+    (void)state;
+    struct spl_view view = looking(), late = view;
+    struct spl_frame expected = alone(large, &view), frame;
+    struct spl_renderer *renderer = open_with(0, large, one);
+    struct spl_error err = {0};
+    assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
+    atomic_store(&may_pass, 0);
+    late.deadline_ns = spl_now_ns() + 50 * SPL_NS_PER_MS;
+    assert_int_equal(spl_renderer_render(renderer, large, &late, &frame, &err), SPL_E_TIMEOUT);
+    assert_non_null(strstr(err.message, "pages"));
+    assert_int_equal(look(renderer, NULL).pages_pending, 1); // the one under way; nobody wants the others
+    assert_int_equal(look(renderer, large).bytes, 0);
+    render(renderer, one, &view, &frame);
+    spl_frame_finish(&frame);
+    atomic_store(&may_pass, open_gate);
+    render(renderer, large, &view, &frame);
+    assert_same(&frame, &expected);
+    spl_frame_finish(&expected);
+    spl_renderer_destroy(renderer);
+}
+
+/* The dataset is closed as soon as it is removed, and the renderer destroyed while a page is being read. */
+static void nothing_is_left_of_what_goes(void **state)
+{
+    (void)state;
+    for (int way = 0; way < 3; way++) {
+        struct spl_view view = looking();
+        struct spl_dataset *comer = cube(few, 1);
+        struct spl_renderer *renderer = open_with(0, comer, one);
+        struct spl_frame_steps *steps;
+        struct spl_frame frame;
+        struct spl_error err = {0};
+        pthread_t opener;
+        bool more;
+        assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
+        int before = atomic_load(&reads);
+        atomic_store(&may_pass, 0);
+        assert_int_equal(spl_frame_begin(renderer, comer, &view, &steps, NULL), SPL_OK);
+        assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+        while (atomic_load(&reads) == before)
+            usleep(500);
+        if (way < 2) {
+            spl_frame_end(steps, NULL);
+            assert_false(spl_renderer_try_remove(renderer, comer));
+            assert_false(spl_renderer_try_remove(renderer, comer));
+            assert_true(spl_renderer_try_remove(renderer, one));
+            assert_int_equal(look(renderer, comer).bytes, 0);
+        }
+        assert_int_equal(pthread_create(&opener, NULL, open_later, NULL), 0);
+        if (way == 0) {
+            spl_renderer_remove(renderer, comer);
+        } else if (way == 1) {
+            while (!spl_renderer_try_remove(renderer, comer))
+                usleep(500);
+        } else {
+            spl_renderer_inject_loss(renderer);
+            assert_int_equal(spl_renderer_render(renderer, one, &view, &frame, &err), SPL_E_DEVICE_LOST);
+            spl_renderer_destroy(renderer);
+            renderer = NULL;
+        }
+        spl_dataset_close(comer);
+        if (way == 2)
+            spl_frame_end(steps, NULL); // the renderer has gone, as has the dataset
+        spl_renderer_destroy(renderer);
+        pthread_join(opener, NULL);
+    }
+}
+
+/* Room for one of two: each gets what it needs in turn, whoever asked first. */
+static void frames_without_room_for_both_take_turns(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_renderer *renderer = open_with(0, one, other);
+    uint64_t bare = look(renderer, NULL).taken_bytes;
+    assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
+    uint64_t needed = look(renderer, NULL).taken_bytes - bare;
+    spl_renderer_destroy(renderer);
+    struct spl_frame expected[2] = {alone(one, &view), alone(other, &view)}, frame;
+    for (int first = 0; first < 2; first++) {
+        renderer = open_with(bare + needed + needed / 4, one, other);
+        const struct spl_dataset *datasets[3] = {first ? other : one, first ? one : other, first ? other : one};
+        struct spl_frame_steps *steps[3];
+        bool more[3] = {true, true, true};
+        atomic_store(&may_pass, 0);
+        for (int i = 0; i < 3; i++) {
+            assert_int_equal(spl_frame_begin(renderer, datasets[i], &view, &steps[i], NULL), SPL_OK);
+            assert_int_equal(spl_frame_step(steps[i], SPL_NEVER, &more[i], NULL), SPL_OK);
+        }
+        for (int i = 0; i < 3; i++)
+            assert_true(more[i] && spl_frame_is_waiting(steps[i]));
+        assert_int_equal(look(renderer, NULL).pages_pending, 1); // the second has no room, and the third has its page
+        atomic_store(&may_pass, open_gate);
+        while (more[0] || more[1] || more[2]) {
+            spl_renderer_wait(renderer, spl_now_ns() + SPL_NS_PER_MS);
+            assert_int_equal(spl_renderer_upload(renderer, NULL), SPL_OK);
+            for (int i = 0; i < 3; i++)
+                if (more[i] && !spl_frame_is_waiting(steps[i]))
+                    assert_int_equal(spl_frame_step(steps[i], SPL_NEVER, &more[i], NULL), SPL_OK);
+        }
+        for (int i = 0; i < 3; i++) {
+            spl_frame_end(steps[i], &frame);
+            assert_true(frame.stats.complete);
+            assert_same(&frame, &expected[datasets[i] == other]);
+        }
+        spl_renderer_destroy(renderer);
+    }
+    for (int i = 0; i < 2; i++)
+        spl_frame_finish(&expected[i]);
+}
+
+/* What the limit leaves out follows from the view, not from what was there or came first. */
+static void what_has_no_room_depends_on_the_view_alone(void **state)
+{
+    (void)state;
+    struct spl_view view = looking(), aside = view;
+    const double eye[3] = {-0.8, -0.8, -0.8}, target[3] = {-1, -1, -1}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&aside.camera, eye, target, up, NULL), SPL_OK);
+    struct spl_renderer *renderer = open_with(0, large, one);
+    uint64_t bare = look(renderer, NULL).taken_bytes;
+    assert_int_equal(spl_renderer_preload(renderer, large, NULL), SPL_OK);
+    uint64_t limit = bare + (look(renderer, NULL).taken_bytes - bare) / 4 * 3;
+    spl_renderer_destroy(renderer);
+    struct spl_frame first, frame;
+    struct spl_frame_steps *steps;
+    renderer = open_with(limit, large, one);
+    render(renderer, large, &view, &first);
+    assert_true(!first.stats.complete && first.stats.splats_drawn > 0);
+    spl_renderer_destroy(renderer);
+    for (int way = 0; way < 4; way++) {
+        renderer = open_with(limit, large, one);
+        if (way == 1)
+            assert_int_equal(spl_renderer_preload(renderer, large, NULL), SPL_OK);
+        if (way == 2) {
+            render(renderer, large, &aside, &frame);
+            spl_frame_finish(&frame);
+        }
+        if (way == 3) {
+            atomic_store(&may_pass, 0);
+            assert_int_equal(spl_frame_begin(renderer, large, &aside, &steps, NULL), SPL_OK);
+            for (int i = 0; i < 2; i++) {
+                bool more;
+                assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+            }
+            atomic_store(&may_pass, open_gate);
+        }
+        render(renderer, large, &view, &frame); // takes what the one that waits has, if it must
+        assert_false(frame.stats.complete);
+        assert_int_equal(frame.stats.splats_drawn, first.stats.splats_drawn);
+        assert_same(&frame, &first);
+        assert_true(look(renderer, NULL).taken_bytes <= limit);
+        if (way == 3) {
+            finish_steps(renderer, steps, &frame);
+            spl_frame_finish(&frame);
+        }
+        spl_renderer_destroy(renderer);
+    }
+    spl_frame_finish(&first);
+}
+
+static void the_least_recently_drawn_gives_way(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_dataset *third = cube(few, 1);
+    struct spl_renderer *renderer = open_with(0, one, other);
+    uint64_t bare = look(renderer, NULL).taken_bytes;
+    struct spl_frame frame;
+    for (int i = 0; i < 2; i++) {
+        render(renderer, i ? other : one, &view, &frame);
+        spl_frame_finish(&frame);
+    }
+    uint64_t limit = bare + (look(renderer, NULL).taken_bytes - bare) * 5 / 4;
+    spl_renderer_destroy(renderer);
+    renderer = open_with(limit, one, other);
+    assert_int_equal(spl_renderer_add(renderer, third, NULL), SPL_OK);
+    const struct spl_dataset *drawn[] = {one, other, one, third};
+    for (size_t i = 0; i < sizeof drawn / sizeof *drawn; i++) {
+        render(renderer, drawn[i], &view, &frame);
+        spl_frame_finish(&frame);
+    }
+    assert_int_equal(look(renderer, other).bytes, 0);
+    assert_true(look(renderer, one).bytes > 0 && look(renderer, third).bytes > 0);
+    assert_int_equal(look(renderer, NULL).pages_evicted, 1);
+    spl_renderer_destroy(renderer);
+    spl_dataset_close(third);
+}
+
+static void failed_allocations_leave_it_working(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_frame expected = alone(one, &view), frame;
+    struct spl_renderer *renderer = open_renderer(0);
+    int failed = 0;
+    for (int n = 1; n <= 24; n++) {
+        struct spl_error err = {0};
+        spl_memory_fail_after(n);
+        int rc = spl_renderer_add(renderer, one, &err);
+        if (!rc)
+            rc = spl_renderer_render(renderer, one, &view, &frame, &err);
+        spl_memory_fail_after(0);
+        if (rc && rc != SPL_E_NOMEM)
+            fail_msg("allocation %d: %s", n, err.message);
+        failed += rc != 0;
+        if (!rc)
+            assert_same(&frame, &expected);
+        spl_renderer_remove(renderer, one);
+    }
+    assert_true(failed >= 4);
+    spl_renderer_destroy(renderer);
+    spl_frame_finish(&expected);
+}
+
+static int reset(void **state)
+{
+    (void)state;
+    atomic_store(&fault, 0);
+    atomic_store(&may_pass, open_gate);
+    return 0;
+}
+
+int main(void)
+{
+    device = getenv("SPLATD_TEST_DEVICE");
+    struct spl_renderer *probe = open_renderer(0);
+    if (!probe)
+        return 77;
+    spl_renderer_destroy(probe);
+    large = cube(many, 2);
+    one = cube(few, 1);
+    other = cube(few, 1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(a_frame_that_waits_holds_up_nobody, reset),
+        cmocka_unit_test_setup(a_partial_frame_draws_what_is_there, reset),
+        cmocka_unit_test_setup(a_read_that_fails_fails_its_frames_until_it_is_well_again, reset),
+        cmocka_unit_test_setup(a_read_that_hangs_costs_its_frame_only, reset),
+        cmocka_unit_test_setup(nothing_is_left_of_what_goes, reset),
+        cmocka_unit_test_setup(frames_without_room_for_both_take_turns, reset),
+        cmocka_unit_test_setup(what_has_no_room_depends_on_the_view_alone, reset),
+        cmocka_unit_test_setup(the_least_recently_drawn_gives_way, reset),
+        cmocka_unit_test_setup(failed_allocations_leave_it_working, reset),
+    };
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_dataset_close(large);
+    spl_dataset_close(one);
+    spl_dataset_close(other);
+    return failed;
+}

@@ -1,0 +1,241 @@
+/* The io thread: order, bounds, reads that nobody wants any more, failures, and an end while a read hangs. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "render/io.h"
+
+enum { reads_max = 1024, broken = 77 };
+
+/* A file whose reads pass a gate, one at a time. */
+static struct file {
+    pthread_mutex_t mutex;
+    pthread_cond_t moved;
+    unsigned may_pass; // guarded by: mutex, as all
+    bool open;
+    unsigned asked;
+    uint32_t order[reads_max];
+} files[2] = {{.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+              {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER}};
+static atomic_uint wakes;
+
+static int read_gated(const void *source, uint32_t index, void *out, struct spl_error *err)
+{
+    struct file *file = (struct file *)source;
+    pthread_mutex_lock(&file->mutex);
+    file->order[file->asked++ % reads_max] = index;
+    pthread_cond_broadcast(&file->moved);
+    while (!file->open && !file->may_pass)
+        pthread_cond_wait(&file->moved, &file->mutex);
+    file->may_pass -= !file->open;
+    pthread_mutex_unlock(&file->mutex);
+    memset(out, (int)index, 8);
+    return index == broken ? spl_fail(err, SPL_E_IO, "index %u is broken", index) : 0;
+}
+
+static void let_pass(struct file *file, unsigned count, bool open)
+{
+    pthread_mutex_lock(&file->mutex);
+    file->may_pass += count;
+    file->open |= open;
+    pthread_cond_broadcast(&file->moved);
+    pthread_mutex_unlock(&file->mutex);
+}
+
+static void await_asked(struct file *file, unsigned count)
+{
+    pthread_mutex_lock(&file->mutex);
+    while (file->asked < count)
+        pthread_cond_wait(&file->moved, &file->mutex);
+    pthread_mutex_unlock(&file->mutex);
+}
+
+static unsigned get_asked(struct file *file)
+{
+    pthread_mutex_lock(&file->mutex);
+    unsigned asked = file->asked;
+    pthread_mutex_unlock(&file->mutex);
+    return asked;
+}
+
+static void on_read(void *context)
+{
+    atomic_fetch_add((atomic_uint *)context, 1);
+}
+
+static struct spl_io *start(void)
+{
+    struct spl_io *io = NULL;
+    for (int i = 0; i < 2; i++) {
+        files[i].may_pass = files[i].asked = 0;
+        files[i].open = false;
+    }
+    atomic_store(&wakes, 0);
+    assert_int_equal(spl_io_create(on_read, &wakes, &io, NULL), 0);
+    return io;
+}
+
+static struct spl_io_read *begin(struct spl_io *io, struct file *file, uint32_t index, size_t bytes, bool awaited,
+                                 uint64_t walk)
+{
+    struct spl_io_what what = {.read = read_gated, .source = file, .index = index, .bytes = bytes, .owner = file};
+    return spl_io_try_begin(io, &what, (struct spl_io_rank){.awaited = awaited, .walk = walk});
+}
+
+static struct spl_io_read *take(struct spl_io *io)
+{
+    assert_true(spl_io_wait(io, spl_now_ns() + 30 * SPL_NS_PER_S));
+    return spl_io_take(io);
+}
+
+static void reads_are_awaited_first_then_latest_walk_first(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    begin(io, files, 0, 8, false, 1); // is begun at once
+    await_asked(files, 1);
+    struct spl_io_read *raised = begin(io, files, 1, 8, false, 1);
+    begin(io, files, 2, 8, false, 1);
+    begin(io, files, 3, 8, false, 2);
+    begin(io, files, 4, 8, true, 1);
+    begin(io, files, 5, 8, false, 2);
+    begin(io, files, 6, 8, true, 3);
+    struct spl_io_read *later = begin(io, files, 7, 8, false, 1);
+    spl_io_raise(io, raised, (struct spl_io_rank){.awaited = true, .walk = 4});
+    spl_io_raise(io, later, (struct spl_io_rank){.walk = 3});
+    spl_io_raise(io, later, (struct spl_io_rank){.walk = 1}); // moves nothing down
+    assert_int_equal(spl_io_count(io), 8);
+    let_pass(files, 0, true);
+    static const uint32_t expected[] = {0, 4, 6, 1, 7, 3, 5, 2};
+    for (size_t i = 0; i < 8; i++) {
+        struct spl_io_read *read = take(io);
+        assert_int_equal(read->what.index, expected[i]);
+        assert_ptr_equal(read->what.owner, files);
+        assert_int_equal(((uint8_t *)read->data)[7], expected[i]);
+        spl_io_end(io, read);
+    }
+    assert_null(spl_io_take(io));
+    assert_int_equal(spl_io_count(io), 0);
+    assert_false(spl_io_wait(io, SPL_NEVER)); // nothing is under way
+    spl_io_destroy(io);
+    assert_int_equal(atomic_load(&wakes), 8);
+}
+
+static void reads_are_bounded_by_count_and_bytes(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    let_pass(files, 0, true);
+    enum { third = SPL_IO_BYTES / 3 };
+    for (uint32_t i = 0; i < 5; i++)
+        assert_non_null(begin(io, files, i, third, true, 1));
+    await_asked(files, 3);
+    usleep(20000);
+    assert_int_equal(get_asked(files), 3); // the fourth has no room
+    struct spl_io_read *first = take(io);
+    usleep(20000);
+    assert_int_equal(get_asked(files), 3); // nor when it was only taken
+    spl_io_end(io, first);
+    await_asked(files, 4);
+    for (int i = 0; i < 4; i++)
+        spl_io_end(io, take(io));
+    struct spl_io_read *alone = begin(io, files, 9, 2 * SPL_IO_BYTES, true, 1); // one alone may have more
+    assert_ptr_equal(take(io), alone);
+    spl_io_end(io, alone);
+    spl_io_destroy(io);
+
+    io = start();
+    for (uint32_t i = 0; i < SPL_IO_READS; i++)
+        assert_non_null(begin(io, files, i, 8, false, 1));
+    assert_null(begin(io, files, 0, 8, true, 1));
+    let_pass(files, 1, false);
+    spl_io_end(io, take(io));
+    assert_non_null(begin(io, files, 0, 8, true, 1));
+    let_pass(files, 0, true);
+    spl_io_destroy(io); // what waits is forgotten
+}
+
+static void reads_that_nobody_wants_are_dropped(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    struct spl_io_read *reads[3];
+    for (uint32_t i = 0; i < 3; i++)
+        reads[i] = begin(io, files, i, 8, true, 1);
+    await_asked(files, 1);
+    spl_io_end(io, reads[1]); // waits
+    spl_io_end(io, reads[0]); // is being read
+    assert_false(spl_io_wait_for(io, files, spl_now_ns() + 20 * SPL_NS_PER_MS));
+    assert_true(spl_io_wait_for(io, files + 1, 0));
+    spl_io_end(io, reads[2]);
+    let_pass(files, 1, false);
+    assert_true(spl_io_wait_for(io, files, spl_now_ns() + 30 * SPL_NS_PER_S));
+    assert_int_equal(get_asked(files), 1);
+    assert_int_equal(spl_io_count(io), 0);
+    assert_null(spl_io_take(io));
+    struct spl_io_read *ended = begin(io, files, 4, SPL_IO_BYTES, true, 1);
+    let_pass(files, 0, true);
+    assert_true(spl_io_wait(io, spl_now_ns() + 30 * SPL_NS_PER_S));
+    spl_io_end(io, ended); // has ended, was not taken
+    spl_io_end(io, NULL);
+    begin(io, files, 5, SPL_IO_BYTES, true, 1); // its bytes are free again
+    assert_int_equal(take(io)->what.index, 5);
+    spl_io_destroy(io); // frees what was taken
+}
+
+static void failures_are_told(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    let_pass(files, 0, true);
+    begin(io, files, broken, SPL_IO_BYTES, true, 1);
+    struct spl_io_read *read = take(io);
+    assert_null(read->data);
+    assert_int_equal(read->err.code, SPL_E_IO);
+    assert_string_equal(read->err.message, "index 77 is broken");
+    begin(io, files, 1, SPL_IO_BYTES, true, 1); // there is room: it holds no bytes
+    spl_io_end(io, take(io));
+    spl_io_end(io, read);
+    spl_memory_fail_after(1);
+    begin(io, files, 2, 8, true, 1);
+    read = take(io);
+    assert_int_equal(read->err.code, SPL_E_NOMEM);
+    assert_int_equal(get_asked(files), 2); // it was not read
+    spl_io_destroy(io);
+}
+
+static void waits_end_at_their_deadline(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    begin(io, files, 0, 8, true, 1);
+    assert_false(spl_io_wait(io, spl_now_ns() + 20 * SPL_NS_PER_MS));
+    assert_null(spl_io_take(io));
+    let_pass(files, 0, true);
+    spl_io_destroy(io);
+    struct spl_error err = {0};
+    spl_memory_fail_after(1);
+    assert_int_equal(spl_io_create(NULL, NULL, &io, &err), SPL_E_NOMEM);
+    assert_null(io);
+    spl_io_destroy(io);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(reads_are_awaited_first_then_latest_walk_first),
+        cmocka_unit_test(reads_are_bounded_by_count_and_bytes),
+        cmocka_unit_test(reads_that_nobody_wants_are_dropped),
+        cmocka_unit_test(failures_are_told),
+        cmocka_unit_test(waits_end_at_their_deadline),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
