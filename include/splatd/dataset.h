@@ -1,4 +1,4 @@
-/* A packed dataset (NAME.spld), mapped read-only. api/format.md documents the file byte by byte.
+/* A packed dataset (NAME.spld), read-only. api/format.md documents the file byte by byte.
  *
  * Threads: open and close on any one thread; between them every call below may run on any thread at once.
  * A file that is renamed over or removed goes on being what it was. One that is cut or overwritten in place makes
@@ -24,15 +24,22 @@ enum spl_attribute {
     SPL_ATTRIBUTE_RADIUS,
     SPL_ATTRIBUTE_NORMAL,
     SPL_ATTRIBUTE_COLOR,
-    SPL_ATTRIBUTE_CLASS,
-    SPL_ATTRIBUTE_UNCERTAINTY,
     SPL_ATTRIBUTE_LINEAR,
     SPL_ATTRIBUTE_CLIP,    /* clip lines and the mask that says which splats have one */
     SPL_ATTRIBUTE_LINES,   /* chunks of lines, with their headers: wires, poles and cables */
-    SPL_ATTRIBUTE_CHUNK,   /* chunk and node headers, spread over the splats */
+    SPL_ATTRIBUTE_CHUNK,   /* chunk, node and stream headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,
     SPL_ATTRIBUTE_COUNT
+};
+
+/* An optional attribute, as the file names it. */
+enum { SPL_STREAMS_MAX = 16, SPL_STREAM_TEXT_MAX = 32 };
+struct spl_stream_info {
+    char name[SPL_STREAM_TEXT_MAX]; /* "class", "uncertainty", … */
+    char type[SPL_STREAM_TEXT_MAX]; /* how codes become values; one that this library does not know is skipped */
+    char unit[SPL_STREAM_TEXT_MAX]; /* "" = none */
+    uint64_t bits;                  /* of its codes, over all splats */
 };
 
 struct spl_dataset_info {
@@ -47,7 +54,8 @@ struct spl_dataset_info {
     uint64_t pieces;           /* straight pieces of wires, poles and cables, of all levels */
     uint64_t ids;              /* of splats and of the pieces' vertices: below it */
     uint32_t levels;           /* depth of the octree, 1 = a single node */
-    uint32_t nodes, chunks, pages;
+    uint64_t nodes, chunks;
+    uint32_t pages;
     double bounds_min[3], bounds_max[3]; /* of the leaf positions, world */
     double default_eye[3], default_target[3], default_up[3], default_fov; /* a view that shows the dataset */
     double splat_radius;       /* median radius of the leaf splats */
@@ -56,9 +64,12 @@ struct spl_dataset_info {
     bool has_linear;  /* some splats lie on wires, poles or cables, and are marked */
     uint32_t atoms, texture_size; /* of the dictionary: atoms of texture_size x texture_size texels; 0 = no textures */
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT]; /* over all splats; bytes per splat = bits / 8 / splats */
+    uint32_t stream_count; /* attributes beyond these, up to SPL_STREAMS_MAX */
+    struct spl_stream_info streams[SPL_STREAMS_MAX];
+    char unit[SPL_STREAM_TEXT_MAX]; /* of coordinates: "m", "ft", "us-ft", "unknown" */
 };
 
-/* Maps `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
+/* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 

@@ -103,8 +103,11 @@ struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
     uint64_t linear; /* leaf splats on wires, poles and cables */
     uint64_t pieces; /* straight ones between them, of all levels */
-    uint32_t levels, nodes, chunks, pages;
+    uint32_t levels, pages;
+    uint64_t nodes, chunks;
     uint64_t attribute_bits[SPL_ATTRIBUTE_COUNT];
+    uint32_t stream_count; /* attributes beyond these: name and bits */
+    struct spl_stream_info streams[SPL_STREAMS_MAX];
     double position_error;     /* measured mean, share of the radius */
     double normal_error;       /* measured mean, degrees */
     double seconds;

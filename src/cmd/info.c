@@ -13,49 +13,12 @@
 #include <jansson.h>
 
 #include "cmd/dictionary.h"
+#include "cmd/info_report.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
-#include "dataset/chunk_clip.h"
-#include "dataset/codec.h"
-#include "dataset/dataset.h"
-#include "dataset/texture.h"
-
-enum { width_max = 24, levels_max = 64 };
-
-/* Fixed-width codes whose widths each chunk chose. */
-static const struct {
-    const char *name; /* as in JSON */
-    const char *label;
-    enum spl_attribute attribute;
-    unsigned shifts[3], shift_count, bits;
-} codes[] = {
-    {"position_axis", "position, an axis", SPL_ATTRIBUTE_POSITION,
-     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z}, 3, 5},
-    {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
-    {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
-    {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
-    {"class", "class", SPL_ATTRIBUTE_CLASS, {SPL_EXTRA_CLASS}, 1, 4},
-    {"uncertainty", "uncertainty", SPL_ATTRIBUTE_UNCERTAINTY, {SPL_EXTRA_UNCERTAINTY}, 1, 4},
-};
-enum { code_count = sizeof codes / sizeof *codes };
 
 static const char bar[] = "########################################";
 enum { bar_max = sizeof bar - 1 };
-
-struct report {
-    const struct spl_dataset *dataset;
-    const struct spl_dataset_info *info;
-    struct level {
-        uint64_t nodes, chunks, splats, pieces;
-        double spacing;   /* mean over the splats */
-    } levels[levels_max]; /* deeper ones are counted with the last */
-    uint32_t level_count;
-    double widths[code_count][width_max + 1]; /* shares of the codes */
-    uint64_t atoms[SPL_ATOMS_MAX + 1];        /* splats by number of atoms */
-    uint64_t linear;                          /* points on wires, poles and cables */
-    uint64_t clips;                           /* splats that end at a clip line */
-    uint64_t chunks[SPL_CHUNK_KINDS], items[SPL_CHUNK_KINDS], bytes[SPL_CHUNK_KINDS];
-};
 
 struct arguments {
     const char *picture; // may be NULL
@@ -95,72 +58,6 @@ static const struct spl_cmd_table table = {
     .count = sizeof options / sizeof *options,
 };
 
-static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attribute)
-{
-    switch (attribute) {
-    case SPL_ATTRIBUTE_COLOR:
-        return chunk->color_bits;
-    case SPL_ATTRIBUTE_CLASS:
-    case SPL_ATTRIBUTE_UNCERTAINTY:
-        return chunk->extra_bits;
-    default:
-        return chunk->geometry_bits;
-    }
-}
-
-static int gather(struct report *report, const struct spl_dataset *dataset, struct spl_error *err)
-{
-    uint32_t node_count, chunk_count;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    *report = (struct report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
-    for (uint32_t n = 0; n < node_count; n++) {
-        uint32_t depth = nodes[n].depth < levels_max ? nodes[n].depth : levels_max - 1;
-        struct level *level = &report->levels[depth];
-        report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
-        level->nodes++;
-        level->chunks += nodes[n].chunk_count;
-        for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
-            const struct spl_chunk *chunk = &chunks[nodes[n].first_chunk + c];
-            uint32_t splats = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
-            level->splats += splats;
-            level->pieces += spl_chunk_count_pieces(chunk);
-            level->spacing += (double)nodes[n].spacing * splats;
-        }
-    }
-    for (uint32_t i = 0; i < report->level_count; i++)
-        report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
-    for (uint32_t c = 0; c < chunk_count; c++) {
-        uint32_t kind = spl_chunk_kind(&chunks[c]);
-        report->clips += spl_clip_count(&chunks[c]);
-        report->chunks[kind]++;
-        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
-        report->bytes[kind] += sizeof *chunks + 4ull * spl_chunk_words(&chunks[c]);
-        for (int k = 0; k < code_count && kind == SPL_CHUNK_DISCS; k++)
-            for (unsigned s = 0; s < codes[k].shift_count; s++) {
-                uint32_t width = code_word(&chunks[c], codes[k].attribute) >> codes[k].shifts[s];
-                width &= (1u << codes[k].bits) - 1;
-                report->widths[k][width] +=
-                    (double)chunks[c].count / codes[k].shift_count / (double)report->info->splats;
-            }
-    }
-    int rc = spl_dataset_count_linear(dataset, &report->linear, err);
-    return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
-}
-
-static double bytes_per_splat(const struct spl_dataset_info *info, enum spl_attribute attribute)
-{
-    return (double)info->attribute_bits[attribute] / 8 / (double)info->splats;
-}
-
-static double total_bytes_per_splat(const struct spl_dataset_info *info)
-{
-    double total = 0;
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
-        total += bytes_per_splat(info, a);
-    return total;
-}
-
 /* 1234567 -> "1,234,567" */
 static const char *grouped(uint64_t value, char text[32])
 {
@@ -176,7 +73,7 @@ static const char *grouped(uint64_t value, char text[32])
 }
 
 /* As figure 9 of the sparse-coding paper. A bar's full length is the largest share. */
-static void print_atoms(const struct report *report)
+static void print_atoms(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
     char text[32];
@@ -218,10 +115,23 @@ static void print_colors(const json_t *colors, uint64_t kept)
     }
 }
 
-static void print_table(const struct report *report)
+/* ", name (unit, where it comes from)" */
+static void print_stream(const struct spl_stream_info *stream)
+{
+    const char *about = NULL, *unit = stream->unit;
+    for (int k = 0; k < SPL_STREAM_KNOWN_COUNT; k++)
+        if (!strcmp(spl_streams_known[k].name, stream->name))
+            about = spl_streams_known[k].about;
+    printf(", %s", stream->name);
+    if (about || *unit)
+        printf(" (%s%s%s)", unit, about && *unit ? ", " : "", about ? about : "");
+}
+
+static void print_table(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
     const json_t *sources = json_object_get(spl_dataset_get_meta(report->dataset), "sources"), *source;
+    const json_t *crs = json_object_get(spl_dataset_get_meta(report->dataset), "crs");
     char a[32], b[32], c[32], d[32];
     size_t i;
     printf("%s  version %016" PRIx64 ", %.1f MB\n", info->id, info->version, (double)info->file_bytes / 1e6);
@@ -230,8 +140,10 @@ static void print_table(const struct report *report)
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
-    printf("  attributes    %s%s%s\n", info->has_color ? "color" : "no color", info->has_class ? ", class" : "",
-           info->has_uncertainty ? ", uncertainty (derived from the points)" : "");
+    printf("  attributes    %s", info->has_color ? "color" : "no color");
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        print_stream(&info->streams[s]);
+    printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
@@ -242,6 +154,9 @@ static void print_table(const struct report *report)
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
+    printf("  unit          %s\n", info->unit);
+    if (json_is_string(crs))
+        printf("  crs           %s\n", json_string_value(crs));
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
@@ -251,19 +166,19 @@ static void print_table(const struct report *report)
 
     printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
-        const struct level *l = &report->levels[level];
+        const struct spl_info_level *l = &report->levels[level];
         printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b),
                grouped(l->splats, c), grouped(l->pieces, d), l->spacing);
     }
     printf("\n  bytes a splat\n");
-    for (int attribute = 0; attribute < SPL_ATTRIBUTE_COUNT; attribute++)
+    for (int attribute = 0; attribute < spl_info_count(info); attribute++)
         if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
-            printf("  %-14s%6.2f\n", spl_attribute_name(attribute), bytes_per_splat(info, attribute));
+            printf("  %-14s%6.2f\n", spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute));
     printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
-           total_bytes_per_splat(info));
-    for (int k = 0; k < code_count; k++) {
-        printf("  %-22s", codes[k].label);
-        for (int width = 0; width <= width_max; width++)
+           spl_info_total_bytes_per_splat(info));
+    for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
+        printf("  %-22s", k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name);
+        for (int width = 0; width <= SPL_INFO_WIDTH_MAX; width++)
             if (report->widths[k][width] > 0)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);
         printf("\n");
@@ -272,83 +187,9 @@ static void print_table(const struct report *report)
         print_atoms(report);
 }
 
-static json_t *vector(const double v[3])
+static int print_json(const struct spl_info_report *report, struct spl_error *err)
 {
-    return json_pack("[f,f,f]", v[0], v[1], v[2]);
-}
-
-/* null where there are none; NULL when memory is refused. */
-static json_t *textures_to_json(const struct report *report)
-{
-    const struct spl_dataset_info *info = report->info;
-    json_t *counts = info->atoms ? json_array() : NULL;
-    if (!info->atoms)
-        return json_null();
-    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
-        json_array_append_new(counts, json_integer((json_int_t)report->atoms[count]));
-    return json_pack("{s:I, s:I, s:I, s:o}", "size", (json_int_t)info->texture_size, "atoms", (json_int_t)info->atoms,
-                     "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
-}
-
-/* Bytes with the chunks' headers. */
-static json_t *kinds_to_json(const struct report *report)
-{
-    json_t *kinds = json_object();
-    for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
-        json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
-                            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
-                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
-                                      "bytes", (json_int_t)report->bytes[kind]));
-    return kinds;
-}
-
-/* NULL when memory is refused: json_pack passes it on. */
-static json_t *to_json(const struct report *report)
-{
-    const struct spl_dataset_info *info = report->info;
-    json_t *bytes = json_pack("{s:f}", "total", total_bytes_per_splat(info));
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
-        json_object_set_new(bytes, spl_attribute_name(a), json_real(bytes_per_splat(info, a)));
-    json_t *levels = json_array();
-    for (uint32_t i = 0; i < report->level_count; i++) {
-        const struct level *l = &report->levels[i];
-        json_array_append_new(levels,
-                              json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
-                                        (json_int_t)l->pieces, "spacing", l->spacing));
-    }
-    json_t *widths = json_object();
-    for (int k = 0; k < code_count; k++) {
-        json_t *histogram = json_object();
-        for (int width = 0; width <= width_max; width++) {
-            char key[16];
-            snprintf(key, sizeof key, "%d", width);
-            if (report->widths[k][width] > 0)
-                json_object_set_new(histogram, key, json_real(report->widths[k][width]));
-        }
-        json_object_set_new(widths, codes[k].name, histogram);
-    }
-    return json_pack(
-        "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?}",
-        "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
-        (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
-        "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
-        (json_int_t)info->chunks, "pages", (json_int_t)info->pages, "bounds", "min", vector(info->bounds_min), "max",
-        vector(info->bounds_max), "default_view", "eye", vector(info->default_eye), "target",
-        vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
-        info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
-        (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
-        kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
-        textures_to_json(report), "sources",
-        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
-        json_object_get(spl_dataset_get_meta(report->dataset), "color"));
-}
-
-static int print_json(const struct report *report, struct spl_error *err)
-{
-    json_t *json = to_json(report);
+    json_t *json = spl_info_to_json(report);
     char *text = json ? json_dumps(json, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
     json_decref(json);
     if (!text)
@@ -378,10 +219,10 @@ int spl_cmd_info(int argc, char **argv)
     for (int i = optind; i < argc; i++) {
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
-        struct report report;
+        struct spl_info_report report;
         int rc = spl_dataset_open(argv[i], !a.no_verify, &dataset, &err);
         if (!rc)
-            rc = gather(&report, dataset, &err);
+            rc = spl_info_gather(&report, dataset, &err);
         if (!rc && a.json)
             rc = print_json(&report, &err);
         else if (!rc)

@@ -64,9 +64,10 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     uint64_t total = 0;
     double splats = (double)r->splats;
     fprintf(stderr,
-            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %u nodes, %u pages\n",
+            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %llu nodes, %u pages\n",
             output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
-            (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels, r->nodes, r->pages);
+            (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels,
+            (unsigned long long)r->nodes, r->pages);
     fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
             (unsigned long long)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");
@@ -74,6 +75,10 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
         total += r->attribute_bits[a];
         if (r->attribute_bits[a])
             fprintf(stderr, " %s %.2f,", spl_attribute_name(a), (double)r->attribute_bits[a] / 8 / splats);
+    }
+    for (uint32_t s = 0; s < r->stream_count; s++) {
+        total += r->streams[s].bits;
+        fprintf(stderr, " %s %.2f,", r->streams[s].name, (double)r->streams[s].bits / 8 / splats);
     }
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,

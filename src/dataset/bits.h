@@ -1,14 +1,14 @@
-/* Fields of up to 24 bits that lie one after the other in streams of 32-bit words, low bits first, as the kernels read
+/* Fields of up to 32 bits that lie one after the other in streams of 32-bit words, low bits first, as the kernels read
  * them: at most two words a field. */
 #ifndef SPL_DATASET_BITS_H
 #define SPL_DATASET_BITS_H
 
 #include <stdint.h>
 
-/* `bits` (0..31) bits of `word` from bit `shift` on. */
+/* `bits` (0..32) bits of `word` from bit `shift` on. */
 static inline uint32_t spl_bits_part(uint32_t word, unsigned shift, unsigned bits)
 {
-    return word >> shift & ((1u << bits) - 1);
+    return word >> shift & (uint32_t)((1ull << bits) - 1);
 }
 
 /* The `width` bits of a stream from bit `at` on; 0 bits look at no word. */

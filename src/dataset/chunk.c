@@ -1,6 +1,6 @@
-/* One chunk's streams. Colours, classes and uncertainties are codes above the chunk's least, in as many bits as the
- * largest needs; positions, normals and radii come quantised (chunk_geometry.c), clip lines are added at the end
- * (chunk_clip.c). Pure functions; any thread. */
+/* One chunk's words. Colours are codes above the chunk's least, in as many bits as the largest needs; positions, normals
+ * and radii come quantised (chunk_geometry.c), clip lines are added at the end (chunk_clip.c); optional attributes
+ * follow them (streams.c). Pure functions; any thread. */
 #include "dataset/codec.h"
 
 #include <math.h>
@@ -15,7 +15,6 @@
 struct codes {
     struct spl_geometry_codes geometry;
     int32_t cy[SPL_CHUNK_SPLATS], cu[SPL_CHUNK_SPLATS], cv[SPL_CHUNK_SPLATS];
-    int32_t classification[SPL_CHUNK_SPLATS], uncertainty[SPL_CHUNK_SPLATS];
 };
 
 static unsigned bits_for_count(uint32_t largest)
@@ -53,52 +52,9 @@ static void encode_colors(const uint8_t (*color)[3], uint32_t count, struct spl_
     chunk->color_base = (uint32_t)(uint16_t)u | (uint32_t)(uint16_t)v << 16;
 }
 
-static void encode_classes(const struct spl_splat *splats, uint32_t count, struct spl_chunk *chunk, struct codes *codes)
-{
-    int32_t base;
-    for (uint32_t i = 0; i < count; i++)
-        codes->classification[i] = splats[i].classification;
-    unsigned bits = rebase(codes->classification, count, &base);
-    chunk->extra_bits |= bits << SPL_EXTRA_CLASS | (uint32_t)base << SPL_EXTRA_CLASS_BASE;
-}
-
-/* Half octaves below the largest; what lies below the last of them becomes zero. */
-static void encode_uncertainties(const struct spl_splat *splats, uint32_t count, struct spl_chunk *chunk,
-                                 struct codes *codes)
-{
-    float largest = 0;
-    for (uint32_t i = 0; i < count; i++)
-        largest = fmaxf(largest, splats[i].uncertainty);
-    chunk->uncertainty_max = largest;
-    const int32_t last = (1 << SPL_UNCERTAINTY_BITS_MAX) - 2;
-    int32_t highest = 0;
-    bool zeros = false;
-    for (uint32_t i = 0; i < count; i++) {
-        float ratio = largest > 0 ? splats[i].uncertainty / largest : 1.0f;
-        int32_t code = ratio > 0 ? (int32_t)(0.5f - 2.0f * log2f(ratio)) : last + 1;
-        codes->uncertainty[i] = code > last ? -1 : code;
-        zeros |= code > last;
-        if (code <= last && code > highest)
-            highest = code;
-    }
-    if (highest == 0 && !zeros)
-        return;
-    unsigned bits = bits_for_count((uint32_t)highest + 1); /* the last code is taken by zero */
-    for (uint32_t i = 0; i < count; i++)
-        if (codes->uncertainty[i] < 0)
-            codes->uncertainty[i] = (1 << bits) - 1;
-    chunk->extra_bits |= bits << SPL_EXTRA_UNCERTAINTY;
-}
-
-/* Writes one stream: `fields` codes a splat, one after the other, then the rest of the last word. A stream without
- * width has no codes: nobody set them where the attribute is absent. */
+/* Writes one stream: `fields` codes a splat, one after the other, then the rest of the last word. */
 static void put_stream(struct spl_bit_writer *w, int32_t *const *code, const unsigned *bits, int fields, uint32_t count)
 {
-    unsigned width = 0;
-    for (int f = 0; f < fields; f++)
-        width += bits[f];
-    if (!width)
-        return;
     for (uint32_t i = 0; i < count; i++)
         for (int f = 0; f < fields; f++)
             spl_bits_put(w, (uint32_t)code[f][i], bits[f]);
@@ -128,7 +84,7 @@ static void encode_linear(const struct spl_splat *splats, uint32_t count, struct
 static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes, const uint32_t mask[SPL_LINEAR_WORDS],
                               uint32_t *words)
 {
-    uint32_t g = chunk->geometry_bits, e = chunk->extra_bits;
+    uint32_t g = chunk->geometry_bits;
     struct spl_geometry_codes *c = &codes->geometry;
     struct spl_bit_writer writer = {.words = words};
     put_stream(&writer, (int32_t *[]){c->position[0], c->position[1], c->position[2], c->u, c->v, c->radius},
@@ -138,9 +94,6 @@ static uint32_t write_streams(const struct spl_chunk *chunk, struct codes *codes
     for (int i = 0; g >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME && i < SPL_LINEAR_WORDS; i++)
         words[writer.used++] = mask[i];
     put_colors(&writer, chunk, codes);
-    put_stream(&writer, (int32_t *[]){codes->classification}, (unsigned[]){e >> SPL_EXTRA_CLASS & 15}, 1, chunk->count);
-    put_stream(&writer, (int32_t *[]){codes->uncertainty}, (unsigned[]){e >> SPL_EXTRA_UNCERTAINTY & 15}, 1,
-               chunk->count);
     return writer.used;
 }
 
@@ -167,7 +120,7 @@ uint32_t spl_discs_encode(const struct spl_splat *splats, const double (*positio
     uint8_t color[SPL_CHUNK_SPLATS][3];
     for (uint32_t i = 0; i < count; i++) {
         const float *n = splats[i].normal;
-        spl_assert(splats[i].radius > 0 && isfinite(splats[i].radius + n[0] + n[1] + n[2] + splats[i].uncertainty) &&
+        spl_assert(splats[i].radius > 0 && isfinite(splats[i].radius + n[0] + n[1] + n[2]) &&
                    isfinite(position[i][0] + position[i][1] + position[i][2]));
         memcpy(color[i], splats[i].color, sizeof color[i]);
     }
@@ -178,10 +131,6 @@ uint32_t spl_discs_encode(const struct spl_splat *splats, const double (*positio
     spl_geometry_quantise(splats, position, count, options, chunk, &codes.geometry, error ? error : &ignored);
     encode_linear(splats, count, chunk, mask);
     encode_colors((const uint8_t(*)[3])color, count, chunk, &codes);
-    if (options->has_class)
-        encode_classes(splats, count, chunk, &codes);
-    if (options->has_uncertainty)
-        encode_uncertainties(splats, count, chunk, &codes);
     uint32_t used = write_streams(chunk, &codes, mask, words);
     return used + write_clips(splats, chunk, words, used);
 }
@@ -193,7 +142,7 @@ uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, 
     *out = *chunk;
     out->geometry_word = 0;
     encode_colors(color, chunk->count, out, &codes);
-    uint32_t geometry = spl_chunk_color_word(out), begin = spl_chunk_class_word(chunk);
+    uint32_t geometry = spl_chunk_color_word(out), begin = spl_chunk_clip_word(chunk);
     uint32_t rest = chunk->geometry_word + spl_chunk_words(chunk) - begin;
     memcpy(words, page + chunk->geometry_word, geometry * sizeof *words);
     struct spl_bit_writer writer = {.words = words, .used = geometry};

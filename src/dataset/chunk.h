@@ -22,9 +22,7 @@ struct spl_splat {
     float position[3];    /* metres from the node's origin; the encoder takes them as doubles, see below */
     float normal[3];      /* unit */
     float radius;         /* metres, > 0 */
-    float uncertainty;    /* eq. 21, >= 0 */
     uint8_t color[3];     /* sRGB */
-    uint8_t classification;
     bool linear; /* lies on a wire, a pole or a cable; a vertex of a line: a piece goes to the next */
     struct spl_clip clip;
 };
@@ -33,7 +31,6 @@ struct spl_chunk_options {
     double position_error;   /* mean error as a share of the splat radius; default 0.016 */
     double normal_error;     /* mean error, radians; default 1 degree */
     double radius_error;     /* largest relative error; default 0.05 */
-    bool has_class, has_uncertainty;
     uint32_t kind;           /* enum spl_chunk_kind, which has what of these and of a splat's fields it knows */
 };
 
@@ -41,14 +38,12 @@ struct spl_chunk_error {     /* what quantisation did to one chunk, sums over it
     double position_over_radius, normal_radians;
 };
 
-/* Words that `chunk`'s streams take; the place of one stream is the sum of those before it. Here and below, what a chunk
- * does by its kind is a row of codec.h. */
+/* Words that `chunk`'s own streams take, without optional attributes, which follow; the place of one stream is the sum
+ * of those before it. Here and below, what a chunk does by its kind is a row of codec.h. */
 uint32_t spl_chunk_words(const struct spl_chunk *chunk);
 uint32_t spl_chunk_geometry_width(const struct spl_chunk *chunk); /* bits a splat */
 uint32_t spl_chunk_color_width(const struct spl_chunk *chunk);
 uint32_t spl_chunk_color_word(const struct spl_chunk *chunk);     /* offset in the page */
-uint32_t spl_chunk_class_word(const struct spl_chunk *chunk);
-uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk);
 uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk);
 
 /* Straight pieces between the vertices of a chunk of lines, as its header says; 0 of discs. */
@@ -63,7 +58,7 @@ uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *m
 /* Largest number of words a chunk can need. */
 enum {
     SPL_CLIP_WORDS_MAX = SPL_LINEAR_WORDS + SPL_CHUNK_SPLATS * SPL_CLIP_BITS / 32,
-    SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9 + 8 + 8)) / 32 + SPL_LINEAR_WORDS + 4 + SPL_CLIP_WORDS_MAX
+    SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9)) / 32 + SPL_LINEAR_WORDS + 4 + SPL_CLIP_WORDS_MAX
 };
 
 /* Chooses widths and codes for `count` splats (1..128; of lines 2..128 vertices, of which the last is joined to none
@@ -76,8 +71,8 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error);
 
-/* The same chunk with other colours, `color[i]` for splat i: its geometry, classes and uncertainties are copied as they
- * lie in `page`, bit for bit. Writes `words` (room for SPL_CHUNK_WORDS_MAX) and *out, whose geometry_word becomes 0.
+/* The same chunk with other colours, `color[i]` for splat i: its geometry and clip lines are copied as they lie in
+ * `page`, bit for bit. Writes `words` (room for SPL_CHUNK_WORDS_MAX) and *out, whose geometry_word becomes 0.
  * Returns the number of words. `chunk` must be one that opening has checked. */
 uint32_t spl_chunk_recolor(const struct spl_chunk *chunk, const uint32_t *page, const uint8_t (*color)[3],
                            struct spl_chunk *out, uint32_t *words);

@@ -15,16 +15,6 @@ static uint32_t stream_words(const struct spl_chunk *chunk, uint32_t width)
     return (chunk->count * width + 31) / 32;
 }
 
-static uint32_t class_width(const struct spl_chunk *chunk)
-{
-    return spl_bits_part(chunk->extra_bits, SPL_EXTRA_CLASS, 4);
-}
-
-static uint32_t uncertainty_width(const struct spl_chunk *chunk)
-{
-    return spl_bits_part(chunk->extra_bits, SPL_EXTRA_UNCERTAINTY, 4);
-}
-
 uint32_t spl_chunk_geometry_width(const struct spl_chunk *chunk)
 {
     uint32_t bits = chunk->geometry_bits;
@@ -65,19 +55,9 @@ uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *m
     return linear;
 }
 
-uint32_t spl_chunk_class_word(const struct spl_chunk *chunk)
-{
-    return spl_chunk_color_word(chunk) + stream_words(chunk, spl_chunk_color_width(chunk));
-}
-
-uint32_t spl_chunk_uncertainty_word(const struct spl_chunk *chunk)
-{
-    return spl_chunk_class_word(chunk) + stream_words(chunk, class_width(chunk));
-}
-
 uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk)
 {
-    return spl_chunk_uncertainty_word(chunk) + stream_words(chunk, uncertainty_width(chunk));
+    return spl_chunk_color_word(chunk) + stream_words(chunk, spl_chunk_color_width(chunk));
 }
 
 uint32_t spl_discs_words(const struct spl_chunk *chunk)
@@ -93,20 +73,16 @@ void spl_discs_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBU
     uint64_t radius = count * spl_bits_part(geometry, SPL_GEOMETRY_RADIUS, 4);
     uint64_t position = count * spl_chunk_geometry_width(chunk) - normal - radius;
     uint64_t color = count * spl_chunk_color_width(chunk);
-    uint64_t classification = count * class_width(chunk);
-    uint64_t uncertainty = count * uncertainty_width(chunk);
     uint64_t linear = linear_words(chunk) ? count : 0;
     uint64_t clip = spl_clip_count(chunk) ? count + spl_clip_count(chunk) * SPL_CLIP_BITS : 0;
     bits[SPL_ATTRIBUTE_POSITION] += position;
     bits[SPL_ATTRIBUTE_NORMAL] += normal;
     bits[SPL_ATTRIBUTE_RADIUS] += radius;
     bits[SPL_ATTRIBUTE_COLOR] += color;
-    bits[SPL_ATTRIBUTE_CLASS] += classification;
-    bits[SPL_ATTRIBUTE_UNCERTAINTY] += uncertainty;
     bits[SPL_ATTRIBUTE_LINEAR] += linear;
     bits[SPL_ATTRIBUTE_CLIP] += clip;
-    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_discs_words(chunk) + 8 * sizeof *chunk - position - normal - radius -
-                                 color - classification - uncertainty - linear - clip;
+    bits[SPL_ATTRIBUTE_CHUNK] += 32ull * spl_discs_words(chunk) + 8 * SPL_CHUNK_BYTES - position - normal - radius -
+                                 color - linear - clip;
 }
 
 static uint32_t take(const uint32_t *words, uint32_t *bit, uint32_t width)
@@ -155,13 +131,4 @@ void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
     splat->color[0] = clamp_byte(cv + g);
     splat->color[1] = clamp_byte(g);
     splat->color[2] = clamp_byte(cu + g);
-
-    bit = i * class_width(chunk);
-    splat->classification = (uint8_t)(spl_bits_part(chunk->extra_bits, SPL_EXTRA_CLASS_BASE, 8) +
-                                      take(page + spl_chunk_class_word(chunk), &bit, class_width(chunk)));
-    uint32_t width = uncertainty_width(chunk);
-    bit = i * width;
-    uint32_t code = take(page + spl_chunk_uncertainty_word(chunk), &bit, width);
-    splat->uncertainty =
-        width && code == (1u << width) - 1 ? 0.0f : chunk->uncertainty_max * exp2f(-0.5f * (float)code);
 }

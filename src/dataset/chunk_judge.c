@@ -38,14 +38,13 @@ const char *spl_discs_judge(const struct spl_chunk *c)
         c->normal_v + c->normal_step * (float)((1u << v) - 1) > 4)
         return "has normals off the octahedron";
     if ((g >> SPL_GEOMETRY_AXIS & 3) == 3 || g >> SPL_GEOMETRY_LINEAR > SPL_LINEAR_SOME)
-        return "has geometry bits that version 1 does not know";
+        return "has geometry bits that version 2 does not know";
     int base_u = (int16_t)(c->color_base & 0xffff), base_v = (int16_t)(c->color_base >> 16);
     if ((color >> SPL_COLOR_Y & 15) > 8 || (color >> SPL_COLOR_U & 15) > 9 || (color >> SPL_COLOR_V & 15) > 9 ||
         color & 0xff00f000u || abs(base_u) > 255 || abs(base_v) > 255)
         return "has colours wider than 8 bits";
-    if ((extra >> SPL_EXTRA_CLASS & 15) > 8 || (extra >> SPL_EXTRA_UNCERTAINTY & 15) > SPL_UNCERTAINTY_BITS_MAX ||
-        !(c->uncertainty_max >= 0 && isfinite(c->uncertainty_max)))
-        return "has classes or uncertainties that no file of version 1 has";
+    if (extra & ~(255u << SPL_EXTRA_CLIP | 255u << SPL_EXTRA_KIND))
+        return "has extra bits that version 2 does not know";
     if (spl_clip_count(c) > c->count)
         return "has more clip lines than splats";
     return NULL;

@@ -22,15 +22,13 @@ static uint32_t encode(const struct spl_splat *splats, const double (*position)[
                        const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                        struct spl_chunk_error *error)
 {
-    struct spl_chunk_options vertices = *options;
     uint32_t lines = 0;
-    vertices.has_class = vertices.has_uncertainty = false;
     spl_assert(count >= 2 && count <= SPL_CHUNK_SPLATS && !splats[count - 1].linear);
     for (uint32_t i = 0; i < count; i++) {
         lines += !splats[i].linear;
         spl_assert(splats[i].linear || (i && splats[i - 1].linear)); /* a vertex that no piece has costs bits */
     }
-    uint32_t used = spl_discs_encode(splats, position, count, &vertices, chunk, words, error);
+    uint32_t used = spl_discs_encode(splats, position, count, options, chunk, words, error);
     chunk->extra_bits = lines << SPL_EXTRA_LINES | (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND;
     spl_assert(used == spl_discs_words(chunk)); /* no clip lines */
     return used;
@@ -42,8 +40,7 @@ static const char *judge(const struct spl_chunk *chunk)
     const char *what = spl_discs_judge(chunk);
     if (what)
         return what;
-    if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != SPL_LINEAR_SOME || chunk->extra_bits & ~known ||
-        chunk->uncertainty_max != 0)
+    if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != SPL_LINEAR_SOME || chunk->extra_bits & ~known)
         return "has fields that lines do not have";
     if (!line_count(chunk) || 2 * line_count(chunk) > chunk->count)
         return "has no lines, or too many for its vertices";
@@ -52,7 +49,7 @@ static const char *judge(const struct spl_chunk *chunk)
 
 static void add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT])
 {
-    bits[SPL_ATTRIBUTE_LINES] += 32ull * spl_discs_words(chunk) + 8 * sizeof *chunk;
+    bits[SPL_ATTRIBUTE_LINES] += 32ull * spl_discs_words(chunk) + 8 * SPL_CHUNK_BYTES;
 }
 
 const struct spl_chunk_codec spl_codec_lines = {

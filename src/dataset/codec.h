@@ -21,7 +21,7 @@ struct spl_chunk_codec {
 /* The row of `kind`; NULL where there is none, which is a file's mistake. */
 const struct spl_chunk_codec *spl_chunk_get_codec(uint32_t kind);
 
-/* The rows' functions. Lines are vertices that are encoded as discs without class, uncertainty and clip line. */
+/* The rows' functions. Lines are vertices that are encoded as discs without clip line. */
 uint32_t spl_discs_words(const struct spl_chunk *chunk);
 uint32_t spl_discs_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,

@@ -125,13 +125,13 @@ const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *da
     return &dataset->info;
 }
 
-const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count)
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count)
 {
     *count = dataset->info.nodes;
     return dataset->nodes;
 }
 
-const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count)
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count)
 {
     *count = dataset->info.chunks;
     return dataset->chunks;
@@ -228,12 +228,11 @@ int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t w
 const char *spl_attribute_name(enum spl_attribute attribute)
 {
     static const char *const names[SPL_ATTRIBUTE_COUNT] = {
-        [SPL_ATTRIBUTE_POSITION] = "position",     [SPL_ATTRIBUTE_RADIUS] = "radius",
-        [SPL_ATTRIBUTE_NORMAL] = "normal",         [SPL_ATTRIBUTE_COLOR] = "color",
-        [SPL_ATTRIBUTE_CLASS] = "class",           [SPL_ATTRIBUTE_UNCERTAINTY] = "uncertainty",
-        [SPL_ATTRIBUTE_LINEAR] = "linear",         [SPL_ATTRIBUTE_CLIP] = "clip",
-        [SPL_ATTRIBUTE_LINES] = "lines",           [SPL_ATTRIBUTE_CHUNK] = "chunk",
-        [SPL_ATTRIBUTE_TEXTURE] = "texture",       [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
+        [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
+        [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
+        [SPL_ATTRIBUTE_LINEAR] = "linear",     [SPL_ATTRIBUTE_CLIP] = "clip",
+        [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_CHUNK] = "chunk",
+        [SPL_ATTRIBUTE_TEXTURE] = "texture",   [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return names[attribute];
 }

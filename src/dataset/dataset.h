@@ -10,6 +10,7 @@
 
 #include "dataset/format.h"
 #include "dataset/source.h"
+#include "dataset/streams.h"
 #include "sparse/dictionary.h"
 
 /* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL)
@@ -22,15 +23,16 @@ int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *can
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
 
-const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint32_t *count);
-const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint32_t *count);
+const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count);
+const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 
 /* Bytes of page `index` (< info.pages). */
 size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index);
 
-/* Reads page `index` (< info.pages) to `out`, which has room for its bytes, and holds it against its checksum where the dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or
- * overwritten in place since. Any thread; blocks on disk. What a daemon reads pages with. */
+/* Reads page `index` (< info.pages) to `out`, which has room for its bytes, and holds it against its checksum where the
+ * dataset was opened with `verify`. SPL_E_CORRUPT when the file was cut or overwritten in place since. Any thread;
+ * blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
 /* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, the words of CTEX (one a
@@ -59,13 +61,27 @@ const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t
 /* Reads and decodes splat `id` of any level, or the vertex of a line that has this id; false (*splat untouched) when
  * there is none, or the file was cut short in place. Its position is relative to its node. Any thread; blocks on disk. */
 struct spl_splat;
-bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint32_t id, struct spl_splat *splat);
+bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat);
+
+/* Optional attributes: `streams` has a row for each, in the order of the file. */
+const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *dataset, uint32_t *count);
+
+/* Index of the stream of this name; -1 where there is none, or none that we can read. */
+int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name);
+
+/* Reads the value of stream `stream` (as find_stream says; -1: none) of splat `id`; false (*value untouched) as
+ * find_splat. Any thread; blocks on disk. */
+bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
+
+/* Words that the first `streams` streams of a chunk take behind its own. */
+uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk);
 
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
- *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "class": bool,
- *   "uncertainty": bool, "surface": bool (optional, true)}, "sources" [string], "pack" {...} (optional, free: settings,
- * statistics), "stations"
+ *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
+ *   bool (optional, true)}, "streams" [{"name": string, "type": string, "unit": string}] (optional; the writer's),
+ *   "unit" "m" | "ft" | "us-ft" | "unknown" (optional), "crs" string or null (optional), "sources" [string], "pack"
+ * {...} (optional, free: settings, statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |
  *   "constant" | "photographs", "points": int}] (optional): where colours come from; those from photographs have taken
  *   the place of the others, whose points are all that were read. */

@@ -3,12 +3,13 @@
 #ifndef SPL_DATASET_FORMAT_H
 #define SPL_DATASET_FORMAT_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "shared.h" /* SPL_CHUNK_SPLATS */
 
 #define SPL_FILE_MAGIC "SPLD\r\n\x1a\n"
-#define SPL_FILE_VERSION 1u
+#define SPL_FILE_VERSION 2u
 #define SPL_FILE_ALIGNMENT 65536u  /* of pages; other sections start on 64 bytes */
 #define SPL_PAGE_BYTES (16u << 20) /* target; a page is at most SPL_PAGE_BYTES_MAX */
 #define SPL_PAGE_BYTES_MAX (64u << 20)
@@ -30,7 +31,8 @@ struct spl_file_header { /* at offset 0 */
 #define SPL_FOURCC(a, b, c, d) ((uint32_t)(a) | (uint32_t)(b) << 8 | (uint32_t)(c) << 16 | (uint32_t)(d) << 24)
 #define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')   /* JSON: sources, counts, statistics, default view */
 #define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E')  /* struct spl_node[], breadth first, node 0 is the root */
-#define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* struct spl_chunk[] */
+#define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* the first SPL_CHUNK_BYTES of each struct spl_chunk */
+#define SPL_SECTION_STREAM SPL_FOURCC('S', 'T', 'R', 'M') /* bases and widths of an attribute; `index` as in META */
 #define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
 #define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, cosine coefficients */
@@ -51,22 +53,20 @@ struct spl_node {
     float size;       /* edge of the cube */
     float spacing;    /* median distance of neighbouring splats, metres: median radius / SPL_RADIUS_SPACING */
     float box_min[3], box_max[3]; /* of its splats' and all descendants' discs, relative to origin */
-    uint32_t first_child;         /* children are consecutive; 0 and count 0 for a leaf */
-    uint32_t child_count;         /* 0..8 */
-    uint32_t first_chunk, chunk_count;
-    uint32_t page;  /* all chunks of a node lie in one page */
-    uint32_t depth; /* root = 0 */
+    uint64_t first_child;         /* children are consecutive; 0 and count 0 for a leaf */
+    uint64_t first_chunk;
+    uint32_t page;        /* all chunks of a node lie in one page */
+    uint16_t chunk_count; /* 1..SPL_NODE_CHUNKS_MAX */
+    uint8_t child_count;  /* 0..8 */
+    uint8_t depth;        /* root = 0 */
 };
 
-/* extra_bits: width of a class 0..3 (0..8 bits), width of an uncertainty 4..7 (0..5), base of the classes 8..15, number
- * of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31. */
-#define SPL_EXTRA_CLASS 0
-#define SPL_EXTRA_UNCERTAINTY 4
-#define SPL_EXTRA_CLASS_BASE 8
+/* extra_bits: number of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31; on disk, the
+ * number of splats 0..7. */
+#define SPL_EXTRA_COUNT 0
 #define SPL_EXTRA_CLIP 16
 #define SPL_EXTRA_LINES 16
 #define SPL_EXTRA_KIND 24
-#define SPL_UNCERTAINTY_BITS_MAX 5
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
 #define SPL_PAGE_TAIL_WORDS 2
@@ -78,10 +78,10 @@ enum spl_chunk_kind {
     SPL_CHUNK_KINDS
 };
 
-/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order
- * of their lines, with the same fields but for class, uncertainty and clip lines. Streams of fixed-width codes, each stream
- * starting on a word: geometry (x y z u v radius), colour (y u v), class, uncertainty. A splat's fields lie one after
- * the other from the low bits up. */
+/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order of
+ * their lines, with the same fields but for clip lines. Streams of fixed-width codes, each stream starting on a word:
+ * geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional attributes (streams.h),
+ * which vertices do not have. A splat's fields lie one after the other from the low bits up. */
 struct spl_chunk {
     float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;
@@ -92,11 +92,14 @@ struct spl_chunk {
     uint32_t geometry_bits; /* as in shared.h */
     uint32_t color_bits;    /* as in shared.h */
     uint32_t color_base;
-    uint32_t extra_bits;   /* SPL_EXTRA_* */
-    float uncertainty_max; /* uncertainty = max * 2^-(code / 2), the last code = 0; width 0: all are max */
-    uint32_t first_id;     /* dataset-wide index of its first splat or vertex */
-    uint32_t count;
+    uint32_t extra_bits; /* SPL_EXTRA_* */
+
+    /* Not on disk. */
+    uint32_t count;    /* there in extra_bits, here taken out of them */
+    uint64_t first_id; /* dataset-wide index of its first splat or vertex: the sum of the counts before it */
 };
+
+#define SPL_CHUNK_BYTES 60u /* of a chunk on disk */
 
 /* enum spl_chunk_kind, or SPL_CHUNK_KINDS and more in a file that opening refuses. */
 static inline uint32_t spl_chunk_kind(const struct spl_chunk *chunk)
@@ -119,7 +122,7 @@ struct spl_atoms_header {
 _Static_assert(sizeof(struct spl_file_header) == 56, "on disk");
 _Static_assert(sizeof(struct spl_section) == 32, "on disk");
 _Static_assert(sizeof(struct spl_node) == 80, "on disk");
-_Static_assert(sizeof(struct spl_chunk) == 72, "on disk");
+_Static_assert(offsetof(struct spl_chunk, count) == SPL_CHUNK_BYTES, "on disk");
 _Static_assert(sizeof(struct spl_atoms_header) == 16, "on disk");
 
 #endif

@@ -58,12 +58,12 @@ static int get_view(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
-static int get_flag(const struct spl_dataset *dataset, const char *name, bool *out, struct spl_error *err)
+static int get_color(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const json_t *value = json_object_get(json_object_get(dataset->meta, "attributes"), name);
+    const json_t *value = json_object_get(json_object_get(dataset->meta, "attributes"), "color");
     if (!json_is_boolean(value))
-        return wrong(dataset, err, "attributes", "must say of color, class and uncertainty whether they were given");
-    *out = json_is_true(value);
+        return wrong(dataset, err, "attributes", "must say whether there is a \"color\", true or false");
+    dataset->info.has_color = json_is_true(value);
     return SPL_OK;
 }
 
@@ -105,6 +105,23 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
     for (size_t i = 0; i < json_array_size(sources); i++)
         if (!json_is_string(json_array_get(sources, i)))
             return wrong(dataset, err, "sources", "must be an array of names");
+    return SPL_OK;
+}
+
+/* Optional: what coordinates are in, and where on earth. */
+static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
+{
+    static const char *const units[] = {"unknown", "m", "ft", "us-ft"};
+    const json_t *unit = json_object_get(dataset->meta, "unit"), *crs = json_object_get(dataset->meta, "crs");
+    const char *said = unit ? json_string_value(unit) : units[0];
+    size_t i = 0;
+    while (i < sizeof units / sizeof *units && (!said || strcmp(said, units[i])))
+        i++;
+    if (i == sizeof units / sizeof *units)
+        return wrong(dataset, err, "unit", "must be m, ft, us-ft or unknown");
+    if (crs && !json_is_null(crs) && !json_is_string(crs))
+        return wrong(dataset, err, "crs", "must be a text (WKT, or EPSG and a number), or null");
+    strcpy(dataset->info.unit, units[i]);
     return SPL_OK;
 }
 
@@ -156,11 +173,7 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     if (!rc)
         rc = get_view(dataset, err);
     if (!rc)
-        rc = get_flag(dataset, "color", &info->has_color, err);
-    if (!rc)
-        rc = get_flag(dataset, "class", &info->has_class, err);
-    if (!rc)
-        rc = get_flag(dataset, "uncertainty", &info->has_uncertainty, err);
+        rc = get_color(dataset, err);
     if (!rc)
         rc = get_surface(dataset, err);
     if (!rc)
@@ -169,6 +182,10 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = check_stations(dataset, err);
     if (!rc)
         rc = check_color(dataset, err);
+    if (!rc)
+        rc = get_unit(dataset, err);
+    if (!rc)
+        rc = spl_dataset_read_streams(dataset, err);
     if (rc)
         return rc;
     for (int a = 0; a < 3; a++)

@@ -18,6 +18,7 @@ struct pass {
     uint32_t *page;      /* of the old one */
     uint32_t page_index; /* UINT32_MAX = none yet */
     uint32_t *words;     /* of the node's chunks */
+    uint32_t stream_count;
     uint32_t *texture_words, *chunk_texture;
 };
 
@@ -33,15 +34,20 @@ static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
     return spl_dataset_read_page(p->what->from, index, page, err);
 }
 
-/* The chunk's streams with the colours wanted; returns the words appended. */
-static uint32_t copy_chunk(struct pass *p, struct spl_chunk *chunk, uint32_t *words)
+/* The words of chunk `index` with the colours wanted; returns how many were appended. */
+static uint32_t copy_chunk(struct pass *p, uint64_t index, uint32_t *words)
 {
-    struct spl_chunk from = *chunk;
-    if (p->what->colors)
-        return spl_chunk_recolor(&from, p->page, p->what->colors + from.first_id, chunk, words);
-    uint32_t count = spl_chunk_words(&from);
-    memcpy(words, p->page + from.geometry_word, count * sizeof *words);
-    return count;
+    struct spl_chunk from = p->chunks[index];
+    uint32_t own = spl_chunk_words(&from),
+             streams = spl_dataset_get_stream_words(p->what->from, p->stream_count, index);
+    const uint32_t *page = p->page + from.geometry_word;
+    if (!p->what->colors) {
+        memcpy(words, page, (own + streams) * sizeof *words);
+        return own + streams;
+    }
+    uint32_t used = spl_chunk_recolor(&from, p->page, p->what->colors + from.first_id, &p->chunks[index], words);
+    memcpy(words + used, page + own, streams * sizeof *words);
+    return used + streams;
 }
 
 static int write_node(struct pass *p, struct spl_node *node, struct spl_error *err)
@@ -52,7 +58,7 @@ static int write_node(struct pass *p, struct spl_node *node, struct spl_error *e
     size_t used = 0;
     int rc = load_page(p, node->page, err);
     for (uint32_t i = 0; i < node->chunk_count && !rc; i++) {
-        uint32_t count = copy_chunk(p, &chunks[i], p->words + used);
+        uint32_t count = copy_chunk(p, node->first_chunk + i, p->words + used);
         chunks[i].geometry_word = (uint32_t)used;
         used += count;
         if (!dictionary)
@@ -85,15 +91,16 @@ static json_t *make_meta(const struct spl_retexture *what)
     return meta;
 }
 
-static int allocate(struct pass *p, uint32_t node_count, uint32_t chunk_count, struct spl_error *err)
+static int allocate(struct pass *p, uint64_t node_count, uint64_t chunk_count, struct spl_error *err)
 {
     size_t most = 0;
-    for (uint32_t i = 0; i < node_count; i++)
+    for (uint64_t i = 0; i < node_count; i++)
         most = p->nodes[i].chunk_count > most ? p->nodes[i].chunk_count : most;
     size_t texture_words = p->what->dictionary ? most * SPL_TEXTURE_WORDS_MAX : 1;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(p->what->from, &chunk_count);
     p->chunks = spl_alloc_raw(chunk_count, sizeof *p->chunks, err);
-    p->words = spl_alloc_raw(most * SPL_CHUNK_WORDS_MAX, sizeof *p->words, err);
+    p->words =
+        spl_alloc_raw(most * (SPL_CHUNK_WORDS_MAX + p->stream_count * SPL_STREAM_WORDS_MAX), sizeof *p->words, err);
     p->texture_words = spl_alloc_raw(texture_words, sizeof *p->texture_words, err);
     p->chunk_texture = spl_alloc_raw(most, sizeof *p->chunk_texture, err);
     if (!p->chunks || !p->words || !p->texture_words || !p->chunk_texture)
@@ -108,8 +115,9 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
     if (what.dictionary && !what.dictionary->count)
         what.dictionary = NULL;
     struct pass p = {.what = &what, .page_index = UINT32_MAX};
-    uint32_t node_count, chunk_count = spl_dataset_get_info(what.from)->chunks;
+    uint64_t node_count, chunk_count = spl_dataset_get_info(what.from)->chunks;
     const struct spl_node *nodes = spl_dataset_get_nodes(what.from, &node_count);
+    const struct spl_stream *streams = spl_dataset_get_streams(what.from, &p.stream_count);
     json_t *meta = make_meta(&what);
     p.nodes = spl_alloc_raw(node_count, sizeof *nodes, err);
     int rc = SPL_E_NOMEM;
@@ -120,9 +128,10 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
     memcpy(p.nodes, nodes, node_count * sizeof *nodes);
     if ((rc = allocate(&p, node_count, chunk_count, err)) || (rc = spl_dataset_writer_create(path, &p.writer, err)))
         goto done;
+    spl_dataset_writer_set_streams(p.writer, streams, p.stream_count);
     if (what.dictionary)
         rc = spl_dataset_writer_set_dictionary(p.writer, what.dictionary, err);
-    for (uint32_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
+    for (uint64_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
         rc = p.nodes[i].first_chunk == next
                  ? write_node(&p, &p.nodes[i], err)
                  : spl_fail(err, SPL_E_UNSUPPORTED, "the chunks of %s are not in the order of its nodes; pack it again",

@@ -17,13 +17,13 @@ struct spl_retexture {
     /* Sets the codes of chunk `chunk`, whose splats are chunks[chunk].first_id on: called once for each, in rising
      * order, from the calling thread. A return below 0 ends the writing with it. Not called where there is no
      * dictionary. */
-    int (*code_chunk)(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err);
+    int (*code_chunk)(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err);
     void *context;
     const json_t *color_source; /* put before what META's "color" has; NULL = nothing */
     const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */
 };
 
-/* Writes `path` (temporary file, sync, rename): geometry, classes and uncertainties are copied bit for bit. Blocks on
+/* Writes `path` (temporary file, sync, rename): geometry and optional attributes are copied bit for bit. Blocks on
  * disk; holds two pages in memory. Errors of the disk, of pages that were overwritten, SPL_E_NOMEM, SPL_E_LIMIT where a
  * node's codes are larger than a page, and those of code_chunk. */
 int spl_dataset_retexture(const struct spl_retexture *retexture, const char *path, struct spl_error *err);

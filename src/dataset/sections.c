@@ -19,11 +19,13 @@ enum { table_alignment = 8 };
 /* A kind of section: a row to add, not code. */
 static const struct kind {
     uint32_t type;
-    bool by_page;  /* one a page, in their order; else once in a file */
+    enum { ONCE, BY_PAGE, BY_STREAM } number; /* in a file, or one for each page or stream, in their order */
     bool required;
-    bool kept;     /* in memory, from open to close */
-    bool texture;  /* a file has all of these kinds or none */
+    bool kept;    /* in memory, from open to close */
+    bool texture; /* a file has all of these kinds or none */
     uint32_t alignment, item_bytes;
+    uint32_t room_bytes; /* of an item in memory, where that is more: items lie at the end of their copy, so that a
+                            check can lay them out anew from its start */
     uint64_t bytes_min, bytes_max;
     const char *wrong_size;
     int (*check)(struct spl_dataset *dataset, struct spl_error *err); // may be NULL: nothing more than the checksum
@@ -38,17 +40,20 @@ static const struct kind {
                                  .item_bytes = sizeof(uint32_t), .bytes_max = UINT64_MAX,
                                  .wrong_size = "has not one word for each chunk"},
     [SPL_KIND_CHUNKS] = {SPL_SECTION_CHUNKS, .required = true, .kept = true, .alignment = 64,
-                         .item_bytes = sizeof(struct spl_chunk), .bytes_min = sizeof(struct spl_chunk),
-                         .bytes_max = UINT32_MAX * sizeof(struct spl_chunk),
+                         .item_bytes = SPL_CHUNK_BYTES, .room_bytes = sizeof(struct spl_chunk),
+                         .bytes_min = SPL_CHUNK_BYTES, .bytes_max = UINT64_MAX,
                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_chunks},
+    [SPL_KIND_STREAMS] = {SPL_SECTION_STREAM, .number = BY_STREAM, .kept = true, .alignment = 64,
+                          .item_bytes = SPL_STREAM_CHUNK_BYTES, .bytes_max = UINT64_MAX,
+                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_streams},
     [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
                         .item_bytes = sizeof(struct spl_node), .bytes_min = sizeof(struct spl_node),
-                        .bytes_max = UINT32_MAX * sizeof(struct spl_node),
-                        .wrong_size = "is not a whole number of nodes", .check = spl_dataset_check_nodes},
-    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .by_page = true, .required = true, .alignment = SPL_FILE_ALIGNMENT,
+                        .bytes_max = UINT64_MAX, .wrong_size = "is not a whole number of nodes",
+                        .check = spl_dataset_check_nodes},
+    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .alignment = SPL_FILE_ALIGNMENT,
                         .item_bytes = sizeof(uint32_t), .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t),
                         .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have"},
-    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .by_page = true, .texture = true, .alignment = 64,
+    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .number = BY_PAGE, .texture = true, .alignment = 64,
                            .item_bytes = sizeof(uint32_t), .bytes_min = SPL_TEXTURE_TAIL_WORDS * sizeof(uint32_t),
                            .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have",
                            .check = spl_dataset_check_textures},
@@ -83,7 +88,7 @@ static const char *section_name(const struct spl_section *section, char text[40]
     const struct kind *kind = kind_of(section);
     char letters[5];
     letters_of(section->type, letters);
-    if (kind && kind->by_page)
+    if (kind && kind->number)
         snprintf(text, 40, "section %s %u", letters, section->index);
     else
         snprintf(text, 40, "section %s", letters);
@@ -95,12 +100,13 @@ static int not_a_dataset(const struct spl_dataset *dataset, const char first[8],
 {
     static const struct {
         const char *start, *kind;
-    } others[] = {{"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
+    } others[] = {
+        {"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         if (dataset->source.size > strlen(others[i].start) && !memcmp(first, others[i].start, strlen(others[i].start)))
             return spl_fail(err, SPL_E_INPUT,
-                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one",
-                            dataset->name, others[i].kind);
+                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one", dataset->name,
+                            others[i].kind);
     size_t letters = dataset->source.size < 4 ? (size_t)dataset->source.size : 4;
     if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
@@ -125,12 +131,12 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
                         sizeof *header - bytes, sizeof *header);
     if (header->version != SPL_FILE_VERSION)
         return spl_fail(err, SPL_E_UNSUPPORTED,
-                        "%s: header says format version %u, this splatd reads version %u; pack the scan again with it",
-                        dataset->name, header->version, SPL_FILE_VERSION);
+                        "%s: header says format version %u, this splatd reads version %u; pack it again", dataset->name,
+                        header->version, SPL_FILE_VERSION);
     if (header->header_hash != XXH3_64bits(header, offsetof(struct spl_file_header, header_hash)))
         return corrupt(dataset, err, "header", "fails its checksum");
     if (header->header_bytes != sizeof *header || header->reserved)
-        return corrupt(dataset, err, "header", "has a size or a reserved field that version 1 does not have");
+        return corrupt(dataset, err, "header", "has a size or a reserved field that version 2 does not have");
     if (header->file_bytes > dataset->source.size)
         return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %llu of its %llu bytes are missing", dataset->name,
                         (unsigned long long)(header->file_bytes - dataset->source.size),
@@ -179,15 +185,22 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
     return SPL_OK;
 }
 
-/* A section as it is in the file, malloc'd; NULL and `err` when it cannot be read. */
+/* What a copy has before its section's bytes. */
+static uint64_t room_before(const struct spl_section *section)
+{
+    const struct kind *kind = kind_of(section);
+    return kind->room_bytes ? section->bytes / kind->item_bytes * (kind->room_bytes - kind->item_bytes) : 0;
+}
+
+/* A section as it is in the file, malloc'd, behind its room; NULL and `err` when it cannot be read. */
 static void *copy_section(const struct spl_dataset *dataset, const struct spl_section *section, struct spl_error *err)
 {
-    const uint64_t block = 16 << 20;
-    char *copy = spl_alloc_raw(section->bytes, 1, err);
+    const uint64_t block = 16 << 20, room = room_before(section);
+    char *copy = spl_alloc_raw(room + section->bytes, 1, err);
     for (uint64_t done = 0; copy && done < section->bytes; done += block) {
         uint64_t left = section->bytes - done;
         if (spl_dataset_check_cancelled(dataset, err) ||
-            spl_dataset_read(dataset, section->offset + done, copy + done, left < block ? left : block, err)) {
+            spl_dataset_read(dataset, section->offset + done, copy + room + done, left < block ? left : block, err)) {
             free(copy);
             return NULL;
         }
@@ -209,7 +222,7 @@ static int check_numbers(const struct spl_dataset *dataset, struct spl_error *er
         snprintf(what, sizeof what, "lists no section %s", letters);
         if (kinds[k].required && !count)
             return corrupt(dataset, err, "section table", what);
-        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].by_page ? dataset->info.pages : 1))
+        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].number == BY_PAGE ? dataset->info.pages : 1))
             return corrupt(dataset, err, "section table", some);
     }
     return SPL_OK;
@@ -237,19 +250,19 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
         struct spl_section_list *list = kind ? &dataset->found[kind - kinds] : NULL;
         if (!kind)
             continue;
-        if (kind->by_page ? s->index != list->count : s->index || list->count)
-            return corrupt(dataset, err, section_name(s, name), kind->by_page ? "is out of order" : "occurs twice");
+        if (kind->number ? s->index != list->count : s->index || list->count)
+            return corrupt(dataset, err, section_name(s, name), kind->number ? "is out of order" : "occurs twice");
         if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
             return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
         list->at[list->count++] = s;
-        dataset->info.page_bytes += kind->by_page ? s->bytes : 0;
+        dataset->info.page_bytes += kind->number == BY_PAGE ? s->bytes : 0;
     }
     dataset->info.pages = dataset->found[SPL_KIND_PAGES].count;
     int rc = check_numbers(dataset, err);
     if (rc)
         return rc;
-    dataset->info.nodes = (uint32_t)(dataset->found[SPL_KIND_NODES].at[0]->bytes / sizeof(struct spl_node));
-    dataset->info.chunks = (uint32_t)(dataset->found[SPL_KIND_CHUNKS].at[0]->bytes / sizeof(struct spl_chunk));
+    dataset->info.nodes = dataset->found[SPL_KIND_NODES].at[0]->bytes / sizeof(struct spl_node);
+    dataset->info.chunks = dataset->found[SPL_KIND_CHUNKS].at[0]->bytes / SPL_CHUNK_BYTES;
     return SPL_OK;
 }
 
@@ -294,7 +307,7 @@ static int check_section(const struct spl_dataset *dataset, uint32_t index, bool
     uint64_t hash = section->hash;
     int rc = SPL_OK;
     if (dataset->copies[index])
-        hash = XXH3_64bits(dataset->copies[index], section->bytes);
+        hash = XXH3_64bits((const char *)dataset->copies[index] + room_before(section), section->bytes);
     else if (verify)
         rc = spl_dataset_hash_section(dataset, section, &hash, NULL);
     return rc ? rc : hash == section->hash ? SPL_OK : SPL_E_CORRUPT;

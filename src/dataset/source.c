@@ -71,9 +71,11 @@ int spl_dataset_source_open_file(const char *path, struct spl_dataset_source *ou
     if (rc)
         close_file(file);
     else
-        *out = (struct spl_dataset_source){
-            .size = file->bytes, .read = read_file, .close = close_file, .context = file,
-                                   .map = file->bytes ? file->map : NULL};
+        *out = (struct spl_dataset_source){.size = file->bytes,
+                                           .read = read_file,
+                                           .close = close_file,
+                                           .context = file,
+                                           .map = file->bytes ? file->map : NULL};
     return rc;
 }
 
@@ -88,8 +90,8 @@ struct spl_dataset_source spl_dataset_source_of_memory(const void *bytes, size_t
     return (struct spl_dataset_source){.size = size, .read = read_memory, .context = (void *)bytes, .map = bytes};
 }
 
-int spl_dataset_source_read(const struct spl_dataset_source *source, const char *name, uint64_t offset, void *out, size_t bytes,
-                    struct spl_error *err)
+int spl_dataset_source_read(const struct spl_dataset_source *source, const char *name, uint64_t offset, void *out,
+                            size_t bytes, struct spl_error *err)
 {
     spl_assert(offset <= source->size && bytes <= source->size - offset);
     for (char *to = out; bytes;) {

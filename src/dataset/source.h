@@ -9,8 +9,8 @@
 
 struct spl_dataset_source {
     uint64_t size; /* bytes; what is read always lies within */
-    /* Puts up to `bytes` (> 0) bytes from `offset` on into `out`. Returns how many, at least one; 0 where the source has
-     * become shorter; -errno. From any thread, from several at once; may block. */
+    /* Puts up to `bytes` (> 0) bytes from `offset` on into `out`. Returns how many, at least one; 0 where the source
+     * has become shorter; -errno. From any thread, from several at once; may block. */
     int64_t (*read)(void *context, uint64_t offset, void *out, size_t bytes);
     void (*close)(void *context); // may be NULL
     void *context;
@@ -23,10 +23,10 @@ int spl_dataset_source_open_file(const char *path, struct spl_dataset_source *ou
 /* `bytes` are borrowed until close and must not change. */
 struct spl_dataset_source spl_dataset_source_of_memory(const void *bytes, size_t size);
 
-/* Reads all of `bytes`, in as many calls as it takes; `name` is the source's in errors: SPL_E_CORRUPT when it has become
- * shorter, SPL_E_IO. Any thread. */
-int spl_dataset_source_read(const struct spl_dataset_source *source, const char *name, uint64_t offset, void *out, size_t bytes,
-                    struct spl_error *err);
+/* Reads all of `bytes`, in as many calls as it takes; `name` is the source's in errors: SPL_E_CORRUPT when it has
+ * become shorter, SPL_E_IO. Any thread. */
+int spl_dataset_source_read(const struct spl_dataset_source *source, const char *name, uint64_t offset, void *out,
+                            size_t bytes, struct spl_error *err);
 
 /* Leaves it zeroed; a zeroed source is nothing to close. */
 void spl_dataset_source_close(struct spl_dataset_source *source);

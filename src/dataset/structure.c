@@ -3,6 +3,7 @@
  * nodes and chunks, and never more memory than a byte a chunk. The opener's thread. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "dataset/codec.h"
@@ -66,17 +67,18 @@ static const char *judge_child(const struct spl_node *parent, const struct spl_n
 int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
-    for (uint32_t i = 0; i < info->chunks; i++) {
-        const struct spl_chunk *chunk = &dataset->chunks[i];
+    const char *from = (const char *)dataset->chunks + info->chunks * (sizeof(struct spl_chunk) - SPL_CHUNK_BYTES);
+    for (uint64_t i = 0; i < info->chunks; i++, from += SPL_CHUNK_BYTES) {
+        struct spl_chunk *chunk = &dataset->chunks[i];
+        memmove(chunk, from, SPL_CHUNK_BYTES); /* never beyond it: the rest lies behind */
+        chunk->count = chunk->extra_bits >> SPL_EXTRA_COUNT & 255;
+        chunk->extra_bits &= ~(255u << SPL_EXTRA_COUNT);
+        chunk->first_id = info->ids;
         const struct spl_chunk_codec *codec = spl_chunk_get_codec(spl_chunk_kind(chunk));
         const char *what = codec ? codec->judge(chunk) : "is of a kind that this version does not know";
-        if (!what && chunk->first_id != info->ids)
-            what = "does not continue the ids of the chunk before it";
         if (what)
             return wrong(dataset, err, "CHNK", "chunk", i, what);
         info->ids += chunk->count;
-        if (info->ids >= UINT32_MAX)
-            return wrong(dataset, err, "CHNK", "chunk", i, "ends beyond the largest id");
         codec->add_bits(chunk, info->attribute_bits);
         bool discs = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS;
         info->splats += discs ? chunk->count : 0;
@@ -88,7 +90,7 @@ int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
 }
 
 /* The chunks of one node: in its page, and in no other node. Adds up their splats. */
-static int claim_chunks(struct spl_dataset *dataset, uint32_t index, uint8_t *claimed, uint64_t *splats,
+static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *claimed, uint64_t *splats,
                         struct spl_error *err)
 {
     const struct spl_node *node = &dataset->nodes[index];
@@ -97,11 +99,13 @@ static int claim_chunks(struct spl_dataset *dataset, uint32_t index, uint8_t *cl
     if (node->first_chunk > dataset->info.chunks || node->chunk_count > dataset->info.chunks - node->first_chunk)
         return wrong(dataset, err, "NODE", "node", index, "names chunks that do not exist");
     uint64_t page_words = dataset->pages[node->page]->bytes / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS;
-    for (uint32_t i = node->first_chunk; i < node->first_chunk + node->chunk_count; i++) {
+    for (uint64_t i = node->first_chunk; i < node->first_chunk + node->chunk_count; i++) {
         const struct spl_chunk *chunk = &dataset->chunks[i];
         if (claimed[i])
             return wrong(dataset, err, "NODE", "node", index, "shares a chunk with another node");
-        if (chunk->geometry_word > page_words || spl_chunk_words(chunk) > page_words - chunk->geometry_word)
+        uint32_t words =
+            spl_chunk_words(chunk) + spl_streams_words(dataset->streams, dataset->info.stream_count, i, chunk->count);
+        if (chunk->geometry_word > page_words || words > page_words - chunk->geometry_word)
             return wrong(dataset, err, "CHNK", "chunk", i, "reaches beyond the end of its page");
         claimed[i] = 1;
         *splats += spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
@@ -117,7 +121,7 @@ static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_
     uint32_t depth = 0;
     if (dataset->nodes[0].depth != 0)
         return wrong(dataset, err, "NODE", "node", 0, "is the root, but its depth is not 0");
-    for (uint32_t i = 0; i < info->nodes; i++) {
+    for (uint64_t i = 0; i < info->nodes; i++) {
         const struct spl_node *node = &dataset->nodes[i];
         const char *what = judge_node(node);
         if (!what && i >= next)
@@ -154,15 +158,15 @@ static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_
 static int sort_nodes_by_page(struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_dataset_info *info = &dataset->info;
-    uint32_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
+    uint64_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
     dataset->page_nodes = first ? spl_alloc_raw(info->nodes, sizeof *dataset->page_nodes, err) : NULL;
     if (!dataset->page_nodes)
         return SPL_E_NOMEM;
-    for (uint32_t n = 0; n < info->nodes; n++)
+    for (uint64_t n = 0; n < info->nodes; n++)
         first[dataset->nodes[n].page + 2]++;
     for (uint32_t p = 2; p <= info->pages; p++)
         first[p] += first[p - 1];
-    for (uint32_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
+    for (uint64_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
         dataset->page_nodes[first[dataset->nodes[n].page + 1]++] = n;
     return SPL_OK;
 }

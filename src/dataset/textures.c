@@ -28,7 +28,7 @@ int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *
     spl_dataset_get_copy(dataset, SPL_KIND_CHUNK_TEXTURES, 0, &chunk_bytes);
     if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
         header->reserved[1])
-        return wrong(dataset, err, "ATOM", "has a size of textures or a reserved field that version 1 does not have");
+        return wrong(dataset, err, "ATOM", "has a size of textures or a reserved field that version 2 does not have");
     if (!header->count || header->count > SPL_DICTIONARY_MAX ||
         spl_dictionary_expanded_bytes(header->count, header->size) > SPL_DICTIONARY_BYTES_MAX)
         return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
@@ -58,9 +58,9 @@ int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *
 static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
 {
     size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_TEXTURE_TAIL_WORDS;
-    for (uint32_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
+    for (uint64_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
         const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
-        for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
+        for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
             uint32_t texture = dataset->chunk_textures[c], first = spl_texture_word(texture);
             if (!texture)
                 continue;
@@ -69,8 +69,9 @@ static int judge_page(const struct spl_dataset *dataset, uint32_t index, const u
                                                        dataset->chunks[c].count, dataset->dictionary.count)
                                    : "starts beyond the end of the section";
             if (what)
-                return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %u %s; pack the dataset again",
-                                dataset->info.id[0] ? dataset->info.id : dataset->name, index, c, what);
+                return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %llu %s; pack the dataset again",
+                                dataset->info.id[0] ? dataset->info.id : dataset->name, index,
+                                (unsigned long long)c, what);
         }
     }
     return SPL_OK;
@@ -147,9 +148,9 @@ static int count_page(const struct spl_dataset *dataset, uint32_t index, const u
 {
     (void)err;
     uint64_t *histogram = context;
-    for (uint32_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
+    for (uint64_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
         const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
-        for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
+        for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
             uint32_t texture = dataset->chunk_textures[c];
             if (spl_chunk_kind(&dataset->chunks[c]) != SPL_CHUNK_DISCS)
                 continue;

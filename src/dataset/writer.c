@@ -4,20 +4,15 @@
  * Owned by one thread at a time. */
 #include "dataset/writer.h"
 
-#include <errno.h>
-#include <fcntl.h>
-#include <glob.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <xxhash.h>
 
 #include "base/memory.h"
 #include "dataset/atoms.h"
 #include "dataset/dictionary.h"
+#include "dataset/part_file.h"
 
 enum { section_alignment = 64 };
 
@@ -28,14 +23,14 @@ struct words {
 };
 
 struct spl_dataset_writer {
-    char *path, *part_path;
-    int fd;
-    bool finished;
+    struct spl_part_file file;
     uint64_t offset;                         /* where the file ends so far */
     struct words page;                       /* the page being filled */
     struct words textures;                   /* of its chunks */
     struct words chunk_textures;             /* one of each chunk of the dataset */
     const struct spl_dictionary *dictionary; /* NULL = no textures */
+    const struct spl_stream *streams;        /* of all chunks */
+    uint32_t stream_count;
     struct spl_section *sections;
     size_t section_count, section_capacity;
     uint32_t page_count;
@@ -44,24 +39,6 @@ struct spl_dataset_writer {
 static uint64_t align(uint64_t offset, uint64_t alignment)
 {
     return (offset + alignment - 1) / alignment * alignment;
-}
-
-static int write_at(struct spl_dataset_writer *writer, uint64_t offset, const void *data, size_t bytes,
-                    struct spl_error *err)
-{
-    const char *p = data;
-    while (bytes) {
-        ssize_t n = pwrite(writer->fd, p, bytes, (off_t)offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return spl_fail_errno(err, n ? errno : ENOSPC, "cannot write %s at byte %llu", writer->part_path,
-                                  (unsigned long long)offset);
-        p += n;
-        offset += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
-    return SPL_OK;
 }
 
 static int add_section(struct spl_dataset_writer *writer, uint32_t type, uint32_t index, const void *data, size_t bytes,
@@ -82,7 +59,7 @@ static int add_section(struct spl_dataset_writer *writer, uint32_t type, uint32_
         .bytes = bytes,
         .hash = XXH3_64bits(data, bytes),
     };
-    int rc = write_at(writer, section.offset, data, bytes, err);
+    int rc = spl_part_file_write(&writer->file, section.offset, data, bytes, err);
     if (rc)
         return rc;
     writer->sections[writer->section_count++] = section;
@@ -128,66 +105,20 @@ static int reserve(struct words *words, size_t count, struct spl_error *err)
     return SPL_OK;
 }
 
-/* Removes what killed processes left of `path`: part files that nobody holds a lock on. */
-static void sweep(const char *path)
-{
-    char pattern[4096];
-    glob_t found = {0};
-    size_t used = 0;
-    if (strlen(path) > (sizeof pattern - 16) / 2)
-        return;
-    for (const char *c = path; *c; c++) {
-        if (strchr("*?[\\", *c))
-            pattern[used++] = '\\';
-        pattern[used++] = *c;
-    }
-    snprintf(pattern + used, sizeof pattern - used, ".part-[0-9]*");
-    if (!glob(pattern, GLOB_NOSORT, NULL, &found))
-        for (size_t i = 0; i < found.gl_pathc; i++) {
-            int fd = open(found.gl_pathv[i], O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-            if (fd >= 0 && !flock(fd, LOCK_EX | LOCK_NB))
-                unlink(found.gl_pathv[i]);
-            if (fd >= 0)
-                close(fd);
-        }
-    globfree(&found);
-}
-
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err)
 {
     *out = NULL;
     struct spl_dataset_writer *writer = spl_alloc(1, sizeof *writer, err);
     if (!writer)
         return SPL_E_NOMEM;
-    writer->fd = -1;
     writer->offset = sizeof(struct spl_file_header);
-    writer->path = strdup(path);
     int rc = reserve(&writer->page, SPL_PAGE_BYTES / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS, err);
+    if (!rc)
+        rc = spl_part_file_init(&writer->file, path, err);
     if (rc)
-        goto failed;
-    rc = SPL_E_NOMEM;
-    if (!writer->path || asprintf(&writer->part_path, "%s.part-%ld", path, (long)getpid()) < 0) {
-        writer->part_path = NULL;
-        spl_fail(err, rc, "out of memory for the name of %s", path);
-        goto failed;
-    }
-    sweep(path);
-    for (;;) { /* again where another's sweep came before our lock */
-        struct stat st;
-        writer->fd = open(writer->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (writer->fd < 0) {
-            rc = spl_fail_errno(err, errno, "cannot create %s", writer->part_path);
-            goto failed;
-        }
-        flock(writer->fd, LOCK_EX | LOCK_NB); /* in use; file systems without locks are not swept either */
-        if (fstat(writer->fd, &st) || st.st_nlink)
-            break;
-        close(writer->fd);
-    }
-    *out = writer;
-    return SPL_OK;
-failed:
-    spl_dataset_writer_destroy(writer);
+        spl_dataset_writer_destroy(writer);
+    else
+        *out = writer;
     return rc;
 }
 
@@ -200,7 +131,7 @@ int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const s
         return spl_fail(err, SPL_E_LIMIT,
                         "%s: a dictionary of %u atoms of %u x %u takes %llu MiB on a device, more than its %u; "
                         "take fewer or smaller atoms",
-                        writer->path, dictionary->count, dictionary->size, dictionary->size,
+                        writer->file.path, dictionary->count, dictionary->size, dictionary->size,
                         (unsigned long long)(bytes >> 20), SPL_DICTIONARY_BYTES_MAX >> 20);
     writer->dictionary = dictionary;
     return reserve(&writer->textures, 0, err);
@@ -231,8 +162,8 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
     size_t larger = word_count > textures->word_count ? word_count : textures->word_count;
     if (larger > SPL_PAGE_BYTES_MAX / sizeof(uint32_t) ||
         page_bytes(larger, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES_MAX)
-        return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)", writer->path,
-                        larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
+        return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)",
+                        writer->file.path, larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
     if (to->used &&
         (page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > SPL_PAGE_BYTES ||
          page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES)) {
@@ -261,22 +192,41 @@ int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_
                                                 &(struct spl_node_textures){0}, page, err);
 }
 
-static int sync_directory(const char *path, struct spl_error *err)
+void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams, uint32_t count)
 {
-    char *directory = strdup(path);
-    if (!directory)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", path);
-    char *slash = strrchr(directory, '/');
-    if (slash)
-        slash[slash == directory] = 0;
-    int fd = open(slash ? directory : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC), rc = SPL_OK;
-    /* Directories that one may write but not read, or that cannot be synced, are no reason to refuse. */
-    if (fd >= 0 && fsync(fd) && errno != EINVAL)
-        rc = spl_fail_errno(err, errno, "cannot sync the directory of %s", path);
-    if (fd >= 0)
-        close(fd);
-    free(directory);
+    spl_assert(count <= SPL_STREAMS_MAX);
+    writer->streams = streams;
+    writer->stream_count = count;
+}
+
+static int write_streams(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
+{
+    size_t bases = chunk_count * sizeof(uint32_t), all = chunk_count * SPL_STREAM_CHUNK_BYTES;
+    char *bytes = writer->stream_count ? spl_alloc_raw(all, 1, err) : NULL;
+    int rc = writer->stream_count && !bytes ? SPL_E_NOMEM : SPL_OK;
+    for (uint32_t s = 0; s < writer->stream_count && !rc; s++) {
+        memcpy(bytes, writer->streams[s].base, bases);
+        memcpy(bytes + bases, writer->streams[s].width, chunk_count);
+        rc = add_section(writer, SPL_SECTION_STREAM, s, bytes, all, err);
+    }
+    free(bytes);
     return rc;
+}
+
+/* META as the caller has it, and "streams"; NULL where memory is refused. */
+static char *describe(const struct spl_dataset_writer *writer, const json_t *meta)
+{
+    json_t *whole = json_copy((json_t *)meta), *streams = json_array();
+    for (uint32_t s = 0; s < writer->stream_count; s++) {
+        const struct spl_stream *stream = &writer->streams[s];
+        json_array_append_new(
+            streams, json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit", stream->unit));
+    }
+    bool failed = json_array_size(streams) != writer->stream_count;
+    failed |= json_object_set_new(whole, "streams", streams) != 0;
+    char *text = failed ? NULL : json_dumps(whole, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    json_decref(whole);
+    return text;
 }
 
 /* ATOM and CTEX. */
@@ -299,6 +249,22 @@ static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count,
                             chunk_count * sizeof(uint32_t), err);
 }
 
+static int write_chunks(struct spl_dataset_writer *writer, const struct spl_chunk *chunks, size_t chunk_count,
+                        struct spl_error *err)
+{
+    char *bytes = spl_alloc_raw(chunk_count, SPL_CHUNK_BYTES, err);
+    if (!bytes)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < chunk_count; i++) {
+        struct spl_chunk chunk = chunks[i];
+        chunk.extra_bits |= chunk.count << SPL_EXTRA_COUNT;
+        memcpy(bytes + i * SPL_CHUNK_BYTES, &chunk, SPL_CHUNK_BYTES);
+    }
+    int rc = add_section(writer, SPL_SECTION_CHUNKS, 0, bytes, chunk_count * SPL_CHUNK_BYTES, err);
+    free(bytes);
+    return rc;
+}
+
 static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                       const struct spl_chunk *chunks, size_t chunk_count, const char *meta, struct spl_error *err)
 {
@@ -308,7 +274,9 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
     if (!rc)
         rc = add_section(writer, SPL_SECTION_NODES, 0, nodes, node_count * sizeof *nodes, err);
     if (!rc)
-        rc = add_section(writer, SPL_SECTION_CHUNKS, 0, chunks, chunk_count * sizeof *chunks, err);
+        rc = write_chunks(writer, chunks, chunk_count, err);
+    if (!rc)
+        rc = write_streams(writer, chunk_count, err);
     if (!rc && writer->dictionary)
         rc = write_textures(writer, chunk_count, err);
     if (rc)
@@ -324,30 +292,24 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
     };
     header.file_bytes = header.table_offset + table_bytes;
     header.header_hash = XXH3_64bits(&header, offsetof(struct spl_file_header, header_hash));
-    rc = write_at(writer, header.table_offset, writer->sections, table_bytes, err);
-    return rc ? rc : write_at(writer, 0, &header, sizeof header, err);
+    rc = spl_part_file_write(&writer->file, header.table_offset, writer->sections, table_bytes, err);
+    return rc ? rc : spl_part_file_write(&writer->file, 0, &header, sizeof header, err);
 }
 
 int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                               const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
                               struct spl_error *err)
 {
-    spl_assert(!writer->finished && node_count && chunk_count);
-    char *text = json_dumps(meta, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    spl_assert(!writer->file.committed && node_count && chunk_count);
+    char *text = describe(writer, meta);
     if (!text)
-        return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->path);
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->file.path);
     int rc = strlen(text) > SPL_META_BYTES_MAX
                  ? spl_fail(err, SPL_E_LIMIT, "what describes the dataset has %zu bytes, a file takes %u", strlen(text),
                             SPL_META_BYTES_MAX)
                  : write_rest(writer, nodes, node_count, chunks, chunk_count, text, err);
-    if (!rc && fsync(writer->fd))
-        rc = spl_fail_errno(err, errno, "cannot sync %s", writer->part_path);
-    if (!rc && rename(writer->part_path, writer->path))
-        rc = spl_fail_errno(err, errno, "cannot rename %s to %s", writer->part_path, writer->path);
-    if (!rc) {
-        writer->finished = true;
-        rc = sync_directory(writer->path, err);
-    }
+    if (!rc)
+        rc = spl_part_file_commit(&writer->file, err);
     free(text);
     return rc;
 }
@@ -356,16 +318,10 @@ void spl_dataset_writer_destroy(struct spl_dataset_writer *writer)
 {
     if (!writer)
         return;
-    if (writer->fd >= 0) {
-        if (!writer->finished)
-            unlink(writer->part_path);
-        close(writer->fd);
-    }
+    spl_part_file_finish(&writer->file);
     free(writer->sections);
     free(writer->page.at);
     free(writer->textures.at);
     free(writer->chunk_textures.at);
-    free(writer->part_path);
-    free(writer->path);
     free(writer);
 }

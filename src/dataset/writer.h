@@ -4,6 +4,7 @@
 #define SPL_DATASET_WRITER_H
 
 #include "dataset/format.h"
+#include "dataset/streams.h"
 
 #include <jansson.h>
 
@@ -39,8 +40,14 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
                                          const struct spl_node_textures *textures, uint32_t *page,
                                          struct spl_error *err);
 
-/* Writes nodes, chunks and `meta` (borrowed), the table and the header, syncs file and directory, renames over the
- * target. The writer stays to be destroyed. */
+/* Makes it a file with optional attributes, before finish: `streams` (borrowed until then, up to SPL_STREAMS_MAX) say
+ * of each what it is, and have base and width of every chunk of the dataset. Each chunk's words end with its codes,
+ * stream by stream. */
+void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams,
+                                    uint32_t count);
+
+/* Writes nodes, chunks and `meta` (borrowed; "streams" follow from set_streams), the table and the header, syncs file
+ * and directory, renames over the target. The writer stays to be destroyed. */
 int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                               const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
                               struct spl_error *err);

@@ -70,14 +70,14 @@ int spl_left_out_load(const struct spl_named_view *view, struct spl_image *out, 
 /* Radii by id; ids lie one after the other, as opening has checked. */
 static float *read_radii(const struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     float *radii = spl_alloc(spl_dataset_get_info(dataset)->ids, sizeof *radii, err);
-    for (uint32_t n = 0; radii && n < node_count; n++) {
+    for (uint64_t n = 0; radii && n < node_count; n++) {
         size_t bytes;
         const uint32_t *page = spl_dataset_get_page(dataset, nodes[n].page, &bytes);
-        for (uint32_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
+        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
             for (uint32_t i = 0; i < chunks[c].count; i++) {
                 struct spl_splat splat;
                 spl_chunk_decode(&chunks[c], page, i, &splat);

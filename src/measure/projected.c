@@ -125,14 +125,14 @@ static void compare_textures(struct work *w, const struct source *source)
     const struct spl_dataset *dataset = w->options->dataset;
     const struct spl_texture_origin *origin = w->options->origin;
     uint64_t stride = origin->splats / compared_splats + 1;
-    uint32_t nodes;
+    uint64_t nodes;
     const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &(uint32_t){0});
-    for (uint32_t n = 0; n < nodes; n++, node++) {
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &(uint64_t){0});
+    for (uint64_t n = 0; n < nodes; n++, node++) {
         const uint32_t *page = spl_dataset_get_page(dataset, node->page, &(size_t){0});
-        for (uint32_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++)
+        for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++)
             for (uint32_t i = 0; i < chunks[c].count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS; i++) {
-                uint64_t id = (uint64_t)chunks[c].first_id + i;
+                uint64_t id = chunks[c].first_id + i;
                 struct spl_splat splat;
                 double centre[3];
                 if (id % stride || origin->photo[id] != source->index)

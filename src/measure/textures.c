@@ -309,6 +309,8 @@ static double find_geometry_bytes(const struct spl_dataset *dataset)
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         if (a != SPL_ATTRIBUTE_COLOR && a != SPL_ATTRIBUTE_TEXTURE && a != SPL_ATTRIBUTE_DICTIONARY)
             bits += info->attribute_bits[a];
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        bits += info->streams[s].bits;
     return (double)bits / 8 / (double)info->splats;
 }
 

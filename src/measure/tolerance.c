@@ -1,4 +1,4 @@
-/* Radii by splat id. Chunks are numbered by their first splat, so that a binary search finds an id's chunk;
+/* Radii by splat id. Chunks continue each other's ids, so that a binary search finds an id's chunk;
  * neighbouring pixels mostly show the same one, which is tried first. Ids that a device should not have returned are
  * treated as no splat. Read-only once created, so any thread may fill. */
 #include "measure/tolerance.h"
@@ -17,9 +17,8 @@ static const double cluster_radius_share = 0.9;
 struct spl_tolerance {
     const struct spl_dataset *dataset;
     const struct spl_chunk *chunks;
-    uint32_t chunk_count;
-    uint32_t *nodes; /* of each chunk */
-    uint32_t *order; /* chunks by ascending first_id */
+    uint64_t chunk_count;
+    uint32_t *nodes; /* of each chunk; the frame's ids have 32 bits, so there are no more of them */
 };
 
 struct job {
@@ -31,35 +30,24 @@ struct job {
     uint32_t width;
 };
 
-static int by_first_id(const void *a, const void *b, void *context)
-{
-    const struct spl_chunk *chunks = context;
-    uint32_t x = chunks[*(const uint32_t *)a].first_id, y = chunks[*(const uint32_t *)b].first_id;
-    return (x > y) - (x < y);
-}
-
 int spl_tolerance_create(const struct spl_dataset *dataset, struct spl_tolerance **out, struct spl_error *err)
 {
     *out = NULL;
     struct spl_tolerance *t = spl_alloc(1, sizeof *t, err);
     if (!t)
         return SPL_E_NOMEM;
-    uint32_t node_count;
+    uint64_t node_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     t->dataset = dataset;
     t->chunks = spl_dataset_get_chunks(dataset, &t->chunk_count);
     t->nodes = spl_alloc(t->chunk_count, sizeof *t->nodes, err);
-    t->order = spl_alloc(t->chunk_count, sizeof *t->order, err);
-    if (!t->nodes || !t->order) {
+    if (!t->nodes) {
         spl_tolerance_destroy(t);
         return SPL_E_NOMEM;
     }
-    for (uint32_t n = 0; n < node_count; n++)
+    for (uint64_t n = 0; n < node_count; n++)
         for (uint32_t c = 0; c < nodes[n].chunk_count; c++)
-            t->nodes[nodes[n].first_chunk + c] = n;
-    for (uint32_t c = 0; c < t->chunk_count; c++)
-        t->order[c] = c;
-    qsort_r(t->order, t->chunk_count, sizeof *t->order, by_first_id, (void *)t->chunks);
+            t->nodes[nodes[n].first_chunk + c] = (uint32_t)n;
     *out = t;
     return SPL_OK;
 }
@@ -69,7 +57,6 @@ void spl_tolerance_destroy(struct spl_tolerance *t)
     if (!t)
         return;
     free(t->nodes);
-    free(t->order);
     free(t);
 }
 
@@ -79,28 +66,29 @@ static bool holds(const struct spl_chunk *chunk, uint32_t id)
 }
 
 /* The chunk of splat `id`; chunk_count when there is none. */
-static uint32_t find_chunk(const struct spl_tolerance *t, uint32_t id)
+static uint64_t find_chunk(const struct spl_tolerance *t, uint32_t id)
 {
-    uint32_t low = 0, high = t->chunk_count;
+    uint64_t low = 0, high = t->chunk_count;
     while (low < high) {
-        uint32_t middle = low + (high - low) / 2;
-        if (t->chunks[t->order[middle]].first_id <= id)
+        uint64_t middle = low + (high - low) / 2;
+        if (t->chunks[middle].first_id <= id)
             low = middle + 1;
         else
             high = middle;
     }
-    return low && holds(&t->chunks[t->order[low - 1]], id) ? t->order[low - 1] : t->chunk_count;
+    return low && holds(&t->chunks[low - 1], id) ? low - 1 : t->chunk_count;
 }
 
-static double drawn_radius(const struct job *job, uint32_t index, uint32_t id, double z)
+static double drawn_radius(const struct job *job, uint64_t index, uint32_t id, double z)
 {
     const struct spl_tolerance *t = job->tolerance;
     const struct spl_chunk *chunk = &t->chunks[index];
-    uint32_t node_count;
+    uint64_t node_count;
     const struct spl_node *node = spl_dataset_get_nodes(t->dataset, &node_count) + t->nodes[index];
     size_t bytes;
     struct spl_splat splat;
-    spl_chunk_decode(chunk, spl_dataset_get_page(t->dataset, node->page, &bytes), id - chunk->first_id, &splat);
+    spl_chunk_decode(chunk, spl_dataset_get_page(t->dataset, node->page, &bytes), id - (uint32_t)chunk->first_id,
+                     &splat);
     const struct spl_camera *camera = &job->view->camera;
     double focal = fmax(camera->fx, camera->fy) * job->view->supersample, lod = job->view->lod;
     double share = (double)chunk->radius_mean / SPL_RADIUS_SPACING * focal / fmax(z, camera->near) / lod;
@@ -114,7 +102,7 @@ static void fill_rows(void *context, size_t begin, size_t end, unsigned worker)
     const struct job *job = context;
     const struct spl_tolerance *t = job->tolerance;
     const float nothing = (float)spl_dataset_get_info(t->dataset)->splat_radius;
-    uint32_t last = t->chunk_count;
+    uint64_t last = t->chunk_count;
     for (size_t i = begin * job->width; i < end * job->width; i++) {
         uint32_t id = job->ids[i];
         job->out[i] = nothing;

@@ -9,7 +9,7 @@
 
 struct spl_tolerance;
 
-/* `dataset` is borrowed until destroy. Takes 5 bytes a chunk. */
+/* `dataset` is borrowed until destroy. Takes 4 bytes a chunk. */
 int spl_tolerance_create(const struct spl_dataset *dataset, struct spl_tolerance **out, struct spl_error *err);
 void spl_tolerance_destroy(struct spl_tolerance *tolerance); /* NULL-safe */
 

@@ -17,6 +17,7 @@ enum { batch_nodes = 256 };
 struct encoded { /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
+    struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT]; /* by chunk */
     size_t word_count;
     uint32_t chunk_count;
     struct spl_chunk_error error;
@@ -39,6 +40,7 @@ struct emit {
     struct scratch *scratch;
     struct encoded *batch;
     struct spl_node *nodes;
+    const struct spl_emitted *out;
     size_t first; /* node of the batch's first element */
     atomic_bool failed;
 };
@@ -47,7 +49,6 @@ static void set_color(struct spl_splat *s, uint32_t color_class)
 {
     for (int c = 0; c < 3; c++)
         s->color[c] = color_class >> 8 * c & 255;
-    s->classification = color_class >> 24;
 }
 
 static void load_leaf(const struct spl_points *p, const struct spl_tree_node *node, uint32_t at, struct spl_splat *s,
@@ -60,7 +61,6 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
         s->normal[c] = p->normal[i][c];
     }
     s->radius = p->radius[i];
-    s->uncertainty = p->uncertainty[i];
     s->linear = p->linear && p->linear[i];
     for (int c = 0; p->clip && c < 3; c++)
         s->clip.direction[c] = (float)p->clip[i].direction[c] / 127;
@@ -77,7 +77,6 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
         s->normal[c] = from->normal[c];
     }
     s->radius = from->radius;
-    s->uncertainty = from->uncertainty;
     s->linear = from->linear;
     set_color(s, from->color_class);
 }
@@ -153,19 +152,21 @@ static void encode_lines(struct emit *e, struct scratch *w, const struct spl_tre
 }
 
 /* Makes room for the discs' and the lines' chunks; each of these but the last takes at least so many vertices on. */
-static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, struct encoded *out)
+static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, uint32_t streams, struct encoded *out)
 {
     size_t most = discs + vertices / (SPL_CHUNK_SPLATS - 2) + 1;
     if (most > w->chunk_capacity) {
         free(w->words);
         w->chunk_capacity = 0;
-        w->words = spl_alloc_raw(most, SPL_CHUNK_WORDS_MAX * sizeof *w->words, NULL);
+        size_t words = SPL_CHUNK_WORDS_MAX + streams * SPL_STREAM_WORDS_MAX; /* of a chunk */
+        w->words = spl_alloc_raw(most, words * sizeof *w->words, NULL);
         if (!w->words)
             return false;
         w->chunk_capacity = most;
     }
     out->chunks = spl_alloc_raw(most, sizeof *out->chunks, NULL);
-    return out->chunks != NULL;
+    out->codes = spl_alloc(most, sizeof *out->codes, NULL); /* those of lines stay 0: vertices have no attributes */
+    return out->chunks && out->codes;
 }
 
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
@@ -196,7 +197,7 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
     spl_chunks_cut(w->items, count);
     out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
     if (!spl_wires_get_node(e->wires, node->begin, node->end, leaf ? 0 : header->spacing, &w->lines) ||
-        !reserve_chunks(w, out->chunk_count, w->lines.count, out))
+        !reserve_chunks(w, out->chunk_count, w->lines.count, e->out->streams.count, out))
         return false;
     for (uint32_t c = 0; c < out->chunk_count; c++) {
         struct spl_splat splats[SPL_CHUNK_SPLATS];
@@ -218,6 +219,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
+        out->word_count += spl_emitted_streams_encode(&e->out->streams, p, node, w->items + first, used, out->codes[c],
+                                                      w->words + out->word_count);
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }
@@ -241,35 +244,49 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
     }
 }
 
+/* Room for `wanted` chunks and their streams' codes. */
+static int reserve(struct spl_emitted *out, size_t wanted, size_t *capacity, struct spl_error *err)
+{
+    size_t before = *capacity;
+    if (spl_array_reserve(out->chunks, *capacity, wanted, err))
+        return SPL_E_NOMEM;
+    return *capacity > before ? spl_emitted_streams_reserve(&out->streams, *capacity, err) : SPL_OK;
+}
+
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
                       size_t *chunk_capacity, struct spl_emitted *out, struct spl_error *err)
 {
     const struct spl_tree_node *from = &e->tree->nodes[index];
     struct spl_node *node = &e->nodes[index];
     for (uint32_t c = 0; c < encoded->chunk_count; c++) {
-        encoded->chunks[c].first_id = (uint32_t)out->ids;
+        encoded->chunks[c].first_id = out->ids;
         out->ids += encoded->chunks[c].count;
         out->splats += spl_chunk_kind(&encoded->chunks[c]) == SPL_CHUNK_DISCS ? encoded->chunks[c].count : 0;
         out->pieces += spl_chunk_count_pieces(&encoded->chunks[c]);
         spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
-    if (out->ids > UINT32_MAX - 1)
-        return spl_fail(err, SPL_E_LIMIT, "more than %u splats; pack the scans as several datasets", UINT32_MAX - 1);
-    if (spl_array_reserve(out->chunks, *chunk_capacity, out->chunk_count + encoded->chunk_count, err))
-        return SPL_E_NOMEM;
-    int rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
+    if (from->depth > UINT8_MAX)
+        return spl_fail(err, SPL_E_LIMIT,
+                        "more than %d levels; points lie closer together than the scan is wide by more than floats "
+                        "can say",
+                        UINT8_MAX + 1);
+    int rc = reserve(out, out->chunk_count + encoded->chunk_count, chunk_capacity, err);
+    if (!rc)
+        rc = spl_dataset_writer_add_node(writer, encoded->words, encoded->word_count, encoded->chunks,
                                          encoded->chunk_count, &node->page, err);
     if (rc)
         return rc;
+    spl_emitted_streams_keep(&out->streams, out->chunk_count, encoded->chunks, encoded->codes, encoded->chunk_count,
+                             &out->bits[SPL_ATTRIBUTE_CHUNK]);
     memcpy(out->chunks + out->chunk_count, encoded->chunks, encoded->chunk_count * sizeof *out->chunks);
     for (int c = 0; c < 3; c++)
         node->origin[c] = from->origin[c];
     node->size = (float)from->size;
     node->first_child = from->first_child;
-    node->child_count = from->child_count;
-    node->depth = from->depth;
+    node->child_count = (uint8_t)from->child_count;
+    node->depth = (uint8_t)from->depth;
     node->first_chunk = out->chunk_count;
-    node->chunk_count = encoded->chunk_count;
+    node->chunk_count = (uint16_t)encoded->chunk_count;
     out->chunk_count += encoded->chunk_count;
     out->pages = node->page + 1;
     out->error.position_over_radius += encoded->error.position_over_radius;
@@ -320,6 +337,7 @@ static void clear_batch(struct encoded *batch)
     for (size_t i = 0; i < batch_nodes; i++) {
         free(batch[i].words);
         free(batch[i].chunks);
+        free(batch[i].codes);
         batch[i] = (struct encoded){0};
     }
 }
@@ -328,11 +346,13 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
              const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,
              struct spl_emitted *out, struct spl_error *err)
 {
-    struct emit e = {.tree = tree, .points = points, .wires = wires, .options = options, .stage = stage};
+    struct emit e = {
+        .tree = tree, .points = points, .wires = wires, .options = options, .stage = stage, .out = out};
     size_t chunk_capacity = 0, splats = 0;
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
     spl_stage_begin(stage, "encoding", "splats", splats);
+    spl_emitted_streams_init(&out->streams, points);
     int rc = allocate(&e, out, err);
     for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
         size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;
@@ -348,6 +368,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     if (!rc) {
         unite_boxes(out->nodes, tree->count);
         out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * sizeof *out->nodes * 8;
+        spl_dataset_writer_set_streams(writer, out->streams.list, out->streams.count);
         spl_stage_end(stage);
     }
     for (unsigned t = 0; e.scratch && t < stage->threads; t++) {
@@ -367,5 +388,6 @@ void spl_emitted_finish(struct spl_emitted *emitted)
 {
     free(emitted->nodes);
     free(emitted->chunks);
+    spl_emitted_streams_finish(&emitted->streams);
     *emitted = (struct spl_emitted){0};
 }

@@ -4,20 +4,23 @@
 
 #include "dataset/chunk.h"
 #include "dataset/writer.h"
+#include "pack/emit_streams.h"
 #include "pack/tree.h"
 #include "pack/wires/wires.h"
 
 struct spl_emitted {
     struct spl_node *nodes; /* as many as the tree has */
     struct spl_chunk *chunks;
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     uint32_t pages;
     uint64_t splats, pieces, ids; /* as in struct spl_dataset_info */
     uint64_t bits[SPL_ATTRIBUTE_COUNT];
+    struct spl_emitted_streams streams;
     struct spl_chunk_error error; /* sums over all splats */
 };
 
-/* Encodes and writes every node, breadth first, its splats and then what it has of `wires`. On failure too, `out` is finished by the caller. */
+/* Encodes and writes every node, breadth first, its splats and then what it has of `wires`, and tells the writer of the
+ * streams, which `out` keeps. On failure too, `out` is finished by the caller. */
 int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_wires *wires,
              const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,
              struct spl_emitted *out, struct spl_error *err);

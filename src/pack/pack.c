@@ -60,7 +60,7 @@ static int check_options(struct pack *p, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
                               normal);
     p->chunk = (struct spl_chunk_options){
-        .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05, .has_uncertainty = true};
+        .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05};
     struct stat output, input;
     if (stat(o->output, &output) == 0) {
         for (size_t i = 0; i < o->input_count; i++)
@@ -96,6 +96,8 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
     json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
+    for (uint32_t s = 0; s < p->emitted.streams.count; s++)
+        json_object_set_new(bits, p->emitted.streams.list[s].name, json_integer((json_int_t)p->emitted.streams.bits[s]));
     for (size_t i = 0; i < p->scans.count; i++)
         json_array_append_new(sources, json_string_nocheck(p->scans.list[i].name));
     for (uint32_t s = 0; s < points->station_count; s++) {
@@ -104,14 +106,14 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
             json_array_append_new(pose, json_real(points->stations[s][i]));
         json_array_append_new(stations, pose);
     }
-    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b, s:b, s:b}, s:o, s:o, s:o,"
+    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:n, s:o, s:o,"
                      " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
-                     (int)points->has_color, "class", (int)points->has_class, "uncertainty", !points->no_surface,
-                     "surface", !points->no_surface, "bits", bits, "sources", sources, "stations", stations, "color",
+                     (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit", "unknown", "crs",
+                     "sources", sources, "stations", stations, "color",
                      spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",
                      p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
                      "points_skipped", (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates,
@@ -163,6 +165,11 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
     for (size_t i = 0; p->points.linear && i < p->points.count; i++)
         report->linear += p->points.linear[i];
     memcpy(report->attribute_bits, p->emitted.bits, sizeof report->attribute_bits);
+    report->stream_count = p->emitted.streams.count;
+    for (uint32_t s = 0; s < report->stream_count; s++) {
+        snprintf(report->streams[s].name, SPL_STREAM_TEXT_MAX, "%s", p->emitted.streams.list[s].name);
+        report->streams[s].bits = p->emitted.streams.bits[s];
+    }
 }
 
 /* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
@@ -229,10 +236,8 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
         rc = spl_levels_build(&p.tree, &p.points, stage, err);
-    if (!rc) {
-        p.chunk.has_class = p.points.has_class;
+    if (!rc)
         rc = write_dataset(&p, err);
-    }
     if (!rc && report)
         fill_report(&p, begin_ns, report);
     spl_dataset_writer_destroy(p.writer);

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "dataset/chunk.h"
 #include "dataset/dataset.h"
 
 void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
@@ -31,9 +30,9 @@ static void place(const struct spl_camera *camera, double u, double v, double z,
 
 static int32_t classification(const struct spl_dataset *dataset, uint32_t id)
 {
-    struct spl_splat splat;
-    bool known = dataset && spl_dataset_get_info(dataset)->has_class && spl_dataset_find_splat(dataset, id, &splat);
-    return known ? splat.classification : -1;
+    double value;
+    bool known = dataset && spl_dataset_find_value(dataset, spl_dataset_find_stream(dataset, "class"), id, &value);
+    return known ? (int32_t)fmin(value, INT32_MAX) : -1;
 }
 
 void spl_pick_read(const struct spl_camera *camera, double x, double y, const struct spl_frame *frame,

@@ -147,7 +147,7 @@ static struct spl_draw_chunk begin_chunk(const struct walk *w, const struct spl_
         .normal_u = chunk->normal_u,
         .normal_v = chunk->normal_v,
         .normal_step = chunk->normal_step,
-        .first_id = chunk->first_id,
+        .first_id = (uint32_t)chunk->first_id, // layer id is refused where they do not fit (view.c)
         .count = chunk->count,
         .texture_scale = 1,
     };
@@ -200,7 +200,7 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     }
     uint32_t clip = spl_clip_count(chunk) && w->params->discs
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
-                        : 0; // at most 157
+                        : 0; // at most 109
     uint32_t linear = 3u << SPL_GEOMETRY_LINEAR;
     struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
     out.radius_min = (float)(chunk->radius_min * scale);
@@ -251,12 +251,13 @@ static struct spl_view_box node_box(const struct walk *w, const struct spl_node 
 
 /* Pushes the children that are in view, the nearest on top. False, and nothing pushed, when the page of one of them
  * cannot be had: then the node itself is drawn. */
-static bool push_children(struct walk *w, const struct spl_node *node, uint32_t *stack, size_t *depth)
+static bool push_children(struct walk *w, const struct spl_node *node, uint64_t *stack, size_t *depth)
 {
-    uint32_t order[8], count = 0;
+    uint64_t order[8];
+    uint32_t count = 0;
     double depths[8];
     bool all = true;
-    for (uint32_t child = node->first_child; child < node->first_child + node->child_count; child++) {
+    for (uint64_t child = node->first_child; child < node->first_child + node->child_count; child++) {
         struct spl_view_box box = node_box(w, &w->nodes[child]);
         if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
             continue;
@@ -282,7 +283,7 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint32_t 
 static int walk_tree(struct walk *w, struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    uint32_t stack[stack_max];
+    uint64_t stack[stack_max];
     size_t depth = 0;
     if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
         return spl_fail(err, SPL_E_LIMIT, "not even the coarsest level fits the device memory limit");
@@ -308,7 +309,7 @@ static int walk_tree(struct walk *w, struct spl_error *err)
 
 static struct walk begin_walk(const struct spl_select_params *params)
 {
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     return (struct walk){
         .params = params,
         .nodes = spl_dataset_get_nodes(params->dataset, &node_count),

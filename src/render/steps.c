@@ -136,17 +136,6 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     return rc;
 }
 
-static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
-{
-    const char *finds = "that finds them";
-    for (int i = SPL_METHOD_COUNT; i-- > 0;)
-        if (spl_method_get(i)->finds_normals)
-            finds = spl_method_name(i);
-    return spl_fail_field(err, SPL_E_INPUT, "layer",
-                          "dataset '%s' has no normals, as it was packed with --points-only: ask for method %s, which "
-                          "takes them from depth, or pack it without", info->id, finds);
-}
-
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                  bool alone, const struct spl_render_options *options, struct spl_frame_steps **out,
                  struct spl_error *err)
@@ -154,15 +143,15 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     uint64_t clock = spl_now_ns();
     struct spl_view known;
     *out = NULL;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     int rc = spl_view_read(view, &known, err);
+    if (!rc)
+        rc = spl_view_check_layers(&known, info, err);
     if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
     view = &known;
-    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
-        return refuse_normals(info, err);
     struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;

@@ -4,7 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/error.h"
 #include "base/sized.h"
+#include "shared.h"
 
 enum { side_max = 32768 };
 #define PIXELS_MAX (1ull << 28)
@@ -64,6 +66,29 @@ static int check(const struct spl_view *view, struct spl_error *err)
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
     return rc;
+}
+
+static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
+{
+    const char *finds = "that finds them";
+    for (int i = SPL_METHOD_COUNT; i-- > 0;)
+        if (spl_method_get(i)->finds_normals)
+            finds = spl_method_name(i);
+    return spl_fail_field(err, SPL_E_INPUT, "layer",
+                          "dataset '%s' has no normals, as it was packed with --points-only: ask for method %s, which "
+                          "takes them from depth, or pack it without", info->id, finds);
+}
+
+int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
+        return refuse_normals(info, err);
+    if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
+        return spl_fail_field(err, SPL_E_INPUT, "layer",
+                              "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer id number (%u): ask for "
+                              "other layers, or pack the scans as several datasets",
+                              info->id, (unsigned long long)info->ids, SPL_NOTHING);
+    return SPL_OK;
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)

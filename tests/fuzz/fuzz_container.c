@@ -2,10 +2,10 @@
  * does in a block of memory, computes every hash, patches header and table, and opens the result. What opens is decoded
  * to the last splat, from pages copied to blocks of their exact size.
  *
- * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures), one byte n, n patches of three
- * bytes (offset low, high; xor) into header and table, four little-endian 32 bit sizes, with textures seven, then META,
- * NODE, CHNK and PAGE, and with textures ATOM, CTEX and TEXP, of those sizes (shortened or missing as the input ends;
- * the page keeps its size up to 64 KiB, with zeroes). */
+ * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures, 8 = attributes), one byte n, n
+ * patches of three bytes (offset low, high; xor) into header and table, a little-endian 32 bit size for each section,
+ * then the sections: META, NODE, CHNK and PAGE, with attributes two STRM, with textures ATOM, CTEX and TEXP, of those
+ * sizes (shortened or missing as the input ends; the page keeps its size up to 64 KiB, with zeroes). */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -22,7 +22,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, plain_sections = 4, section_count = 7 };
+enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, flag_streams = 8, plain_sections = 4, section_count = 9 };
 
 struct head {
     struct spl_file_header header;
@@ -40,10 +40,14 @@ static void rehash(struct head *head, size_t table_bytes)
 static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches, unsigned patch_count,
                         size_t *length)
 {
-    static const uint32_t types[section_count] = {SPL_SECTION_PAGE,    SPL_SECTION_META,  SPL_SECTION_NODES,
-                                                  SPL_SECTION_CHUNKS,  SPL_SECTION_ATOMS, SPL_SECTION_CHUNK_TEXTURES,
-                                                  SPL_SECTION_TEXTURES};
-    const int count = flags & flag_textures ? section_count : plain_sections;
+    static const uint32_t all[section_count] = {SPL_SECTION_PAGE,   SPL_SECTION_META,           SPL_SECTION_NODES,
+                                                SPL_SECTION_CHUNKS, SPL_SECTION_STREAM,         SPL_SECTION_STREAM,
+                                                SPL_SECTION_ATOMS,  SPL_SECTION_CHUNK_TEXTURES, SPL_SECTION_TEXTURES};
+    uint32_t types[section_count];
+    int count = 0;
+    for (int i = 0; i < section_count; i++)
+        if (i < plain_sections || (i < plain_sections + 2 ? flags & flag_streams : flags & flag_textures))
+            types[count++] = all[i];
     const size_t table_bytes = (size_t)count * sizeof(struct spl_section);
     uint32_t wanted[section_count] = {0};
     const uint8_t *part[section_count];
@@ -70,8 +74,11 @@ static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const 
     uint64_t offset = SPL_FILE_ALIGNMENT;
     for (int i = 0; i < count; i++) {
         int from = i < plain_sections ? (i + 3) % plain_sections : i; /* the input has the page behind CHNK */
-        head.table[i] = (struct spl_section){
-            .type = types[i], .offset = offset, .bytes = wanted[from], .hash = XXH3_64bits(part[from], wanted[from])};
+        head.table[i] = (struct spl_section){.type = types[i],
+                                             .index = i > 0 && types[i] == types[i - 1],
+                                             .offset = offset,
+                                             .bytes = wanted[from],
+                                             .hash = XXH3_64bits(part[from], wanted[from])};
         offset = (offset + wanted[from] + 63) / 64 * 64;
     }
     head.header.table_offset = offset;
@@ -97,7 +104,7 @@ static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const 
 /* Of every page that may be read: codes within the dictionary, whose expansion fits its place. */
 static void decode_textures(const struct spl_dataset *dataset)
 {
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(dataset);
@@ -106,10 +113,10 @@ static void decode_textures(const struct spl_dataset *dataset)
     uint32_t *atoms = malloc(spl_dataset_get_info(dataset)->dictionary_bytes);
     spl_dictionary_expand(dictionary, atoms);
     free(atoms);
-    for (uint32_t n = 0; n < node_count; n++) {
+    for (uint64_t n = 0; n < node_count; n++) {
         uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, nodes[n].page));
         bool readable = !spl_dataset_read_textures(dataset, nodes[n].page, words, NULL);
-        for (uint32_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+        for (uint64_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
             struct spl_chunk_code code;
             uint32_t texture = spl_dataset_get_chunk_textures(dataset)[c];
             spl_texture_decode(words + spl_texture_word(texture), spl_texture_planes(texture), chunks[c].count, &code);
@@ -121,29 +128,53 @@ static void decode_textures(const struct spl_dataset *dataset)
     }
 }
 
+/* Every code of every stream, and the same by the splat's id. */
+static void decode_streams(const struct spl_dataset *dataset, const struct spl_chunk *chunk, uint64_t index,
+                           const uint32_t *page)
+{
+    uint32_t count;
+    const struct spl_stream *streams = spl_dataset_get_streams(dataset, &count);
+    for (uint32_t s = 0; s < count; s++) {
+        struct spl_stream_code code = {streams[s].base[index], streams[s].width[index]};
+        enum spl_stream_type type = spl_stream_type_from_name(streams[s].type);
+        const uint32_t *words =
+            page + chunk->geometry_word + spl_chunk_words(chunk) + spl_dataset_get_stream_words(dataset, s, index);
+        for (uint32_t i = 0; i < chunk->count; i++) {
+            double value = spl_stream_decode(type, code, words, i), found = -1;
+            spl_assert(type == SPL_STREAM_UNKNOWN ? isnan(value) : value >= 0 && isfinite(value));
+            bool known = spl_dataset_find_stream(dataset, streams[s].name) == (int)s;
+            spl_assert(known == (type != SPL_STREAM_UNKNOWN));
+            if (known && i % 64 == 0)
+                spl_assert(spl_dataset_find_value(dataset, (int)s, chunk->first_id + i, &found) && found == value);
+        }
+    }
+}
+
 static void decode_all(const struct spl_dataset *dataset)
 {
     uint64_t linear = 0, decoded = 0;
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    for (uint32_t n = 0; n < node_count; n++) {
+    for (uint64_t n = 0; n < node_count; n++) {
         size_t bytes;
         const uint32_t *mapped = spl_dataset_get_page(dataset, nodes[n].page, &bytes);
         uint32_t *page = malloc(bytes);
         memcpy(page, mapped, bytes);
-        for (uint32_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
+        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+            decode_streams(dataset, &chunks[c], c, page);
             for (uint32_t i = 0; i < chunks[c].count; i++) {
                 struct spl_splat s;
                 spl_chunk_decode(&chunks[c], page, i, &s);
                 decoded += s.linear && !nodes[n].child_count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS;
                 spl_assert(isfinite(s.position[0]) && isfinite(s.position[1]) && isfinite(s.position[2]));
-                spl_assert(s.radius > 0 && isfinite(s.radius) && s.uncertainty >= 0 && isfinite(s.uncertainty));
+                spl_assert(s.radius > 0 && isfinite(s.radius));
                 float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];
                 spl_assert(fabsf(length - 1) < 1e-5f);
                 spl_assert(isfinite(s.clip.direction[0] + s.clip.direction[1] + s.clip.direction[2]));
                 spl_assert(s.clip.offset >= 0 && s.clip.offset <= 1);
             }
+        }
         free(page);
     }
     spl_assert(!spl_dataset_count_linear(dataset, &linear, NULL) && linear == decoded);

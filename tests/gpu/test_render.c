@@ -224,7 +224,8 @@ static void the_widest_codes_match(void **state)
     struct spl_dataset *dataset = make_dataset(splats, count);
     make_dataset_normal_error = M_PI / 180;
     free(splats);
-    uint32_t chunks, widest = 0;
+    uint64_t chunks;
+    uint32_t widest = 0;
     const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
     for (uint32_t i = 0; i < chunks; i++)
         widest = spl_chunk_geometry_width(&chunk[i]) > widest ? spl_chunk_geometry_width(&chunk[i]) : widest;

@@ -21,6 +21,8 @@ struct build {
     struct spl_node nodes[9];
     uint32_t node_count;
     struct spl_chunk *chunks;
+    uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk */
+    uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
     size_t chunk_count, chunk_capacity;
     uint32_t splats;
 };
@@ -41,14 +43,31 @@ static void *must_have(void *p)
 
 double make_dataset_normal_error = M_PI / 180;
 
+/* Class and uncertainty of chunk `index`; returns the words that they take. */
+static uint32_t add_streams(struct build *b, size_t index, const struct make_splat *splats, uint32_t count,
+                            uint32_t *words)
+{
+    uint32_t used = 0;
+    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
+        double values[SPL_CHUNK_SPLATS];
+        struct spl_stream_code code;
+        for (uint32_t i = 0; i < count; i++)
+            values[i] = s == SPL_STREAM_CLASS ? splats[i].classification : (double)splats[i].uncertainty;
+        used += spl_stream_encode(spl_stream_type_from_name(spl_streams_known[s].type), values, count, &code,
+                                  words + used);
+        b->bases[s][index] = code.base;
+        b->widths[s][index] = code.width;
+    }
+    return used;
+}
+
 /* Writes `count` splats as the node's chunks and sets what follows from them. */
 static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count)
 {
     const struct spl_chunk_options options = {.position_error = 0.016,
                                               .normal_error = make_dataset_normal_error,
-                                              .radius_error = 0.05,
-                                              .has_class = true,
-                                              .has_uncertainty = true};
+                                              .radius_error = 0.05};
+    const size_t words_max = SPL_CHUNK_WORDS_MAX + SPL_STREAM_KNOWN_COUNT * SPL_STREAM_WORDS_MAX;
     size_t splat_count = 0, used = 0;
     while (splat_count < count && !splats[splat_count].vertex)
         splat_count++;
@@ -56,7 +75,7 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
     size_t chunk_count = disc_chunks + (count > splat_count);
     spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity &&
                count - splat_count <= SPL_CHUNK_SPLATS);
-    uint32_t *words = must_have(malloc(chunk_count * SPL_CHUNK_WORDS_MAX * sizeof *words));
+    uint32_t *words = must_have(malloc(chunk_count * words_max * sizeof *words));
     struct spl_chunk *chunks = b->chunks + b->chunk_count;
     double radius_sum = 0;
     for (int a = 0; a < 3; a++) {
@@ -73,8 +92,6 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         own.kind = c < disc_chunks ? SPL_CHUNK_DISCS : SPL_CHUNK_LINES;
         for (uint32_t i = 0; i < n; i++) {
             part[i] = (struct spl_splat){.radius = from[i].radius,
-                                         .uncertainty = from[i].uncertainty,
-                                         .classification = from[i].classification,
                                          .linear = from[i].linear,
                                          .clip.offset = from[i].clip_offset};
             memcpy(part[i].clip.direction, from[i].clip, sizeof part[i].clip.direction);
@@ -98,6 +115,7 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         chunks[c].first_id = b->splats;
         b->splats += n;
         used += length;
+        used += add_streams(b, b->chunk_count + c, from, n, words + used);
     }
     struct spl_error err = {0};
     must(spl_dataset_writer_add_node(b->writer, words, used, chunks, chunk_count, &node->page, &err), &err);
@@ -158,6 +176,12 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
         discs += !splats[i].vertex;
     spl_assert(discs && (levels == 1 || discs == count));
     b.chunks = must_have(malloc(b.chunk_capacity * sizeof *b.chunks));
+    struct spl_stream streams[SPL_STREAM_KNOWN_COUNT];
+    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
+        streams[s] = spl_streams_known[s];
+        streams[s].base = b.bases[s] = must_have(malloc(b.chunk_capacity * sizeof *b.bases[s]));
+        streams[s].width = b.widths[s] = must_have(malloc(b.chunk_capacity));
+    }
     for (int a = 0; a < 3; a++) {
         low[a] = high[a] = splats[0].position[a];
         for (size_t i = 1; i < count; i++) {
@@ -176,18 +200,23 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
     else
         add_two_levels(&b, splats, count);
     json_t *meta =
-        json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b, s:b, s:b}, "
+        json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:s, s:s, "
                   "s:[s], s:{}}",
                   "points", (json_int_t)discs, "leaf_splats", (json_int_t)discs, "levels", levels, "splat_radius",
                   (double)splats[discs / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
                   high[2], "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target",
-                  middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "class",
-                  1, "uncertainty", 1, "sources", "made by a test", "pack");
+                  middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "unit",
+                  "us-ft", "crs", "EPSG:2263", "sources", "made by a test", "pack");
     must_have(meta);
+    spl_dataset_writer_set_streams(b.writer, streams, SPL_STREAM_KNOWN_COUNT);
     must(spl_dataset_writer_finish(b.writer, b.nodes, b.node_count, b.chunks, b.chunk_count, meta, &err), &err);
     json_decref(meta);
     spl_dataset_writer_destroy(b.writer);
     free(b.chunks);
+    for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
+        free(b.bases[s]);
+        free(b.widths[s]);
+    }
 }
 
 void make_folder(char *path)

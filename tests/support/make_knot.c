@@ -19,11 +19,12 @@ static double unit(uint64_t *state)
     return (double)(*state >> 40) / (1 << 24);
 }
 
-static void write_anew(const char *path, const struct spl_dataset *dataset, struct spl_chunk *chunks, uint32_t count)
+static void write_anew(const char *path, const struct spl_dataset *dataset, struct spl_chunk *chunks, uint64_t count)
 {
     struct spl_dataset_writer *writer;
     size_t bytes;
-    uint32_t nodes, page;
+    uint64_t nodes;
+    uint32_t page;
     const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
     const uint32_t *words = spl_dataset_get_page(dataset, 0, &bytes);
     spl_assert(nodes == 1 && !spl_dataset_writer_create(path, &writer, NULL));
@@ -37,7 +38,7 @@ void make_knot_file(const char *path, size_t count)
 {
     uint64_t state = 1;
     double side = 0.025 * cbrt((double)count);
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     struct make_splat *splats = calloc(count, sizeof *splats);
     spl_assert(splats);
     for (size_t i = 0; i < count; i++) {
@@ -49,7 +50,7 @@ void make_knot_file(const char *path, size_t count)
     const struct spl_chunk *honest = spl_dataset_get_chunks(dataset, &chunk_count);
     struct spl_chunk *chunks = calloc(chunk_count, sizeof *chunks);
     spl_assert(chunks);
-    for (uint32_t i = 0; i < chunk_count; i++) {
+    for (uint64_t i = 0; i < chunk_count; i++) {
         chunks[i] = honest[i];
         if (i % forged_every == 0)
             chunks[i].radius_min = chunks[i].radius_mean = 1000;

@@ -99,10 +99,10 @@ struct making {
     uint32_t discs; /* chunks of them so far: codes do not depend on how many lines there are */
 };
 
-static int code_chunk(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err)
+static int code_chunk(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
     struct making *m = context;
-    const struct spl_chunk *header = &spl_dataset_get_chunks(m->from, &(uint32_t){0})[chunk];
+    const struct spl_chunk *header = &spl_dataset_get_chunks(m->from, &(uint64_t){0})[chunk];
     (void)err;
     if (spl_chunk_kind(header) == SPL_CHUNK_DISCS)
         make_code(m->dictionary, m->planes, m->seed, m->discs++, header->count, code);

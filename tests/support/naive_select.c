@@ -140,7 +140,7 @@ static void add_node(struct selection *s, uint32_t index, bool beside)
 
 struct naive_chunk *naive_select(const struct naive_options *options, size_t *count)
 {
-    uint32_t nodes, chunks;
+    uint64_t nodes, chunks;
     struct selection s = {.options = options};
     s.nodes = spl_dataset_get_nodes(options->dataset, &nodes);
     s.chunks = spl_dataset_get_chunks(options->dataset, &chunks);

@@ -343,7 +343,7 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
 static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t index, struct disc *d,
                       uint32_t *low_bits)
 {
-    uint32_t count;
+    uint64_t count;
     size_t bytes;
     const struct spl_node *node = &spl_dataset_get_nodes(s->dataset, &count)[drawn->node];
     const struct spl_chunk *chunk = &spl_dataset_get_chunks(s->dataset, &count)[drawn->chunk];
@@ -354,7 +354,9 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
     local.radius_min = (float)(chunk->radius_min * drawn->scale);
     local.radius_step = (float)(chunk->radius_step * drawn->scale);
     spl_chunk_decode(&local, page, index, &splat);
-    *d = (struct disc){.radius = splat.radius, .id = chunk->first_id + index, .texture_scale = (float)drawn->scale};
+    *d = (struct disc){.radius = splat.radius,
+                       .id = (uint32_t)chunk->first_id + index,
+                       .texture_scale = (float)drawn->scale};
     memcpy(d->color, splat.color, sizeof d->color);
     memcpy(d->world, splat.normal, sizeof d->world);
     d->end = splat.clip.offset / d->texture_scale;

@@ -312,7 +312,7 @@ void spl_coded_finish(struct spl_coded *coded)
     *coded = (struct spl_coded){0};
 }
 
-int spl_coded_get(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err)
+int spl_coded_get(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
     const struct spl_coded_chunks *chunks = context;
     uint32_t splats = chunks->splats->chunks[chunk].count;

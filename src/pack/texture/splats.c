@@ -9,11 +9,14 @@
 int spl_splats_init(struct spl_splats *splats, const struct spl_dataset *dataset, struct spl_error *err)
 {
     *splats = (struct spl_splats){.dataset = dataset, .count = spl_dataset_get_info(dataset)->ids};
-    splats->nodes = spl_dataset_get_nodes(dataset, &splats->node_count);
-    splats->chunks = spl_dataset_get_chunks(dataset, &splats->chunk_count);
+    uint64_t node_count, chunk_count; /* no more than splats */
+    splats->nodes = spl_dataset_get_nodes(dataset, &node_count);
+    splats->chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     if (splats->count > UINT32_MAX)
         return spl_fail(err, SPL_E_LIMIT, "%llu splats; photographs are put onto %u at most",
                         (unsigned long long)splats->count, UINT32_MAX);
+    splats->node_count = (uint32_t)node_count;
+    splats->chunk_count = (uint32_t)chunk_count;
     splats->node_of = spl_alloc(splats->chunk_count, sizeof *splats->node_of, err);
     if (!splats->node_of)
         return SPL_E_NOMEM;

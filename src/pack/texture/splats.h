@@ -16,7 +16,7 @@ struct spl_splats {
     uint64_t count; /* ids are below it */
 };
 
-/* Refuses more than UINT32_MAX splats and ids that do not lie one after the other. On failure nothing is held. */
+/* Refuses more than UINT32_MAX splats. On failure nothing is held. */
 int spl_splats_init(struct spl_splats *splats, const struct spl_dataset *dataset, struct spl_error *err);
 void spl_splats_finish(struct spl_splats *splats);
 

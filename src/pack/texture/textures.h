@@ -63,6 +63,6 @@ struct spl_coded_chunks {
     const struct spl_coded *coded;
     const struct spl_splats *splats;
 };
-int spl_coded_get(void *context, uint32_t chunk, struct spl_chunk_code *code, struct spl_error *err);
+int spl_coded_get(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err);
 
 #endif

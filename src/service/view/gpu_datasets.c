@@ -120,9 +120,10 @@ static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int r
 
 static uint32_t count_first_page_chunks(const struct spl_dataset *dataset)
 {
-    uint32_t count, chunks = 0;
+    uint64_t count;
+    uint32_t chunks = 0;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &count);
-    for (uint32_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; i++)
         chunks += nodes[i].page == 0 ? nodes[i].chunk_count : 0; // every chunk is of one node
     return chunks;
 }

@@ -15,9 +15,7 @@
 
 static const struct spl_chunk_options defaults = {.position_error = 0.016,
                                                   .normal_error = M_PI / 180,
-                                                  .radius_error = 0.05,
-                                                  .has_class = true,
-                                                  .has_uncertainty = true};
+                                                  .radius_error = 0.05};
 
 static uint32_t random_state;
 
@@ -59,10 +57,8 @@ static void make_sheet(struct sample *s, uint32_t count, double extent, double t
         set_normal(splat, toward[0] + spread * (2 * uniform() - 1), toward[1] + spread * (2 * uniform() - 1),
                    toward[2] + spread * (2 * uniform() - 1) + 1e-9);
         splat->radius = (float)(radius * (1 + uniform()));
-        splat->uncertainty = (float)(uniform() < 0.1 ? 0 : exp2(-12 * uniform()));
         for (int c = 0; c < 3; c++)
             splat->color[c] = (uint8_t)(uniform() * 256);
-        splat->classification = (uint8_t)(uniform() * 7 + 249);
     }
 }
 
@@ -125,11 +121,6 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
         assert_int_equal(out.linear, in->linear);
         linear += in->linear;
         clips += check_clip(&in->clip, &out);
-        assert_int_equal(out.classification, options->has_class ? in->classification : 0);
-        if (!options->has_uncertainty || in->uncertainty == 0)
-            assert_true(out.uncertainty == 0);
-        else
-            assert_true(fabs(log2(out.uncertainty / in->uncertainty)) < 0.26);
     }
     assert_true(position_sum <= options->position_error * s->count * 1.00001);
     assert_true(normal_sum <= options->normal_error * s->count * 1.00001);
@@ -144,7 +135,7 @@ static double check_sample(const struct sample *s, const struct spl_chunk_option
     spl_chunk_add_bits(&chunk, bits);
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         all += bits[a];
-    assert_int_equal(all, 32 * words + 8 * sizeof chunk);
+    assert_int_equal(all, 32 * words + 8 * SPL_CHUNK_BYTES);
     return (double)(bits[SPL_ATTRIBUTE_POSITION] + bits[SPL_ATTRIBUTE_NORMAL] + bits[SPL_ATTRIBUTE_RADIUS] +
                     bits[SPL_ATTRIBUTE_COLOR]) /
            s->count;
@@ -154,8 +145,6 @@ static void test_random(void **state)
 {
     (void)state;
     static const double up[3] = {0, 0, 1};
-    struct spl_chunk_options no_class = defaults;
-    no_class.has_class = false;
     struct sample s;
     for (uint32_t round = 0; round < 300; round++) {
         random_state = round + 1;
@@ -163,7 +152,6 @@ static void test_random(void **state)
         double extent = exp2(20 * uniform() - 12), radius = extent * exp2(-8 * uniform());
         make_sheet(&s, count, extent, extent * exp2(-16 * uniform()), radius, 2 * uniform(), up);
         check_sample(&s, &defaults);
-        check_sample(&s, &no_class); /* nothing of the classes just encoded shows in the uncertainties */
         check_sample(&s, &(struct spl_chunk_options){.position_error = 0.1, .normal_error = 0.1, .radius_error = 0.2});
         check_sample(
             &s, &(struct spl_chunk_options){.position_error = 0.001, .normal_error = 0.001, .radius_error = 0.001});
@@ -192,10 +180,7 @@ static void test_one_and_equal(void **state)
     struct sample s;
     random_state = 3;
     make_sheet(&s, 1, 1, 1, 0.01, 0.5, down);
-    struct spl_chunk_options plain = defaults;
-    plain.has_class = plain.has_uncertainty = false;
-    assert_true(check_sample(&s, &plain) == 0);
-    check_sample(&s, &defaults);
+    assert_true(check_sample(&s, &defaults) == 0);
     s.count = SPL_CHUNK_SPLATS;
     for (uint32_t i = 1; i < s.count; i++) {
         s.splats[i] = s.splats[0];
@@ -400,38 +385,6 @@ static void test_color_is_lossless(void **state)
     }
 }
 
-static void test_uncertainty_levels(void **state)
-{
-    (void)state;
-    static const double up[3] = {0, 0, 1};
-    struct sample s;
-    uint32_t words[SPL_CHUNK_WORDS_MAX];
-    struct spl_chunk chunk;
-    make_sheet(&s, 3, 1, 0, 0.1, 0, up);
-    static const struct {
-        float in[3], out[3];
-        unsigned bits;
-    } rows[] = {
-        {{0, 0, 0}, {0, 0, 0}, 0},
-        {{0.25f, 0.25f, 0.25f}, {0.25f, 0.25f, 0.25f}, 0},
-        {{0, 1, 1}, {0, 1, 1}, 1},
-        {{0.5f, 1, 0}, {0.5f, 1, 0}, 2},
-        {{0x1p-15f, 1, 0}, {0x1p-15f, 1, 0}, 5},
-        {{1e-30f, 1, 1}, {0, 1, 1}, 1},
-    };
-    for (size_t row = 0; row < sizeof rows / sizeof *rows; row++) {
-        for (int i = 0; i < 3; i++)
-            s.splats[i].uncertainty = rows[row].in[i];
-        spl_chunk_encode(s.splats, constant(&s), s.count, &defaults, &chunk, words, NULL);
-        assert_int_equal(chunk.extra_bits >> SPL_EXTRA_UNCERTAINTY & 15, rows[row].bits);
-        for (uint32_t i = 0; i < 3; i++) {
-            struct spl_splat out;
-            spl_chunk_decode(&chunk, words, i, &out);
-            assert_true(out.uncertainty == rows[row].out[i]);
-        }
-    }
-}
-
 /* Fields of every width at every place of a word come back, and a pad begins the next word. */
 static void test_bits(void **state)
 {
@@ -442,8 +395,8 @@ static void test_bits(void **state)
     struct spl_bit_writer writer = {.words = words};
     random_state = 5;
     for (int i = 0; i < count; i++) {
-        width[i] = (uint32_t)(uniform() * 25);
-        value[i] = spl_bits_part((uint32_t)(uniform() * 0x1p32), 3, width[i]);
+        width[i] = (uint32_t)(uniform() * 33);
+        value[i] = spl_bits_part((uint32_t)(uniform() * 0x1p32), 0, width[i]);
         spl_bits_put(&writer, value[i], width[i]);
         if (i % 100 == 99)
             spl_bits_pad(&writer);
@@ -471,7 +424,6 @@ int main(void)
         cmocka_unit_test(test_zero_normal),
         cmocka_unit_test(test_octahedral),
         cmocka_unit_test(test_color_is_lossless),
-        cmocka_unit_test(test_uncertainty_levels),
         cmocka_unit_test(test_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -56,7 +56,7 @@ static void test_round_trip(void **state)
         assert_int_equal(info->pages, 1);
         assert_true(info->has_color && info->has_class && info->has_uncertainty);
         assert_true(info->bounds_min[0] == 500000.25 && info->default_fov == 50);
-        uint32_t nodes, chunks;
+        uint64_t nodes, chunks;
         const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
         const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
         assert_true(nodes == info->nodes && chunks == info->chunks);
@@ -66,13 +66,17 @@ static void test_round_trip(void **state)
         uint64_t bits = 0;
         for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
             bits += info->attribute_bits[a];
-        uint64_t structs = 8 * (nodes * sizeof *node + chunks * sizeof *chunk);
+        for (uint32_t s = 0; s < info->stream_count; s++)
+            bits += info->streams[s].bits;
+        uint64_t structs = 8 * (nodes * sizeof *node + chunks * (SPL_CHUNK_BYTES + 2 * SPL_STREAM_CHUNK_BYTES));
         assert_true(bits > structs && bits <= 8 * bytes + structs);
         for (uint32_t i = 0; levels == 1 && i < count; i++) {
             struct spl_splat splat;
             spl_chunk_decode(&chunk[i / SPL_CHUNK_SPLATS], page, i % SPL_CHUNK_SPLATS, &splat);
             assert_memory_equal(splat.color, splats[i].color, 3);
-            assert_int_equal(splat.classification, splats[i].classification);
+            double class = -1;
+            assert_true(spl_dataset_find_value(dataset, spl_dataset_find_stream(dataset, "class"), i, &class));
+            assert_true(class == splats[i].classification);
             for (int a = 0; a < 3; a++)
                 assert_true(fabs(node->origin[a] + splat.position[a] - splats[i].position[a]) <
                             0.05 * splats[i].radius);
@@ -168,7 +172,9 @@ static const char *region_at(struct bytes b, size_t offset)
             return s->type == SPL_SECTION_PAGE    ? "section PAGE 0 fails its checksum"
                    : s->type == SPL_SECTION_META  ? "section META fails its checksum"
                    : s->type == SPL_SECTION_NODES ? "section NODE fails its checksum"
-                                                  : "section CHNK fails its checksum";
+                   : s->type == SPL_SECTION_STREAM
+                       ? (s->index ? "section STRM 1 fails its checksum" : "section STRM 0 fails its checksum")
+                       : "section CHNK fails its checksum";
     }
     return NULL;
 }
@@ -203,7 +209,7 @@ static void test_every_flipped_bit(void **state)
         }
         assert_int_equal(pwrite(fd, &b.data[offset], 1, (off_t)offset), 1);
     }
-    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + sizeof(struct spl_chunk)));
+    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + SPL_CHUNK_BYTES));
     close(fd);
     unlink(path);
     free(b.data);
@@ -337,7 +343,7 @@ static void test_files_that_change_in_place(void **state)
         make_dataset_file(path, splats, count, 1);
         assert_int_equal(spl_dataset_open(path, true, &verified, NULL), 0);
         assert_int_equal(spl_dataset_open(path, false, &trusted, NULL), 0);
-        uint32_t nodes;
+        uint64_t nodes;
         struct spl_node before = spl_dataset_get_nodes(verified, &nodes)[0];
         size_t bytes;
         const uint32_t *mapped = spl_dataset_get_page(verified, 0, &bytes);
@@ -377,23 +383,31 @@ static void test_splats_by_id(void **state)
     enum { count = 1000 };
     struct make_splat *splats = some_splats(count);
     struct spl_dataset *dataset = make_dataset_levels(splats, count, 1); // ids are indices
+    int class = spl_dataset_find_stream(dataset, "class"), uncertainty = spl_dataset_find_stream(dataset, "uncertainty");
     struct spl_splat splat;
+    double value;
+    assert_true(class >= 0 && uncertainty >= 0 && spl_dataset_find_stream(dataset, "intensity") < 0);
     for (uint32_t id = 0; id < count; id++) {
         assert_true(spl_dataset_find_splat(dataset, id, &splat));
-        assert_int_equal(splat.classification, id % 3);
+        assert_true(spl_dataset_find_value(dataset, class, id, &value) && value == id % 3);
+        assert_true(spl_dataset_find_value(dataset, uncertainty, id, &value) && value == (id % 5 ? 0.5 : 0));
         assert_int_equal(splat.color[1], 100);
         assert_true(fabsf(splat.radius - splats[id].radius) < 0.1f * splats[id].radius);
     }
-    splat.classification = 77;
+    splat.radius = (float)(value = 77);
     assert_false(spl_dataset_find_splat(dataset, count, &splat));
     assert_false(spl_dataset_find_splat(dataset, UINT32_MAX, &splat));
-    assert_int_equal(splat.classification, 77);
+    assert_false(spl_dataset_find_splat(dataset, 1ull << 32, &splat)); // not the first one
+    assert_false(spl_dataset_find_splat(dataset, UINT64_MAX, &splat));
+    assert_false(spl_dataset_find_value(dataset, class, count, &value));
+    assert_false(spl_dataset_find_value(dataset, -1, 0, &value));
+    assert_true(splat.radius == 77 && value == 77);
     spl_dataset_close(dataset);
 
     dataset = make_dataset_levels(splats, count, 2); // several nodes: each id is some splat, none beyond the last is
     uint32_t all = (uint32_t)spl_dataset_get_info(dataset)->splats;
     for (uint32_t id = 0; id < all; id++)
-        assert_true(spl_dataset_find_splat(dataset, id, &splat) && splat.classification < 3);
+        assert_true(spl_dataset_find_value(dataset, class, id, &value) && value < 3);
     assert_false(spl_dataset_find_splat(dataset, all, &splat));
     spl_dataset_close(dataset);
     free(splats);

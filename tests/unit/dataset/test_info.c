@@ -81,6 +81,12 @@ static void test_json(void **state)
     assert_true(number(discs, "splats") == 4500 && number(discs, "chunks") == number(json, "chunks"));
     assert_true(number(discs, "bytes") > 4500 && number(lines, "pieces") == 0 && number(lines, "bytes") == 0);
     assert_true(json_is_true(json_object_get(json_object_get(json, "attributes"), "surface")));
+    const json_t *streams = json_object_get(json, "streams");
+    assert_int_equal(json_array_size(streams), 2);
+    assert_string_equal(json_string_value(json_object_get(json_array_get(streams, 1), "type")), "half-octaves");
+    assert_string_equal(json_string_value(json_object_get(json, "unit")), "us-ft");
+    assert_string_equal(json_string_value(json_object_get(json, "crs")), "EPSG:2263");
+    assert_true(json_object_size(json_object_get(json, "widths")) == 6);
     assert_true(number(json, "points") == 4000 && number(json, "splats") == 4500 && number(json, "levels") == 2);
     const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");
     assert_true(json_number_value(json_array_get(max, 0)) == 49.5 && json_number_value(json_array_get(max, 2)) == 0);
@@ -119,6 +125,9 @@ static void test_table(void **state)
     assert_non_null(strstr(output, "linear        400 points on wires, poles and cables (10.00 %)"));
     assert_non_null(strstr(output, "clip lines    500 splats (11.11 %)"));
     assert_non_null(strstr(output, "surface       normals and radii"));
+    assert_non_null(strstr(output, "attributes    color, class, uncertainty (derived from the points)\n"));
+    assert_non_null(strstr(output, "unit          us-ft"));
+    assert_non_null(strstr(output, "crs           EPSG:2263"));
 }
 
 static void test_exit_codes(void **state)

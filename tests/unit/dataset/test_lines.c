@@ -17,8 +17,6 @@
 static const struct spl_chunk_options options = {.position_error = 0.016,
                                                  .normal_error = M_PI / 180,
                                                  .radius_error = 0.05,
-                                                 .has_class = true,
-                                                 .has_uncertainty = true,
                                                  .kind = SPL_CHUNK_LINES};
 
 struct made {
@@ -42,9 +40,7 @@ static void make(struct made *m, uint32_t count, uint32_t length)
         struct spl_splat *v = &m->vertices[i];
         *v = (struct spl_splat){.normal = {0, (float)sin(0.3 * noise(i)), (float)cos(0.3 * noise(i))},
                                 .radius = (float)(0.06 + 0.01 * noise(i)),
-                                .uncertainty = 1,
                                 .color = {40, (uint8_t)(60 + 30 * noise(i)), 80},
-                                .classification = 14,
                                 .linear = i + 1 < count && i % length != length - 1};
         memcpy(m->position[i], (double[3]){x, 2 + 0.01 * noise(i), 0.01 * x * x}, sizeof m->position[i]);
     }
@@ -76,7 +72,6 @@ static void vertices_come_back(void **state)
             assert_int_equal(out.linear, m.vertices[i].linear);
             assert_memory_equal(out.color, m.vertices[i].color, 3);
             assert_true(fabsf(out.radius / m.vertices[i].radius - 1) < 0.051f);
-            assert_true(out.classification == 0 && out.uncertainty == 0);
         }
         assert_true(off <= options.position_error * 1.001 && angle <= options.normal_error * 1.01);
         assert_int_equal(spl_chunk_count_pieces(&m.chunk), joined);
@@ -90,7 +85,7 @@ static void a_piece_costs_few_bytes(void **state)
     uint64_t bits[SPL_ATTRIBUTE_COUNT] = {0};
     make(&m, 128, 128);
     spl_chunk_add_bits(&m.chunk, bits);
-    assert_int_equal(bits[SPL_ATTRIBUTE_LINES], 32 * m.used + 8 * sizeof m.chunk);
+    assert_int_equal(bits[SPL_ATTRIBUTE_LINES], 32 * m.used + 8 * SPL_CHUNK_BYTES);
     assert_true((double)bits[SPL_ATTRIBUTE_LINES] / 8 / 127 <= 12);
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         assert_true(a == SPL_ATTRIBUTE_LINES || bits[a] == 0);
@@ -157,12 +152,12 @@ static void what_lines_do_not_have_is_refused(void **state)
     const char *(*judge)(const struct spl_chunk *) = spl_chunk_get_codec(SPL_CHUNK_LINES)->judge;
     assert_null(judge(&m.chunk));
     struct spl_chunk forged[] = {m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk};
-    forged[0].extra_bits |= 3;                                       /* a width of classes */
-    forged[1].extra_bits |= 1 << SPL_EXTRA_UNCERTAINTY;
+    forged[0].extra_bits |= 3; /* bits that no chunk has */
+    forged[1].extra_bits |= 1 << 15;
     forged[2].extra_bits += 19 << SPL_EXTRA_LINES;                   /* 21 lines of 40 vertices */
     forged[3].extra_bits &= ~(255u << SPL_EXTRA_LINES);              /* none */
     forged[4].geometry_bits ^= 3u << SPL_GEOMETRY_LINEAR;            /* all are joined, to what? */
-    forged[5].uncertainty_max = 1;
+    forged[5].radius_step = 0;
     forged[6].step = 0;
     forged[7].count = 1;
     for (size_t i = 0; i < sizeof forged / sizeof *forged; i++)

@@ -144,7 +144,8 @@ static void test_sizes_that_lie(void **state)
     (void)state;
     struct spl_dataset *dataset;
     struct spl_error err = {0};
-    struct spl_dataset_source none = spl_dataset_source_of_memory(file, 0), shorter = spl_dataset_source_of_memory(file, size - 1);
+    struct spl_dataset_source none = spl_dataset_source_of_memory(file, 0),
+                              shorter = spl_dataset_source_of_memory(file, size - 1);
     assert_int_equal(spl_dataset_open_source(&none, "none", true, NULL, &dataset, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "none is empty"));
     err = (struct spl_error){0};

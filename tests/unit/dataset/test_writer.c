@@ -73,7 +73,7 @@ static void test_pages(void **state)
     assert_int_equal(spl_dataset_writer_add_node(writer, words, 64 << 18, NULL, 0, &page, &err), SPL_E_LIMIT);
     assert_non_null(strstr(err.message, path));
     memset(words, 'a', SPL_META_BYTES_MAX); /* what no reader takes is not written */
-    json_t *meta = json_pack("[s]", (const char *)words);
+    json_t *meta = json_pack("{s:s}", "sources", (const char *)words);
     err = (struct spl_error){0};
     assert_int_equal(spl_dataset_writer_finish(writer, &(struct spl_node){0}, 1, &(struct spl_chunk){0}, 1, meta, &err),
                      SPL_E_LIMIT);
@@ -117,7 +117,7 @@ static void test_replaced_while_mapped(void **state)
     size_t bytes;
     assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
     make_target(4);
-    uint32_t count;
+    uint64_t count;
     assert_int_equal(spl_dataset_get_chunks(dataset, &count)->color_base >> 16, 3);
     assert_non_null(spl_dataset_get_page(dataset, 0, &bytes));
     spl_dataset_close(dataset);

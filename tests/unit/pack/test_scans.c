@@ -213,7 +213,7 @@ static void test_intensities_share_a_scale(void **state)
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     for (uint32_t id = 0; id < info->splats; id++) {
         assert_true(spl_dataset_find_splat(dataset, id, &splat));
-        uint32_t count;
+        uint64_t count;
         (void)spl_dataset_get_nodes(dataset, &count);
         assert_int_equal(count, 1); /* positions are relative to the one node, which begins at x = 0 */
         bool is_dark = splat.position[0] < 9.5f;

@@ -115,7 +115,7 @@ struct ball {
 static struct ball ball_of(const struct spl_dataset *dataset, const struct spl_camera *camera,
                            const struct naive_chunk *drawn, uint32_t index)
 {
-    uint32_t count;
+    uint64_t count;
     size_t bytes;
     const struct spl_node *node = &spl_dataset_get_nodes(dataset, &count)[drawn->node];
     struct spl_splat splat;
@@ -196,7 +196,7 @@ static uint32_t count_over(const struct spl_camera *camera, const struct ball *b
 /* Whether the root was asked for. */
 static bool check_view(const struct spl_dataset *dataset, const struct spl_camera *camera, double lod)
 {
-    uint32_t chunk_count;
+    uint64_t chunk_count;
     size_t count, seen_balls = 0;
     int left = 1 << 30;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
@@ -275,7 +275,7 @@ static void nodes_are_listed_front_to_back(void **state)
     (void)state;
     random_state = 23;
     struct spl_dataset *dataset = make_clumps();
-    uint32_t node_count, chunk_count;
+    uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     for (int view = 0; view < 20; view++) {
@@ -320,7 +320,7 @@ static void what_comes_later_is_asked_for_at_once(void **state)
         grid[i] =
             (struct make_splat){.position = {i % side * 0.1, i / side * 0.1, 0}, .normal = {0, 0, 1}, .radius = 0.05f};
     struct spl_dataset *dataset = make_dataset_levels(grid, side * side, 2);
-    uint32_t nodes;
+    uint64_t nodes;
     spl_dataset_get_nodes(dataset, &nodes);
     struct spl_view view;
     spl_view_init(&view);

@@ -1,0 +1,182 @@
+/* Gathering what splatd info says, and saying it as JSON. The command's thread. */
+#include "cmd/info_report.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "dataset/chunk_clip.h"
+
+const struct spl_info_code spl_info_codes[SPL_INFO_CODES] = {
+    {"position_axis",
+     "position, an axis",
+     SPL_ATTRIBUTE_POSITION,
+     {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z},
+     3,
+     5},
+    {"radius", "radius", SPL_ATTRIBUTE_RADIUS, {SPL_GEOMETRY_RADIUS}, 1, 4},
+    {"normal_coordinate", "normal, a coordinate", SPL_ATTRIBUTE_NORMAL, {SPL_GEOMETRY_U, SPL_GEOMETRY_V}, 2, 4},
+    {"color_component", "color, a component", SPL_ATTRIBUTE_COLOR, {SPL_COLOR_Y, SPL_COLOR_U, SPL_COLOR_V}, 3, 4},
+};
+
+static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attribute)
+{
+    return attribute == SPL_ATTRIBUTE_COLOR ? chunk->color_bits : chunk->geometry_bits;
+}
+
+static void gather_widths(struct spl_info_report *report)
+{
+    uint64_t chunk_count;
+    uint32_t stream_count;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(report->dataset, &chunk_count);
+    const struct spl_stream *streams = spl_dataset_get_streams(report->dataset, &stream_count);
+    for (uint64_t c = 0; c < chunk_count; c++) {
+        double share = chunks[c].count / (double)report->info->splats;
+        if (spl_chunk_kind(&chunks[c]) != SPL_CHUNK_DISCS)
+            continue;
+        for (int k = 0; k < SPL_INFO_CODES; k++)
+            for (unsigned s = 0; s < spl_info_codes[k].shift_count; s++) {
+                uint32_t width = code_word(&chunks[c], spl_info_codes[k].attribute) >> spl_info_codes[k].shifts[s];
+                width &= (1u << spl_info_codes[k].bits) - 1;
+                report->widths[k][width] += share / spl_info_codes[k].shift_count;
+            }
+        for (uint32_t s = 0; s < stream_count; s++)
+            report->widths[SPL_INFO_CODES + s][streams[s].width[c]] += share;
+    }
+}
+
+int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    uint64_t node_count, chunk_count;
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    *report = (struct spl_info_report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
+    for (uint64_t n = 0; n < node_count; n++) {
+        uint32_t depth = nodes[n].depth < SPL_INFO_LEVELS_MAX ? nodes[n].depth : SPL_INFO_LEVELS_MAX - 1;
+        struct spl_info_level *level = &report->levels[depth];
+        report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
+        level->nodes++;
+        level->chunks += nodes[n].chunk_count;
+        for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
+            const struct spl_chunk *chunk = &chunks[nodes[n].first_chunk + c];
+            uint32_t splats = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
+            level->splats += splats;
+            level->pieces += spl_chunk_count_pieces(chunk);
+            level->spacing += (double)nodes[n].spacing * splats;
+        }
+    }
+    for (uint32_t i = 0; i < report->level_count; i++)
+        report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
+    for (uint64_t c = 0; c < chunk_count; c++) {
+        uint32_t kind = spl_chunk_kind(&chunks[c]);
+        report->clips += spl_clip_count(&chunks[c]);
+        report->chunks[kind]++;
+        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
+        report->bytes[kind] += SPL_CHUNK_BYTES + 4ull * spl_chunk_words(&chunks[c]);
+    }
+    gather_widths(report);
+    int rc = spl_dataset_count_linear(dataset, &report->linear, err);
+    return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
+}
+
+const char *spl_info_name(const struct spl_dataset_info *info, int attribute)
+{
+    return attribute < SPL_ATTRIBUTE_COUNT ? spl_attribute_name((enum spl_attribute)attribute)
+                                           : info->streams[attribute - SPL_ATTRIBUTE_COUNT].name;
+}
+
+int spl_info_count(const struct spl_dataset_info *info)
+{
+    return SPL_ATTRIBUTE_COUNT + (int)info->stream_count;
+}
+
+double spl_info_bytes_per_splat(const struct spl_dataset_info *info, int attribute)
+{
+    uint64_t bits = attribute < SPL_ATTRIBUTE_COUNT ? info->attribute_bits[attribute]
+                                                    : info->streams[attribute - SPL_ATTRIBUTE_COUNT].bits;
+    return (double)bits / 8 / (double)info->splats;
+}
+
+double spl_info_total_bytes_per_splat(const struct spl_dataset_info *info)
+{
+    double total = 0;
+    for (int a = 0; a < spl_info_count(info); a++)
+        total += spl_info_bytes_per_splat(info, a);
+    return total;
+}
+
+static json_t *vector(const double v[3])
+{
+    return json_pack("[f,f,f]", v[0], v[1], v[2]);
+}
+
+/* null where there are none; NULL when memory is refused. */
+static json_t *textures_to_json(const struct spl_info_report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    json_t *counts = info->atoms ? json_array() : NULL;
+    if (!info->atoms)
+        return json_null();
+    for (int count = 0; count <= SPL_ATOMS_MAX; count++)
+        json_array_append_new(counts, json_integer((json_int_t)report->atoms[count]));
+    return json_pack("{s:I, s:I, s:I, s:o}", "size", (json_int_t)info->texture_size, "atoms", (json_int_t)info->atoms,
+                     "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
+}
+
+/* Bytes with the chunks' headers. */
+static json_t *kinds_to_json(const struct spl_info_report *report)
+{
+    json_t *kinds = json_object();
+    for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
+        json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
+                            json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
+                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
+                                      "bytes", (json_int_t)report->bytes[kind]));
+    return kinds;
+}
+
+/* NULL when memory is refused: json_pack passes it on. */
+json_t *spl_info_to_json(const struct spl_info_report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    json_t *bytes = json_pack("{s:f}", "total", spl_info_total_bytes_per_splat(info));
+    for (int a = 0; a < spl_info_count(info); a++)
+        json_object_set_new(bytes, spl_info_name(info, a), json_real(spl_info_bytes_per_splat(info, a)));
+    json_t *levels = json_array();
+    for (uint32_t i = 0; i < report->level_count; i++) {
+        const struct spl_info_level *l = &report->levels[i];
+        json_array_append_new(levels,
+                              json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
+                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
+                                        (json_int_t)l->pieces, "spacing", l->spacing));
+    }
+    json_t *widths = json_object();
+    for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
+        json_t *histogram = json_object();
+        for (int width = 0; width <= SPL_INFO_WIDTH_MAX; width++) {
+            char key[16];
+            snprintf(key, sizeof key, "%d", width);
+            if (report->widths[k][width] > 0)
+                json_object_set_new(histogram, key, json_real(report->widths[k][width]));
+        }
+        const char *name = k < SPL_INFO_CODES ? spl_info_codes[k].name : info->streams[k - SPL_INFO_CODES].name;
+        json_object_set_new(widths, name, histogram);
+    }
+    return json_pack(
+        "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?}",
+        "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
+        (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
+        "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
+        (json_int_t)info->chunks, "pages", (json_int_t)info->pages, "bounds", "min", vector(info->bounds_min), "max",
+        vector(info->bounds_max), "default_view", "eye", vector(info->default_eye), "target",
+        vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
+        info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
+        (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds", kinds_to_json(report), "bytes_per_splat", bytes,
+        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
+        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
+        json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
+        json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
+        json_object_get(spl_dataset_get_meta(report->dataset), "crs"));
+}

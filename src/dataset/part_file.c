@@ -1,0 +1,123 @@
+/* Everything goes into PATH.part-PID, which the file's own lock says is in use; a rename makes it PATH. Owned by one
+ * thread at a time. */
+#include "dataset/part_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <glob.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Removes what killed processes left of `path`: part files that nobody holds a lock on. */
+static void sweep(const char *path)
+{
+    char pattern[4096];
+    glob_t found = {0};
+    size_t used = 0;
+    if (strlen(path) > (sizeof pattern - 16) / 2)
+        return;
+    for (const char *c = path; *c; c++) {
+        if (strchr("*?[\\", *c))
+            pattern[used++] = '\\';
+        pattern[used++] = *c;
+    }
+    snprintf(pattern + used, sizeof pattern - used, ".part-[0-9]*");
+    if (!glob(pattern, GLOB_NOSORT, NULL, &found))
+        for (size_t i = 0; i < found.gl_pathc; i++) {
+            int fd = open(found.gl_pathv[i], O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+            if (fd >= 0 && !flock(fd, LOCK_EX | LOCK_NB))
+                unlink(found.gl_pathv[i]);
+            if (fd >= 0)
+                close(fd);
+        }
+    globfree(&found);
+}
+
+int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err)
+{
+    *file = (struct spl_part_file){.path = strdup(path), .fd = -1};
+    int rc = SPL_E_NOMEM;
+    if (!file->path || asprintf(&file->part_path, "%s.part-%ld", path, (long)getpid()) < 0) {
+        file->part_path = NULL;
+        spl_fail(err, rc, "out of memory for the name of %s", path);
+        goto failed;
+    }
+    sweep(path);
+    for (;;) { /* again where another's sweep came before our lock */
+        struct stat st;
+        file->fd = open(file->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+        if (file->fd < 0) {
+            rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
+            goto failed;
+        }
+        flock(file->fd, LOCK_EX | LOCK_NB); /* in use; file systems without locks are not swept either */
+        if (fstat(file->fd, &st) || st.st_nlink)
+            return SPL_OK;
+        close(file->fd);
+    }
+failed:
+    spl_part_file_finish(file);
+    return rc;
+}
+
+int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void *data, size_t bytes,
+                        struct spl_error *err)
+{
+    const char *p = data;
+    while (bytes) {
+        ssize_t n = pwrite(file->fd, p, bytes, (off_t)offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return spl_fail_errno(err, n ? errno : ENOSPC, "cannot write %s at byte %llu", file->part_path,
+                                  (unsigned long long)offset);
+        p += n;
+        offset += (uint64_t)n;
+        bytes -= (size_t)n;
+    }
+    return SPL_OK;
+}
+
+static int sync_directory(const char *path, struct spl_error *err)
+{
+    char *directory = strdup(path);
+    if (!directory)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", path);
+    char *slash = strrchr(directory, '/');
+    if (slash)
+        slash[slash == directory] = 0;
+    int fd = open(slash ? directory : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC), rc = SPL_OK;
+    /* Directories that one may write but not read, or that cannot be synced, are no reason to refuse. */
+    if (fd >= 0 && fsync(fd) && errno != EINVAL)
+        rc = spl_fail_errno(err, errno, "cannot sync the directory of %s", path);
+    if (fd >= 0)
+        close(fd);
+    free(directory);
+    return rc;
+}
+
+int spl_part_file_commit(struct spl_part_file *file, struct spl_error *err)
+{
+    if (fsync(file->fd))
+        return spl_fail_errno(err, errno, "cannot sync %s", file->part_path);
+    if (rename(file->part_path, file->path))
+        return spl_fail_errno(err, errno, "cannot rename %s to %s", file->part_path, file->path);
+    file->committed = true;
+    return sync_directory(file->path, err);
+}
+
+void spl_part_file_finish(struct spl_part_file *file)
+{
+    if (file->part_path && file->fd >= 0) {
+        if (!file->committed)
+            unlink(file->part_path);
+        close(file->fd);
+    }
+    free(file->part_path);
+    free(file->path);
+    *file = (struct spl_part_file){0};
+}

@@ -1,0 +1,36 @@
+/* The optional attributes of what is packed: which the points have, their codes by chunk. An attribute is a row of the
+ * table in emit_streams.c. */
+#ifndef SPL_PACK_EMIT_STREAMS_H
+#define SPL_PACK_EMIT_STREAMS_H
+
+#include "dataset/streams.h"
+#include "pack/chunks.h"
+#include "pack/tree.h"
+
+struct spl_emitted_streams {
+    struct spl_stream list[SPL_STREAM_KNOWN_COUNT]; /* what the points have, as the writer takes it */
+    int which[SPL_STREAM_KNOWN_COUNT];              /* SPL_STREAM_* of each */
+    uint32_t count;
+    uint64_t bits[SPL_STREAM_KNOWN_COUNT];
+    uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk, owned; what `list` looks at */
+    uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
+};
+
+void spl_emitted_streams_init(struct spl_emitted_streams *streams, const struct spl_points *points);
+void spl_emitted_streams_finish(struct spl_emitted_streams *streams);
+
+/* The codes of one chunk, stream by stream: the splats items[0 .. count) of `node`. Writes `words` (room for
+ * SPL_STREAM_WORDS_MAX a stream) and returns how many. Any thread. */
+uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, const struct spl_points *points,
+                                    const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count,
+                                    struct spl_stream_code *codes, uint32_t *words);
+
+/* Room for the codes of `chunks` chunks. */
+int spl_emitted_streams_reserve(struct spl_emitted_streams *streams, size_t chunks, struct spl_error *err);
+
+/* Keeps the codes of chunks [first, first + count), and adds what is no code to *header_bits. */
+void spl_emitted_streams_keep(struct spl_emitted_streams *streams, uint64_t first, const struct spl_chunk *chunks,
+                              struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT], uint32_t count,
+                              uint64_t *header_bits);
+
+#endif
