@@ -10,7 +10,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
 #include <splatd/error.h>
+
+SPL_BEGIN_DECLARATIONS
 
 struct spl_camera {
     double eye[3];           /* world position */
@@ -22,13 +25,13 @@ struct spl_camera {
 
 /* Full pinhole from a vertical field of view: fx = fy, principal point in the middle.
  * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height only. */
-int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
-                       struct spl_error *err);
+SPL_API int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
+                               struct spl_error *err);
 
 /* Looks from `eye` to `target` with `up` upwards in the image. Errors name "eye", "target", "up": non-finite numbers,
  * eye == target, up zero or parallel to the view. Fills eye and rotation only. */
-int spl_camera_look_at(struct spl_camera *camera, const double eye[3], const double target[3], const double up[3],
-                       struct spl_error *err);
+SPL_API int spl_camera_look_at(struct spl_camera *camera, const double eye[3], const double target[3],
+                               const double up[3], struct spl_error *err);
 
 enum spl_axes {
     SPL_AXES_OPENCV, /* +x right, +y down, +z forward: COLMAP, ROS, Open3D */
@@ -38,18 +41,21 @@ enum spl_axes {
 /* From a 4×4 camera-to-world matrix, row-major, in the named axes. Refuses non-finite numbers, a last row other than
  * (0 0 0 1) and a rotation block that is not orthonormal within 1e-3 (it is re-orthonormalised); field "matrix".
  * Fills eye and rotation only. */
-int spl_camera_set_matrix(struct spl_camera *camera, const double camera_to_world[16], enum spl_axes axes,
-                          struct spl_error *err);
+SPL_API int spl_camera_set_matrix(struct spl_camera *camera, const double camera_to_world[16], enum spl_axes axes,
+                                  struct spl_error *err);
 
 /* From COLMAP's world-to-camera quaternion (w, x, y, z; normalised here, zero refused) and translation;
  * fields "q", "t". Fills eye and rotation only. */
-int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const double t[3], struct spl_error *err);
+SPL_API int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const double t[3],
+                                  struct spl_error *err);
 
 /* Checks everything: finite, orthonormal, positive focal lengths and sizes, 0 < near < far, |eye| <= 1e12.
  * The field at fault is named. */
-int spl_camera_check(const struct spl_camera *camera, struct spl_error *err);
+SPL_API int spl_camera_check(const struct spl_camera *camera, struct spl_error *err);
 
 /* The pixel and view depth of world point `p`; false (outputs untouched) when it lies at or behind the eye's plane. */
-bool spl_camera_project(const struct spl_camera *camera, const double p[3], double pixel[2], double *depth);
+SPL_API bool spl_camera_project(const struct spl_camera *camera, const double p[3], double pixel[2], double *depth);
+
+SPL_END_DECLARATIONS
 
 #endif

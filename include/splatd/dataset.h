@@ -7,10 +7,15 @@
 #define SPLATD_DATASET_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
 #include <splatd/camera.h>
+#include <splatd/cancel.h>
 #include <splatd/error.h>
+
+SPL_BEGIN_DECLARATIONS
 
 struct spl_dataset;
 
@@ -66,18 +71,54 @@ struct spl_dataset_info {
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
-int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
+SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
+
+/* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
+struct spl_reader {
+    size_t size;    /* of this struct: spl_reader_init() */
+    uint64_t bytes; /* of the dataset */
+    /* Puts up to `count` (> 0) bytes from `offset` on into `out`; what is asked for lies within `bytes`. Returns how
+     * many, at least one; 0 where there are no longer as many; -errno. Called by any thread that uses the dataset, by
+     * several at once; may block. */
+    int64_t (*read)(void *context, uint64_t offset, void *out, size_t count);
+    void (*close)(void *context); // may be NULL; called once, by spl_dataset_close(): not where opening fails
+    void *context;
+};
+
+static inline void spl_reader_init(struct spl_reader *reader)
+{
+    spl_sized_init(reader, sizeof *reader);
+}
+
+struct spl_open_options {
+    size_t size;                     /* spl_open_options_init() */
+    bool verify;                     /* as of spl_dataset_open() */
+    const struct spl_cancel *cancel; // may be NULL; borrowed until close: ends whatever takes long with the dataset
+    const struct spl_reader *reader; // NULL = the file at `path`; the struct itself is read while opening only
+};
+
+static inline void spl_open_options_init(struct spl_open_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
+/* The same as spl_dataset_open(), with options. With a reader `path` is the dataset's name in errors and, without folder
+ * and extension, its id; nothing is opened there. SPL_E_CANCELLED. */
+SPL_API int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
+                                  struct spl_error *err);
 
 /* NULL-safe. */
-void spl_dataset_close(struct spl_dataset *dataset);
+SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 
 /* Borrowed until close. */
-const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
+SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
 
 /* The default view as a camera of the given size. */
-int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
-                                   struct spl_camera *camera, struct spl_error *err);
+SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
+                                           struct spl_camera *camera, struct spl_error *err);
 
-const char *spl_attribute_name(enum spl_attribute attribute);
+SPL_API const char *spl_attribute_name(enum spl_attribute attribute);
+
+SPL_END_DECLARATIONS
 
 #endif

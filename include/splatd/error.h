@@ -7,6 +7,10 @@
 
 #include <stdbool.h>
 
+#include <splatd/api.h>
+
+SPL_BEGIN_DECLARATIONS
+
 enum spl_code {
     SPL_OK = 0,
     SPL_E_NOMEM = -1,       /* host memory refused */
@@ -31,15 +35,15 @@ struct spl_error {
     char message[512];  /* one sentence, no newline, says what to do where that is known */
 };
 
-/* One row of the table that every front end maps errors through. */
+/* One row of the table of codes; static. */
 struct spl_code_info {
-    const char *name;   /* "input", "device-lost", … */
-    int http_status;    /* 400, 503, … */
-    int exit_code;      /* 1 failed, 2 bad input or usage */
-    bool retry;         /* the same call may succeed later */
+    const char *name; /* "input", "device-lost", … */
+    bool retry;       /* the same call may succeed later */
 };
 
 /* The row of `code`; never NULL (unknown codes give the row of SPL_E_INTERNAL). Any thread. */
-const struct spl_code_info *spl_code_get_info(int code);
+SPL_API const struct spl_code_info *spl_code_get_info(int code);
+
+SPL_END_DECLARATIONS
 
 #endif

@@ -6,14 +6,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
 #include <splatd/error.h>
+
+SPL_BEGIN_DECLARATIONS
 
 enum spl_layer {
     SPL_LAYER_COLOR,    /* RGBA8, straight alpha, sRGB */
     SPL_LAYER_DEPTH,    /* F32, linear depth along the viewing axis, dataset's unit; NaN = nothing there */
     SPL_LAYER_RANGE,    /* F32, length of the ray to the surface; NaN = nothing */
     SPL_LAYER_NORMAL,   /* F32X3, unit, world axes; (0,0,0) = nothing */
-    SPL_LAYER_ID,       /* U32, index of the nearest splat in the dataset; UINT32_MAX = nothing */
+    SPL_LAYER_ID,       /* U32, index of the nearest splat or vertex of a line in the dataset; UINT32_MAX = nothing */
     SPL_LAYER_COVERAGE, /* F32, share of the pixel's samples that hit a surface, 0..1 */
     SPL_LAYER_COUNT
 };
@@ -24,7 +27,8 @@ struct spl_image {
     enum spl_layer layer;
     enum spl_pixel_type type;
     uint32_t width, height;
-    void *pixels;       /* row-major, top row first, rows packed; owned by whoever holds the struct */
+    void *pixels;       /* row-major, top row first; owned by whoever holds the struct */
+    size_t row_bytes;   /* from one row's first pixel to the next one's; 0 = packed, as in all that the library makes */
 };
 
 enum spl_format {
@@ -38,11 +42,17 @@ enum spl_format {
 };
 
 struct spl_encode_options {
+    size_t size;          /* spl_encode_options_init() */
     enum spl_format format;
     int quality;          /* JPEG and WebP, 1..100; 0 = 90 */
     int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
 };
+
+static inline void spl_encode_options_init(struct spl_encode_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
 
 struct spl_encoded {
     uint8_t *bytes;       /* owned by the receiver, release with spl_encoded_finish() */
@@ -52,32 +62,34 @@ struct spl_encoded {
     float near, far;      /* JPEG of a float layer: the values at the ends of the colour map, 0 otherwise */
 };
 
-uint32_t spl_pixel_bytes(enum spl_pixel_type type);
+SPL_API uint32_t spl_pixel_bytes(enum spl_pixel_type type);
 
 /* Releases `image->pixels` and zeroes the struct. */
-void spl_image_finish(struct spl_image *image);
+SPL_API void spl_image_finish(struct spl_image *image);
 
 /* Encodes `image` into `out`. Any thread; blocks for the encoding only. SPL_E_UNSUPPORTED where the format cannot hold
  * the layer; SPL_E_LIMIT above the format's largest side (JPEG 65535). On failure `out` is zeroed. */
-int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
-                     struct spl_error *err);
+SPL_API int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options,
+                             struct spl_encoded *out, struct spl_error *err);
 
 /* NULL-safe. */
-void spl_encoded_finish(struct spl_encoded *encoded);
+SPL_API void spl_encoded_finish(struct spl_encoded *encoded);
 
 /* "color" <-> SPL_LAYER_COLOR and "jpeg", "jpg" <-> SPL_FORMAT_JPEG; lookups return -1 for an unknown name. */
-const char *spl_layer_name(enum spl_layer layer);
-int spl_layer_from_name(const char *name);
-const char *spl_format_name(enum spl_format format);
-int spl_format_from_name(const char *name);
+SPL_API const char *spl_layer_name(enum spl_layer layer);
+SPL_API int spl_layer_from_name(const char *name);
+SPL_API const char *spl_format_name(enum spl_format format);
+SPL_API int spl_format_from_name(const char *name);
 
 /* False for a format whose library this build does without. */
-bool spl_format_is_built(enum spl_format format);
+SPL_API bool spl_format_is_built(enum spl_format format);
 
 /* 420 or 444: what a JPEG of these options has. */
-int spl_encode_chroma(const struct spl_encode_options *options);
+SPL_API int spl_encode_chroma(const struct spl_encode_options *options);
 
 /* "image/jpeg", …; static. */
-const char *spl_format_media_type(enum spl_format format);
+SPL_API const char *spl_format_media_type(enum spl_format format);
+
+SPL_END_DECLARATIONS
 
 #endif

@@ -7,8 +7,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
+
+SPL_BEGIN_DECLARATIONS
 
 /* METHOD(NAME, name); the first is drawn where none is asked for. src/render/methods/name.c has its row. */
 #define SPL_METHODS(METHOD)                                                                                            \
@@ -39,8 +42,8 @@ enum spl_visibility {
     SPL_VISIBILITY_NONE,     /* no point is removed; holes as adaptive finds them */
     SPL_VISIBILITY_COUNT
 };
-const char *spl_visibility_name(enum spl_visibility visibility);
-int spl_visibility_from_name(const char *name); /* -1 for an unknown name */
+SPL_API const char *spl_visibility_name(enum spl_visibility visibility);
+SPL_API int spl_visibility_from_name(const char *name); /* -1 for an unknown name */
 
 struct spl_fill_params {
     enum spl_visibility visibility;
@@ -84,10 +87,10 @@ struct spl_method_param_info {
     const char *(*choice_name)(int choice); /* CHOICE, as the next; choices are 0 … most */
     int (*choice_from_name)(const char *name);
 };
-const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static */
-int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
+SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static */
+SPL_API int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
 /* Is `value` within the parameter's range? SPL_E_USAGE names it. */
-int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);
+SPL_API int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);
 
 /* What everyone may know of a method; static. */
 struct spl_method_info {
@@ -99,18 +102,20 @@ struct spl_method_info {
     enum spl_method stand_in;
     bool finds_normals;           /* also where a dataset has none */
 };
-const struct spl_method_info *spl_method_get(enum spl_method method);
+SPL_API const struct spl_method_info *spl_method_get(enum spl_method method);
 
-const char *spl_method_name(enum spl_method method); /* "unknown" for none */
-int spl_method_from_name(const char *name);          /* -1 for an unknown name */
-const char *spl_method_names(void);                  /* "splat, points, …"; static */
-bool spl_method_has_textures(enum spl_method method);
+SPL_API const char *spl_method_name(enum spl_method method); /* "unknown" for none */
+SPL_API int spl_method_from_name(const char *name);          /* -1 for an unknown name */
+SPL_API const char *spl_method_names(void);                  /* "splat, points, …"; static */
+SPL_API bool spl_method_has_textures(enum spl_method method);
 
 /* What is drawn of a dataset where `method` is asked for. */
-enum spl_method spl_method_for(enum spl_method method, const struct spl_dataset_info *dataset);
+SPL_API enum spl_method spl_method_for(enum spl_method method, const struct spl_dataset_info *dataset);
 /* Has what is drawn normals? */
-bool spl_method_has_normals(enum spl_method method, const struct spl_dataset_info *dataset);
+SPL_API bool spl_method_has_normals(enum spl_method method, const struct spl_dataset_info *dataset);
 /* The parameters that `method` takes, or what stands in for it. */
-uint32_t spl_method_get_params(enum spl_method method);
+SPL_API uint32_t spl_method_get_params(enum spl_method method);
+
+SPL_END_DECLARATIONS
 
 #endif

@@ -6,8 +6,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
+#include <splatd/cancel.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
+
+SPL_BEGIN_DECLARATIONS
 
 struct spl_progress {          /* one call about every 100 ms while work runs, from the calling thread */
     const char *stage;         /* static: "reading scan.ply", "neighbours", … (valid during the call) */
@@ -33,6 +37,7 @@ enum spl_texture_preset { SPL_TEXTURE_NORMAL, SPL_TEXTURE_DRAFT, SPL_TEXTURE_BES
 
 /* Colours and textures from photographs with known poses. */
 struct spl_photo_options {
+    size_t size;               /* spl_photo_options_init() */
     const char *cameras;       /* COLMAP's folder, transforms.json, Open3D's trajectory, pose folder, list of views */
     const char *images;        /* folder of the photographs; NULL = where `cameras` says */
     const char *device;        /* as of struct spl_renderer_options: draws how far the splats lie from photographs */
@@ -48,6 +53,11 @@ struct spl_photo_options {
     void *context;
 };
 
+static inline void spl_photo_options_init(struct spl_photo_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
 struct spl_photo_report {
     uint32_t photographs;      /* whose poses and files could be used */
     uint32_t refused;
@@ -62,6 +72,7 @@ struct spl_photo_report {
 };
 
 struct spl_pack_options {
+    size_t size;               /* spl_pack_options_init() */
     const char *const *inputs;
     size_t input_count;
     const char *output;        /* NAME.spld */
@@ -80,7 +91,13 @@ struct spl_pack_options {
      * two without a newline. May be NULL. */
     void (*warn)(void *context, const char *text);
     void *progress_context; /* of both */
+    const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
 };
+
+static inline void spl_pack_options_init(struct spl_pack_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
 
 struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
@@ -101,6 +118,8 @@ struct spl_pack_report {
  * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
  * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
  * and at most about 80 bytes a point. `report` may be NULL. Any thread. */
-int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
+SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
+
+SPL_END_DECLARATIONS
 
 #endif

@@ -6,15 +6,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <splatd/api.h>
 #include <splatd/camera.h>
+#include <splatd/cancel.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 #include <splatd/image.h>
 #include <splatd/method.h>
 
+SPL_BEGIN_DECLARATIONS
+
 struct spl_renderer;
 
 struct spl_view {
+    size_t size;                /* spl_view_init() */
     struct spl_camera camera;
     enum spl_method method;
     uint32_t layers;            /* bit per enum spl_layer, at least one */
@@ -31,20 +36,25 @@ struct spl_view {
 
 /* Fills everything but the camera with defaults: the first method, color, lod 1, supersample 1, opaque black, and each
  * method's parameters as their table says. */
-void spl_view_init(struct spl_view *view);
+SPL_API void spl_view_init_sized(struct spl_view *view, size_t size);
+static inline void spl_view_init(struct spl_view *view)
+{
+    spl_view_init_sized(view, sizeof *view);
+}
 
-/* A method's parameter by its place in the table; whole numbers and choices as doubles (what is none becomes one that
- * spl_view_check() refuses). */
-double spl_view_get_param(const struct spl_view *view, enum spl_method_param param);
-void spl_view_set_param(struct spl_view *view, enum spl_method_param param, double value);
+/* A method's parameter by its place in the table, of a view that spl_view_init() has made whole; whole numbers and
+ * choices as doubles (what is none becomes one that spl_view_check() refuses). */
+SPL_API double spl_view_get_param(const struct spl_view *view, enum spl_method_param param);
+SPL_API void spl_view_set_param(struct spl_view *view, enum spl_method_param param, double value);
 
 /* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is the
  * pixels, which are enlarged, encoded and sent all the same. */
-uint64_t spl_view_get_samples(const struct spl_view *view);
-uint64_t spl_view_get_frame_bytes(const struct spl_view *view); /* what the images of its layers take in memory */
+SPL_API uint64_t spl_view_get_samples(const struct spl_view *view);
+/* What the images of its layers take in memory. */
+SPL_API uint64_t spl_view_get_frame_bytes(const struct spl_view *view);
 
 /* Checks ranges; the field at fault is named as in the HTTP interface. */
-int spl_view_check(const struct spl_view *view, struct spl_error *err);
+SPL_API int spl_view_check(const struct spl_view *view, struct spl_error *err);
 
 /* Has a dataset the layers that the view asks for? SPL_E_INPUT (field "layer") of normals where it has no surface and
  * the method makes none, and of ids where it has more splats than 32 bits number. Every renderer asks. */
@@ -64,7 +74,7 @@ struct spl_frame {
     struct spl_image images[SPL_LAYER_COUNT];  /* pixels NULL for layers that were not asked for */
     struct spl_frame_stats stats;
 };
-void spl_frame_finish(struct spl_frame *frame);
+SPL_API void spl_frame_finish(struct spl_frame *frame);
 
 enum { SPL_DEVICE_NAME_MAX = 256 };
 
@@ -80,9 +90,10 @@ struct spl_device_info {
 
 /* Lists devices of every backend built in, unusable ones with their reason. Writes at most `capacity`, returns how many
  * there are. */
-size_t spl_device_list(struct spl_device_info *devices, size_t capacity);
+SPL_API size_t spl_device_list(struct spl_device_info *devices, size_t capacity);
 
 struct spl_renderer_options {
+    size_t size;                /* spl_renderer_options_init() */
     const char *device;         /* NULL or "auto"; "vulkan", "egl", "vulkan:1", a UUID, or part of a name */
     bool require_gpu;           /* refuse software devices */
     bool debug;                 /* validation layers, GL debug output */
@@ -95,35 +106,43 @@ struct spl_renderer_options {
 };
 #define SPL_TILE_SAMPLES (4ull << 20)
 
+static inline void spl_renderer_options_init(struct spl_renderer_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
-int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err);
-void spl_renderer_destroy(struct spl_renderer *renderer); /* NULL-safe; datasets that were not removed are let go */
-const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
+SPL_API int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out,
+                                struct spl_error *err);
+/* NULL-safe; datasets that were not removed are let go. */
+SPL_API void spl_renderer_destroy(struct spl_renderer *renderer);
+SPL_API const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
 
 /* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the
  * memory limit. Refuses with both sizes when not even one frame's worth fits. */
-int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+SPL_API int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 /* remove() blocks while a page of it is being read, try_remove() never: false, and the dataset stays added with nothing on
  * the device, to be removed after spl_renderer_options.wake was called. */
-void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
-bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
+SPL_API void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
+SPL_API bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
 /* Pages are read on a thread of the renderer's own and put on the device between tiles: by every step of a frame, and by
  * upload(), for those who have no step to make. Errors as of spl_renderer_render(), the device's only. wait() blocks until
  * there is something to put there: false where nothing is being read, or nothing came within a second at most or until
  * `deadline_ns`. */
-int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err);
-bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns);
+SPL_API int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err);
+SPL_API bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns);
 
 /* Loads every page that fits, so that the first frame is as fast as the others. Only the first page, which views cannot
  * do without, takes the place of others that were not drawn for longest. SPL_E_LIMIT with numbers when not. */
-int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
+SPL_API int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                 struct spl_error *err);
 
 /* The same in steps that never block, for a renderer that has frames to make in between: *page (0 at first; textures
  * follow) moves over those that are there, the next ones are asked for. *more: to be called again, where *page has not
  * moved once a page has been read. */
-int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
-                              bool *more, struct spl_error *err);
+SPL_API int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
+                                      bool *more, struct spl_error *err);
 
 /* What is on the device: pages of `dataset` (NULL: none) and everything there. */
 struct spl_residency_info {
@@ -134,44 +153,84 @@ struct spl_residency_info {
     uint64_t pages_evicted; /* the same, to make room for others */
     uint64_t pages_pending; /* of all datasets, on their way */
 };
-void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
-                                struct spl_residency_info *info);
+SPL_API void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                        struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs give
  * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page has come for 10 s. A dataset without surface
  * is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT (field "layer") refuses
- * them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is dead,
- * destroy it and make a new one. */
-int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                        struct spl_frame *frame, struct spl_error *err);
+ * them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is
+ * dead, destroy it and make a new one. */
+SPL_API int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                const struct spl_view *view, struct spl_frame *frame, struct spl_error *err);
+
+/* How a frame is made, beyond what it shows. */
+struct spl_render_options {
+    size_t size;                    /* spl_render_options_init() */
+    const struct spl_image *images; /* the caller's, at most one a layer of the view; their pixels are written */
+    size_t image_count;
+    const struct spl_cancel *cancel; // may be NULL; polled before each tile and page, and every second of waiting
+};
+
+static inline void spl_render_options_init(struct spl_render_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
+/* The same as spl_renderer_render(), with options. An image of theirs has the layer, its type, the view's width and
+ * height, and pixels and row_bytes in multiples of 4 (0 = packed): SPL_E_USAGE (field "images") where not. `frame` has
+ * the layers that no image was given for, NULL pixels for the others, and the stats; it may be NULL where every layer
+ * has an image. What lies between the rows is not touched; after a failure the caller's pixels are anything. All
+ * pointers are borrowed until it returns. */
+SPL_API int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                                     const struct spl_view *view, const struct spl_render_options *options,
+                                     struct spl_frame *frame, struct spl_error *err);
+
+/* What lies under one point of a view. */
+struct spl_pick {
+    bool hit;            /* false: the rest is zero */
+    double position[3];  /* world, on the ray through the point */
+    double depth;        /* along the viewing axis */
+    double distance;     /* from the eye */
+    double normal[3];    /* unit, world axes; (0,0,0) = none is known */
+    uint8_t color[4];    /* of the splats, without textures */
+    int32_t classification; /* of the nearest splat; -1 = the dataset has none */
+    int64_t splat;       /* its index in the dataset; -1 = none is known */
+};
+
+/* Picks point (x, y) of the view's image, pixels from its left upper corner, so that a pixel's middle is at .5. One
+ * pixel is rendered as the view renders it, whatever its layers; SPL_E_USAGE names "x" or "y" outside the image. Blocks
+ * and fails as spl_renderer_render(). */
+SPL_API int spl_renderer_pick(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                              const struct spl_view *view, double x, double y, struct spl_pick *pick,
+                              struct spl_error *err);
 
 /* The same frame in steps of a tile at most, for a renderer that has others to make in between: any number may be
  * under way, pages and versions of other datasets may come and go, and each gets the bytes that it has alone. `dataset`
  * is borrowed and stays added until the end. begin() checks the view; on success the caller ends the steps. */
 struct spl_frame_steps;
-int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                    struct spl_frame_steps **out, struct spl_error *err);
+SPL_API int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                            const struct spl_view *view, struct spl_frame_steps **out, struct spl_error *err);
 
 /* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count) or the frame waits: then it makes
  * nothing and does not block. *more: there are others. Times
  * in the frame's stats are those of its own steps. Fails as spl_renderer_render() does; then the steps can only be
  * ended. */
-int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err);
+SPL_API int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err);
 
 /* Does it wait for pages? A step has nothing to do then; others may have come, or room, after each
  * spl_renderer_upload() and step of another frame. Who renders another frame to its end instead lets it wait again. */
-bool spl_frame_is_waiting(struct spl_frame_steps *steps);
+SPL_API bool spl_frame_is_waiting(struct spl_frame_steps *steps);
 
 /* Of spl_view_get_samples(), what is still to be made: a guess for whoever shares out turns. */
-uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);
+SPL_API uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);
 
 /* Frees the steps; NULL-safe, also after the renderer has gone. `frame`, if not NULL, takes what was made: the whole
  * frame after the last step, else all zero. */
-void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame);
+SPL_API void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame);
 
-uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer);  /* device bytes held */
+SPL_API uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer); /* device bytes held */
 
-/* Fault injection for tests: the next submit reports a lost device. */
-void spl_renderer_inject_loss(struct spl_renderer *renderer);
+SPL_END_DECLARATIONS
 
 #endif

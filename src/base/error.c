@@ -9,21 +9,21 @@
 #include "base/log.h"
 
 static const struct spl_code_info table[] = {
-    [-SPL_OK] = {"ok", 200, 0, false},
-    [-SPL_E_NOMEM] = {"out-of-memory", 503, 1, true},
-    [-SPL_E_IO] = {"io", 500, 1, false},
-    [-SPL_E_INPUT] = {"input", 400, 2, false},
-    [-SPL_E_USAGE] = {"usage", 400, 2, false},
-    [-SPL_E_UNSUPPORTED] = {"unsupported", 501, 2, false},
-    [-SPL_E_CORRUPT] = {"corrupt", 500, 2, false},
-    [-SPL_E_NOT_FOUND] = {"not-found", 404, 2, false},
-    [-SPL_E_LIMIT] = {"limit", 413, 2, false},
-    [-SPL_E_BUSY] = {"busy", 503, 1, true},
-    [-SPL_E_TIMEOUT] = {"timeout", 503, 1, true},
-    [-SPL_E_NO_DEVICE] = {"no-device", 503, 1, false},
-    [-SPL_E_DEVICE_LOST] = {"device-lost", 503, 1, true},
-    [-SPL_E_CANCELLED] = {"cancelled", 503, 1, true},
-    [-SPL_E_INTERNAL] = {"internal", 500, 1, false},
+    [-SPL_OK] = {"ok", false},
+    [-SPL_E_NOMEM] = {"out-of-memory", true},
+    [-SPL_E_IO] = {"io", false},
+    [-SPL_E_INPUT] = {"input", false},
+    [-SPL_E_USAGE] = {"usage", false},
+    [-SPL_E_UNSUPPORTED] = {"unsupported", false},
+    [-SPL_E_CORRUPT] = {"corrupt", false},
+    [-SPL_E_NOT_FOUND] = {"not-found", false},
+    [-SPL_E_LIMIT] = {"limit", false},
+    [-SPL_E_BUSY] = {"busy", true},
+    [-SPL_E_TIMEOUT] = {"timeout", true},
+    [-SPL_E_NO_DEVICE] = {"no-device", false},
+    [-SPL_E_DEVICE_LOST] = {"device-lost", true},
+    [-SPL_E_CANCELLED] = {"cancelled", true},
+    [-SPL_E_INTERNAL] = {"internal", false},
 };
 
 const struct spl_code_info *spl_code_get_info(int code)

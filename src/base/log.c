@@ -1,6 +1,7 @@
 /* Lines are put together in a buffer of their own thread's stack and written with one write(2) of less than PIPE_BUF
  * bytes, when poll(2) says that it will not block. The mutex keeps a second thread from taking the room that poll has
- * promised the first; it is held for one write that does not block. */
+ * promised the first; it is held for one write that does not block, or one call of a program's callback, which may
+ * not log: so the callback is gone once another has been set. */
 #include "base/log.h"
 
 #include <math.h>
@@ -19,6 +20,8 @@ enum { line_max = 2048, end_room = 8 }; /* what closes a string, an object and t
 static _Atomic(int) log_level = SPL_LOG_INFO, log_format = SPL_LOG_TEXT;
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static uint64_t dropped; // guarded by: mutex
+static void (*callback)(void *context, enum spl_log_level level, const char *message); // guarded by: mutex; may be NULL
+static void *callback_context;                                                         // guarded by: mutex
 
 static const char *const level_names[] = {"error", "warning", "info", "debug"};
 
@@ -30,6 +33,14 @@ struct line {
 void spl_log_set_level(enum spl_log_level level)
 {
     atomic_store(&log_level, (int)level);
+}
+
+void spl_log_set_callback(void (*log)(void *context, enum spl_log_level level, const char *message), void *context)
+{
+    pthread_mutex_lock(&mutex);
+    callback = log;
+    callback_context = context;
+    pthread_mutex_unlock(&mutex);
 }
 
 bool spl_log_is_on(enum spl_log_level level)
@@ -134,16 +145,9 @@ static void make_json(struct line *line, enum spl_log_level level, const char *m
     close_with(line, "}");
 }
 
-static void make_text(struct line *line, enum spl_log_level level, const char *message,
-                      const struct spl_log_field *fields, size_t count)
+/* The message and name=value… */
+static void add_message(struct line *line, const char *message, const struct spl_log_field *fields, size_t count)
 {
-    if (!isatty(STDERR_FILENO)) {
-        add_time(line);
-        add_char(line, ' ');
-    }
-    add_plain(line, "splatd: ");
-    add_plain(line, level_names[level]);
-    add_plain(line, ": ");
     add_outside(line, message, false);
     for (size_t i = 0; i < count; i++) {
         add_char(line, ' ');
@@ -156,6 +160,19 @@ static void make_text(struct line *line, enum spl_log_level level, const char *m
         else
             add_outside(line, fields[i].text, false);
     }
+}
+
+static void make_text(struct line *line, enum spl_log_level level, const char *message,
+                      const struct spl_log_field *fields, size_t count)
+{
+    if (!isatty(STDERR_FILENO)) {
+        add_time(line);
+        add_char(line, ' ');
+    }
+    add_plain(line, "splatd: ");
+    add_plain(line, level_names[level]);
+    add_plain(line, ": ");
+    add_message(line, message, fields, count);
 }
 
 static void make(struct line *line, enum spl_log_level level, const char *message, const struct spl_log_field *fields,
@@ -180,6 +197,14 @@ void spl_log_fields(enum spl_log_level level, const char *message, const struct 
     if (!spl_log_is_on(level))
         return;
     pthread_mutex_lock(&mutex);
+    if (callback) {
+        line.used = 0;
+        add_message(&line, message, fields, count);
+        line.text[line.used] = '\0';
+        callback(callback_context, level, line.text);
+        pthread_mutex_unlock(&mutex);
+        return;
+    }
     if (dropped) {
         struct spl_log_field lines = {"lines", NULL, (double)dropped};
         make(&line, SPL_LOG_WARN, "stderr did not take log lines, they are lost", &lines, 1);

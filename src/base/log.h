@@ -1,21 +1,20 @@
-/* Leveled messages to stderr, as text or JSON: one line each, one write, so that lines of several threads never mix.
- * Any thread. Never blocks on who reads: a line that stderr does not take at once is dropped and counted, and the next
- * line that gets through says how many were. What came from outside cannot break a line: control characters become '?'.
- */
+/* Leveled messages to a program's callback, or to stderr as text or JSON: one line each, one write, so that lines of
+ * several threads never mix. Any thread. Never blocks on who reads: a line that stderr does not take at once is dropped
+ * and counted, and the next line that gets through says how many were. What came from outside cannot break a line:
+ * control characters become '?'. */
 #ifndef SPL_BASE_LOG_H
 #define SPL_BASE_LOG_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-enum spl_log_level { SPL_LOG_ERROR, SPL_LOG_WARN, SPL_LOG_INFO, SPL_LOG_DEBUG };
+#include <splatd/log.h>
+
 enum spl_log_format {
     SPL_LOG_TEXT, /* TIME splatd: LEVEL: MESSAGE name=value…, without TIME on a terminal */
     SPL_LOG_JSON, /* {"time", "level", "message", name: value…} */
 };
 
-/* Messages above `level` are dropped; SPL_LOG_INFO at start. */
-void spl_log_set_level(enum spl_log_level level);
 bool spl_log_is_on(enum spl_log_level level);
 
 /* SPL_LOG_TEXT at start. */

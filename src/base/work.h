@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <splatd/cancel.h>
+
 #include "base/error.h"
 
 struct spl_work { // owned by: the thread that works
@@ -16,6 +18,12 @@ struct spl_work { // owned by: the thread that works
 static inline bool spl_is_cancelled(const atomic_bool *cancelled)
 {
     return cancelled && atomic_load_explicit(cancelled, memory_order_relaxed);
+}
+
+/* The flag inside a caller's `cancel`, which may be NULL. */
+static inline const atomic_bool *spl_cancel_get_flag(const struct spl_cancel *cancel)
+{
+    return cancel ? (const atomic_bool *)&cancel->cancelled : NULL;
 }
 
 /* Takes a step; false when none is left. */

@@ -36,7 +36,7 @@ static int write_picture(const struct arguments *a, const char *view, const char
     struct spl_encoded encoded = {0};
     if (snprintf(path, sizeof path, "%s/%s.%s.png", a->folder, view, what) >= (int)sizeof path)
         return spl_fail(err, SPL_E_USAGE, "%s: the path is too long", a->folder);
-    int rc = spl_image_encode(image, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, err);
+    int rc = spl_image_encode(image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(path, encoded.bytes, encoded.length, err);
     spl_encoded_finish(&encoded);
@@ -126,7 +126,7 @@ static int run(const struct arguments *a, struct spl_error *err)
                       a->dataset);
         goto done;
     }
-    if ((rc = spl_renderer_create(&(struct spl_renderer_options){.device = a->device}, &renderer, err)) ||
+    if ((rc = spl_renderer_create(&SPL_SIZED(spl_renderer_options, .device = a->device), &renderer, err)) ||
         (rc = spl_renderer_add(renderer, dataset, err)))
         goto done;
     if (a->folder && mkdir(a->folder, 0777) && errno != EEXIST) {

@@ -235,7 +235,7 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
     s->atoms = a->atoms;
     s->atom_count = a->atom_count;
     s->atoms_listed = a->listed[3];
-    s->sweep.renderer = (struct spl_renderer_options){.device = a->devices[0], .memory_limit = a->bench.memory_limit};
+    s->sweep.renderer = SPL_SIZED(spl_renderer_options, .device = a->devices[0], .memory_limit = a->bench.memory_limit);
     return 0;
 }
 

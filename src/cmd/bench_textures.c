@@ -146,7 +146,7 @@ struct bench {
 /* What is measured of frames: the times of passes, and photographs where there are cameras. */
 static int render(struct bench *b, struct spl_error *err)
 {
-    const struct spl_renderer_options how = {.device = b->a.device};
+    const struct spl_renderer_options how = {.size = sizeof how, .device = b->a.device};
     struct spl_renderer *renderer = NULL;
     int rc = spl_renderer_create(&how, &renderer, err);
     if (!rc)

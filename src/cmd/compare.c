@@ -158,7 +158,7 @@ static int write_map(const struct arguments *a, const struct spl_image *image, c
         return spl_fail(err, SPL_E_INPUT, "--error-map needs the colours of both");
     int rc = spl_error_map(image, truth, &map, err);
     if (!rc)
-        rc = spl_image_encode(&map, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, err);
+        rc = spl_image_encode(&map, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(a->map, encoded.bytes, encoded.length, err);
     spl_encoded_finish(&encoded);

@@ -45,7 +45,7 @@ int spl_cmd_write_dictionary(const struct spl_dataset *dataset, const char *path
         pixels[4 * i + 3] = 255;
     for (uint32_t a = 0; a < dictionary->count; a++)
         draw_atom(dictionary, a, &image, line + a % columns * pitch, line + a / columns * pitch);
-    int rc = spl_image_encode(&image, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, err);
+    int rc = spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(path, encoded.bytes, encoded.length, err);
     spl_encoded_finish(&encoded);

@@ -9,6 +9,8 @@
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
     *drawing = (struct spl_cmd_drawing){.width = width, .height = height, .format = -1, .layer = SPL_LAYER_COLOR};
+    spl_encode_options_init(&drawing->encode);
+    spl_renderer_options_init(&drawing->renderer);
     spl_view_init(&drawing->view);
     drawing->view.layers = 1u << SPL_LAYER_COLOR;
 }

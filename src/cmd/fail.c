@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/exit.h"
 #include "base/log.h"
 
 int spl_cmd_fail(const struct spl_error *err)
@@ -14,5 +15,5 @@ int spl_cmd_fail(const struct spl_error *err)
         spl_log_error("%s%s%s", field, colon, err->message);
     else
         fprintf(stderr, "splatd: %s%s%s\n", field, colon, err->message);
-    return spl_code_get_info(err->code)->exit_code;
+    return spl_exit_code(err->code);
 }

@@ -266,8 +266,11 @@ int spl_cmd_pack(int argc, char **argv)
 {
     struct spl_cmd_progress progress = {0};
     struct arguments a = {
-        .pack = {.progress = spl_cmd_progress, .warn = say_warning, .progress_context = &progress},
-        .photos = {.trained = say_trained, .context = &progress},
+        .pack = {.size = sizeof a.pack,
+                 .progress = spl_cmd_progress,
+                 .warn = say_warning,
+                 .progress_context = &progress},
+        .photos = {.size = sizeof a.photos, .trained = say_trained, .context = &progress},
         .textures = -1,
     };
     struct spl_pack_report report = {0};

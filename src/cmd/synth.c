@@ -7,14 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <splatd/synth.h>
-
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "cmd/table.h"
 #include "synth/exact.h"
 #include "synth/pictures.h"
+#include "synth/synth.h"
 
 struct arguments {
     struct spl_synth_options scan;

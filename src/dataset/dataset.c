@@ -14,6 +14,7 @@
 #include <xxhash.h>
 
 #include "base/memory.h"
+#include "base/sized.h"
 #include "dataset/open.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
@@ -37,6 +38,27 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
     return spl_dataset_open_until(path, verify, NULL, out, err);
+}
+
+int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
+                          struct spl_error *err)
+{
+    struct spl_open_options known = {0};
+    *out = NULL;
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    if (rc)
+        return rc;
+    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    if (!known.reader)
+        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+    struct spl_reader reader = {0};
+    if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
+        return rc;
+    if (!reader.read)
+        return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
+    const struct spl_dataset_source source = {
+        .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
+    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
 }
 
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/parallel.h"
+#include "image/rows.h"
 
 struct job {
     const struct spl_image *small;
@@ -101,26 +102,26 @@ static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worke
     const void *from = j->small->pixels;
     for (size_t y = j->first + begin; y < j->first + end; y++) {
         struct axis row = place((uint32_t)y, j->scale, j->small->height);
+        void *to = spl_image_row(j->large, y);
         for (uint32_t x = 0; x < j->large->width; x++) {
             struct axis column = place(x, j->scale, j->small->width);
             struct taps t = place_taps(&column, &row, j->small->width);
-            size_t at = y * j->large->width + x;
             switch (j->large->layer) {
             case SPL_LAYER_COLOR:
-                color(from, &t, (uint8_t *)j->large->pixels + 4 * at);
+                color(from, &t, (uint8_t *)to + 4 * (size_t)x);
                 break;
             case SPL_LAYER_DEPTH:
             case SPL_LAYER_RANGE:
-                ((float *)j->large->pixels)[at] = distance(from, &t, 0.01f / (float)j->scale);
+                ((float *)to)[x] = distance(from, &t, 0.01f / (float)j->scale);
                 break;
             case SPL_LAYER_NORMAL:
-                normal(from, &t, (float *)j->large->pixels + 3 * at);
+                normal(from, &t, (float *)to + 3 * (size_t)x);
                 break;
             case SPL_LAYER_COVERAGE:
-                ((float *)j->large->pixels)[at] = coverage(from, &t);
+                ((float *)to)[x] = coverage(from, &t);
                 break;
             default:
-                ((uint32_t *)j->large->pixels)[at] = ((const uint32_t *)from)[t.at[0]];
+                ((uint32_t *)to)[x] = ((const uint32_t *)from)[t.at[0]];
             }
         }
     }

@@ -6,7 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
+#include "base/sized.h"
 #include "image/encode.h"
+#include "image/rows.h"
 
 enum { DEFAULT_QUALITY = 90 };
 static const double default_depth_scale = 1000;
@@ -110,16 +113,16 @@ static int check(const struct spl_image *image, const struct spl_encode_options 
     if (!image->width || !image->height || !image->pixels)
         return spl_fail(err, SPL_E_USAGE, "an image of %u x %u pixels has nothing to encode", image->width,
                         image->height);
+    if (image->row_bytes && image->row_bytes < (size_t)image->width * spl_pixel_bytes(image->type))
+        return spl_fail(err, SPL_E_USAGE, "rows of %u pixels do not fit row_bytes %zu", image->width,
+                        image->row_bytes);
     return SPL_OK;
 }
 
-int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
-                     struct spl_error *err)
+static int encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                  struct spl_error *err)
 {
-    memset(out, 0, sizeof *out);
-    int rc = check(image, options, err);
-    if (rc)
-        return rc;
+    int rc;
     switch (options->format) {
     case SPL_FORMAT_JPEG:
         rc = spl_encode_jpeg(image, options->quality ? options->quality : DEFAULT_QUALITY, spl_encode_chroma(options),
@@ -140,5 +143,37 @@ int spl_image_encode(const struct spl_image *image, const struct spl_encode_opti
     out->media_type = spl_format_media_type(options->format);
     if (rc)
         spl_encoded_finish(out);
+    return rc;
+}
+
+/* Encoders take packed rows. */
+static int pack_rows(const struct spl_image *image, struct spl_image *packed, struct spl_error *err)
+{
+    size_t bytes = (size_t)image->width * spl_pixel_bytes(image->type);
+    *packed = *image;
+    packed->row_bytes = 0;
+    packed->pixels = spl_alloc_raw(image->height, bytes, err);
+    for (uint32_t y = 0; packed->pixels && y < image->height; y++)
+        memcpy((char *)packed->pixels + y * bytes, spl_image_row(image, y), bytes);
+    return packed->pixels ? SPL_OK : SPL_E_NOMEM;
+}
+
+int spl_image_encode(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                     struct spl_error *err)
+{
+    struct spl_encode_options known = {0};
+    memset(out, 0, sizeof *out);
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_encode_options", err);
+    if (!rc)
+        rc = check(image, &known, err);
+    if (rc)
+        return rc;
+    if (!image->row_bytes)
+        return encode(image, &known, out, err);
+    struct spl_image packed;
+    rc = pack_rows(image, &packed, err);
+    if (!rc)
+        rc = encode(&packed, &known, out, err);
+    spl_image_finish(&packed);
     return rc;
 }

@@ -30,7 +30,8 @@ static int open_renderers(struct bench *b, struct spl_error *err)
 {
     const struct spl_bench_options *o = b->options;
     for (size_t i = 0; i < o->device_count; i++) {
-        struct spl_renderer_options options = {.device = o->devices[i], .memory_limit = o->memory_limit};
+        struct spl_renderer_options options = {
+            .size = sizeof options, .device = o->devices[i], .memory_limit = o->memory_limit};
         int status = spl_renderer_create(&options, &b->renderers[i], err);
         for (size_t d = 0; !status && d < o->dataset_count; d++) {
             status = spl_renderer_add(b->renderers[i], o->datasets[d], err);

@@ -45,7 +45,8 @@ int spl_thumbnail(const struct spl_image *color, uint32_t side, struct spl_encod
     for (uint32_t y = 0; y < small.height; y++)
         for (uint32_t x = 0; x < small.width; x++)
             box_mean(color, x * factor, y * factor, factor, pixels + 4 * ((size_t)y * small.width + x));
-    struct spl_encode_options options = {.format = SPL_FORMAT_JPEG, .quality = thumbnail_quality};
+    struct spl_encode_options options = {
+        .size = sizeof options, .format = SPL_FORMAT_JPEG, .quality = thumbnail_quality};
     int rc = spl_image_encode(&small, &options, out, err);
     free(pixels);
     return rc;

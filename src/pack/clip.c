@@ -72,6 +72,8 @@ static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
     const struct lines *l = context;
     struct spl_points *p = l->points;
     struct spl_nearest near;
+    if (spl_stage_is_cancelled(l->stage))
+        return;
     spl_nearest_init(&near);
     for (size_t i = begin; i < end; i++) {
         double direction[2] = {0}, far;
@@ -104,5 +106,5 @@ int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neigh
     spl_stage_begin(stage, "clip lines", "points", points->count);
     spl_parallel_for(stage->threads, points->count, 4096, find_lines, &lines);
     spl_stage_end(stage);
-    return SPL_OK;
+    return spl_stage_check(stage, err);
 }

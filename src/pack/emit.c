@@ -362,6 +362,8 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
         for (size_t i = 0; !rc && i < count; i++)
             rc = write_node(&e, e.first + i, &e.batch[i], writer, &chunk_capacity, out, err);
         clear_batch(e.batch);
+        if (!rc)
+            rc = spl_stage_check(stage, err);
     }
     if (!rc) {
         unite_boxes(out->nodes, tree->count);

@@ -133,6 +133,8 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         spl_stage_add(stage, batch->count, 0);
         grow_box(scan, batch);
         rc = append(p, batch, attributes, p->station_count, scan->path, err);
+        if (!rc)
+            rc = spl_stage_check(stage, err);
     }
     info = spl_cloud_get_info(cloud);
     if (!rc && attributes & SPL_CLOUD_STATION)

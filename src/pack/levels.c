@@ -236,7 +236,7 @@ static void build_nodes(void *context, size_t begin, size_t end, unsigned worker
         struct spl_tree_node *node = &l->tree->nodes[l->order[i]];
         if (!build_node(l, &l->scratch[worker], node))
             atomic_store(&l->failed, true);
-        if (atomic_load(&l->failed))
+        if (atomic_load(&l->failed) || spl_stage_is_cancelled(l->stage))
             return;
         spl_stage_add(l->stage, 1, worker);
     }
@@ -269,6 +269,8 @@ int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, str
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory while building the levels of detail");
             goto done;
         }
+        if ((rc = spl_stage_check(stage, err)))
+            goto done;
     }
     spl_stage_end(stage);
 done:

@@ -60,6 +60,8 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
         l.length_min = length_min[k > 0];
         rc = search_level(points, &l, stage->threads, &marked, err);
         spl_stage_add(stage, 1, 0);
+        if (!rc)
+            rc = spl_stage_check(stage, err);
         if (rc || l.cells.count < 8 || l.cells.shift + 1 > SPL_CELLS_SHIFT_MAX || k + 1 == levels_max)
             break;
         rc = spl_cells_init_above(&above.cells, &l.cells, stage->threads, err);

@@ -16,6 +16,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "pack/emit.h"
 #include "pack/linear.h"
 #include "pack/median.h"
@@ -131,6 +132,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
         rc = spl_emit(&p->tree, &p->points, &p->wires, &p->chunk, p->writer, p->stage, &p->emitted, err);
     if (rc)
         return rc;
+    if ((rc = spl_stage_check(p->stage, err)))
+        return rc;
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
@@ -214,10 +217,14 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
         plan(&p, photographs);
         rc = spl_points_gather(&p.points, &p.scans, stage, err);
     }
+    if (!rc)
+        rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
         spl_scans_compare(&p.scans, options->warn, options->progress_context);
     if (!rc)
         rc = spl_points_order(&p.points, stage, err);
+    if (!rc)
+        rc = spl_stage_check(stage, err);
     if (!rc && !options->no_linear)
         rc = spl_linear_find(&p.points, stage, err);
     if (!rc)
@@ -314,14 +321,27 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_stage 
     return rc;
 }
 
-int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+static int pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
-                              .threads = spl_thread_count(options->threads)};
+                              .threads = spl_thread_count(options->threads),
+                              .cancelled = spl_cancel_get_flag(options->cancel)};
     return options->photos ? pack_photos(options, &stage, report, err)
                            : pack_scan(options, options->output, 0, &stage, report, err);
+}
+
+int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
+{
+    struct spl_pack_options known = {0};
+    struct spl_photo_options photos = {0};
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_pack_options", err);
+    if (!rc && known.photos) {
+        rc = spl_sized_read(known.photos, &photos, sizeof photos, "spl_photo_options", err);
+        known.photos = &photos;
+    }
+    return rc ? rc : pack(&known, report, err);
 }

@@ -109,6 +109,7 @@ int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t co
                                   .max = {-INFINITY, -INFINITY, -INFINITY}};
         spl_cloud_destroy(cloud);
         spl_stage_add(stage, 1, 0);
+        rc = spl_stage_check(stage, err);
     }
     spl_stage_end(stage);
     if (rc)

@@ -105,6 +105,11 @@ void spl_stage_add(struct spl_stage *stage, uint64_t items, unsigned worker)
         report(stage, now);
 }
 
+int spl_stage_check(const struct spl_stage *stage, struct spl_error *err)
+{
+    return spl_stage_is_cancelled(stage) ? spl_fail(err, SPL_E_CANCELLED, "packing was cancelled") : SPL_OK;
+}
+
 void spl_stage_end(struct spl_stage *stage)
 {
     report(stage, spl_now_ns());

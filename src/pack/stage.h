@@ -9,6 +9,8 @@
 
 #include <splatd/pack.h>
 
+#include "base/work.h"
+
 enum { SPL_STAGE_PARTS_MAX = 16 };
 
 /* Work that is planned: `work` in seconds of the machine that it was measured on. Only ratios matter once some of it is
@@ -23,6 +25,7 @@ struct spl_stage {
     void (*callback)(void *context, const struct spl_progress *progress); /* may be NULL */
     void *context;
     unsigned threads; /* of all parallel loops of this run, >= 1 */
+    const atomic_bool *cancelled; // may be NULL
     const char *name, *unit;
     uint64_t total, begin_ns, reported_ns;
     atomic_uint_fast64_t done;
@@ -45,6 +48,14 @@ void spl_stage_begin(struct spl_stage *stage, const char *name, const char *unit
 
 /* Adds `items` done; reports at most every 100 ms, and only from worker 0, which is the caller's thread. */
 void spl_stage_add(struct spl_stage *stage, uint64_t items, unsigned worker);
+
+/* Whether the run was cancelled: then a loop's pieces do nothing, which the loop's caller finds out by
+ * spl_stage_check() before it uses what they should have made. Any thread. */
+static inline bool spl_stage_is_cancelled(const struct spl_stage *stage)
+{
+    return spl_is_cancelled(stage->cancelled);
+}
+int spl_stage_check(const struct spl_stage *stage, struct spl_error *err); /* SPL_E_CANCELLED */
 
 /* Reports the stage's end with what was counted. */
 void spl_stage_end(struct spl_stage *stage);

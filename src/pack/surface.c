@@ -102,6 +102,8 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         size_t begin = b * block_points;
         size_t end = begin + block_points < s->points->count ? begin + block_points : s->points->count;
         struct spl_nearest near;
+        if (spl_stage_is_cancelled(s->stage))
+            return;
         spl_nearest_init(&near);
         for (size_t i = begin; i < end; i++) {
             spl_neighbours_find(s->neighbours, i, s->k, &near);
@@ -272,6 +274,8 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while estimating the normals of %zu points", points->count);
         goto done;
     }
+    if ((rc = spl_stage_check(stage, err)))
+        goto done;
     if (s.label) {
         rc = join_blocks(&s, err);
         if (rc)

@@ -22,7 +22,9 @@ static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
     bool awaited = !job->view->partial || slot == SPL_FIRST_SLOT;
-    int rc = spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
+    int rc = spl_is_cancelled(job->cancelled)
+                 ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
+                 : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
     bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT); // for which a coarser one stands in
     if (rc < 0 && !no_room)
         spl_fail(&job->page_error, rc, "%s", why.message);

@@ -4,6 +4,7 @@
 #define SPL_RENDER_FRAME_H
 
 #include "base/clock.h"
+#include "base/work.h"
 #include "render/hold.h"
 #include "render/renderer.h"
 #include "render/tiling.h"
@@ -14,6 +15,7 @@ struct spl_frame_job {
     const struct spl_view *view;           /* at least one sample a pixel */
     struct spl_frame *frame;
     struct spl_tiling tiling;
+    const atomic_bool *cancelled;  // may be NULL
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
 };

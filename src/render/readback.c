@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "image/rows.h"
+
 enum spl_pixel_type spl_readback_type(enum spl_layer layer)
 {
     switch (layer) {
@@ -48,13 +50,13 @@ void spl_readback_tile(const struct spl_tile *tile, const uint32_t *words, struc
         size_t pixel_bytes = spl_pixel_bytes(image->type);
         const uint32_t *from = words + (size_t)tile->width * tile->height * spl_readback_rank(layers, layer);
         for (uint32_t y = 0; y < tile->height; y++, from += tile->width) {
-            size_t at = (size_t)(tile->y + y) * image->width + tile->x;
+            void *to = (char *)spl_image_row(image, tile->y + y) + tile->x * pixel_bytes;
             if (layer != SPL_LAYER_NORMAL) {
-                memcpy((char *)image->pixels + at * pixel_bytes, from, tile->width * pixel_bytes);
+                memcpy(to, from, tile->width * pixel_bytes);
                 continue;
             }
             for (uint32_t x = 0; x < tile->width; x++)
-                unpack_normal(from[x], (float *)image->pixels + 3 * (at + x));
+                unpack_normal(from[x], (float *)to + 3 * (size_t)x);
         }
     }
 }

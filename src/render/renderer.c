@@ -3,6 +3,8 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/sized.h"
+#include "render/fault.h"
 #include "render/hold.h"
 #include "render/renderer.h"
 #include "render/slot.h"
@@ -10,9 +12,13 @@
 enum { preload_ahead = 8 }; // pages that are asked for at once
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S, between_looks_ns = SPL_NS_PER_S;
 
-int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
+int spl_renderer_create(const struct spl_renderer_options *given, struct spl_renderer **out, struct spl_error *err)
 {
+    struct spl_renderer_options known = {0}, *options = &known;
     *out = NULL;
+    int rc = spl_sized_read(given, options, sizeof known, "spl_renderer_options", err);
+    if (rc)
+        return rc;
     struct spl_renderer *renderer = spl_alloc(1, sizeof *renderer, err);
     if (!renderer)
         return SPL_E_NOMEM;
@@ -22,7 +28,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
         .debug = options->debug,
         .memory_limit = options->memory_limit,
     };
-    int rc = spl_gpu_open(&gpu, &renderer->gpu, err);
+    rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
     }

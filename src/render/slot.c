@@ -15,13 +15,11 @@ uint32_t spl_slot_count(const struct spl_dataset *dataset)
 size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    size_t bytes;
     if (slot >= 2 * info->pages)
         return info->dictionary_bytes;
     if (slot >= info->pages)
         return spl_dataset_get_texture_bytes(dataset, slot - info->pages);
-    spl_dataset_get_page(dataset, slot, &bytes);
-    return bytes + 4;
+    return spl_dataset_get_page_bytes(dataset, slot) + 4;
 }
 
 int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error *err)

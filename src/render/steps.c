@@ -9,11 +9,15 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/sized.h"
 #include "geom/size.h"
 #include "image/enlarge.h"
+#include "image/rows.h"
 #include "render/frame.h"
 #include "render/method.h"
+#include "render/pick.h"
 #include "render/readback.h"
+#include "render/view.h"
 
 enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
 
@@ -25,15 +29,65 @@ struct spl_frame_steps {
     struct spl_frame_job job;
     uint32_t x, y; /* corner of the next tile; y = height: all are there */
     uint32_t row;  /* of `enlarged`, the next */
+    uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
     bool prepared; /* its plan is made, for which it may have waited */
 };
+
+/* The frame that is handed out at the end. */
+static struct spl_frame *get_made(struct spl_frame_steps *steps)
+{
+    return steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+}
+
+static int check_image(const struct spl_image *image, const struct spl_view *view, struct spl_error *err)
+{
+    const uint32_t unit = sizeof(uint32_t); /* pixels are stored as words */
+    if ((unsigned)image->layer >= SPL_LAYER_COUNT || !(view->layers >> image->layer & 1))
+        return spl_fail_field(err, SPL_E_USAGE, "images", "an image is of layer %d, which the view does not have",
+                              (int)image->layer);
+    if (image->type != spl_readback_type(image->layer) || image->width != view->camera.width ||
+        image->height != view->camera.height)
+        return spl_fail_field(err, SPL_E_USAGE, "images", "the image of layer %s has another type or size than the view",
+                              spl_layer_name(image->layer));
+    if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
+        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type))
+        return spl_fail_field(err, SPL_E_USAGE, "images",
+                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, or "
+                              "rows that overlap",
+                              spl_layer_name(image->layer), unit);
+    return SPL_OK;
+}
+
+static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
+                         struct spl_error *err)
+{
+    for (size_t i = 0; i < options->image_count; i++) {
+        const struct spl_image *image = &options->images[i];
+        int rc = check_image(image, &steps->wanted, err);
+        if (rc)
+            return rc;
+        if (steps->borrowed >> image->layer & 1)
+            return spl_fail_field(err, SPL_E_USAGE, "images", "there are two images of layer %s",
+                                  spl_layer_name(image->layer));
+        get_made(steps)->images[image->layer] = *image;
+        steps->borrowed |= 1u << image->layer;
+    }
+    return SPL_OK;
+}
+
+static void give_images_back(struct spl_frame_steps *steps)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (steps->borrowed >> layer & 1)
+            get_made(steps)->images[layer] = (struct spl_image){0};
+}
 
 static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
 {
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-        if (!(view->layers >> layer & 1))
-            continue;
         struct spl_image *image = &frame->images[layer];
+        if (!(view->layers >> layer & 1) || image->pixels) /* the caller's */
+            continue;
         *image = (struct spl_image){.layer = layer,
                                     .type = spl_readback_type(layer),
                                     .width = view->camera.width,
@@ -83,18 +137,21 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 }
 
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                 bool alone, struct spl_frame_steps **out, struct spl_error *err)
+                 bool alone, const struct spl_render_options *options, struct spl_frame_steps **out,
+                 struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    struct spl_view known;
     *out = NULL;
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    int rc = spl_view_check(view, err);
+    int rc = spl_view_read(view, &known, err);
     if (!rc)
-        rc = spl_view_check_layers(view, info, err);
+        rc = spl_view_check_layers(&known, info, err);
     if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
+    view = &known;
     struct spl_frame_steps *steps = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;
@@ -105,9 +162,12 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (view->supersample < 1)
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->job.hold.alone = alone;
     steps->frame.stats.complete = true;
-    if ((rc = prepare(steps, err)) < 0) {
+    if (options)
+        rc = borrow_images(steps, options, err);
+    if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
         return rc;
     }
@@ -119,7 +179,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err)
 {
-    return begin(renderer, dataset, view, false, out, err);
+    return begin(renderer, dataset, view, false, NULL, out, err);
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -157,6 +217,8 @@ static void enlarge(struct spl_frame_steps *steps)
 static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    if (spl_is_cancelled(steps->job.cancelled))
+        return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
     int rc = spl_residency_upload(&steps->job.renderer->residency, err);
     if (!rc)
         rc = spl_hold_poll(&steps->job.hold, err);
@@ -206,7 +268,8 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         *frame = (struct spl_frame){0};
     if (!steps)
         return;
-    struct spl_frame *made = steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+    struct spl_frame *made = get_made(steps);
+    give_images_back(steps);
     if (frame && !spl_frame_get_samples_left(steps)) {
         steps->enlarged.stats = steps->frame.stats;
         *frame = *made;
@@ -221,16 +284,54 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
 int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                         struct spl_frame *frame, struct spl_error *err)
 {
-    struct spl_frame_steps *steps;
+    const struct spl_render_options none = {.size = sizeof none};
+    return spl_renderer_render_with(renderer, dataset, view, &none, frame, err);
+}
+
+int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                             const struct spl_view *view, const struct spl_render_options *options,
+                             struct spl_frame *frame, struct spl_error *err)
+{
+    struct spl_frame_steps *steps = NULL;
+    struct spl_render_options known = {0};
     bool more = true;
-    int rc = begin(renderer, dataset, view, true, &steps, err);
+    int rc = spl_sized_read(options, &known, sizeof known, "spl_render_options", err);
+    if (!rc)
+        rc = begin(renderer, dataset, view, true, &known, &steps, err);
+    if (!rc && !frame && steps->borrowed != steps->wanted.layers)
+        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
+                            steps->wanted.layers & ~steps->borrowed);
     while (!rc && more) {
-        rc = spl_frame_step(steps, view->deadline_ns, &more, err);
+        rc = spl_frame_step(steps, steps->wanted.deadline_ns, &more, err);
         if (!rc && more && spl_frame_is_waiting(steps))
-            spl_renderer_wait(renderer, view->deadline_ns);
+            spl_renderer_wait(renderer, steps->wanted.deadline_ns);
     }
     spl_frame_end(steps, rc ? NULL : frame);
-    if (rc)
+    if (rc && frame)
         memset(frame, 0, sizeof *frame);
+    return rc;
+}
+
+int spl_renderer_pick(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                      double x, double y, struct spl_pick *pick, struct spl_error *err)
+{
+    struct spl_frame frame;
+    struct spl_view known, pixel;
+    *pick = (struct spl_pick){0};
+    int rc = spl_view_read(view, &known, err);
+    if (rc)
+        return rc;
+    view = &known;
+    if (!(x >= 0 && x <= view->camera.width))
+        return spl_fail_field(err, SPL_E_USAGE, "x", "x %g is outside the image, 0 to %u", x, view->camera.width);
+    if (!(y >= 0 && y <= view->camera.height))
+        return spl_fail_field(err, SPL_E_USAGE, "y", "y %g is outside the image, 0 to %u", y, view->camera.height);
+    spl_pick_view(view, x, y, &pixel);
+    if (!spl_method_has_normals(view->method, spl_dataset_get_info(dataset)))
+        pixel.layers &= ~(1u << SPL_LAYER_NORMAL);
+    rc = spl_renderer_render(renderer, dataset, &pixel, &frame, err);
+    if (!rc)
+        spl_pick_read(&view->camera, x, y, &frame, dataset, pick);
+    spl_frame_finish(&frame);
     return rc;
 }

@@ -1,18 +1,19 @@
 /* A view's defaults, its names and its limits. Pure; any thread. */
-#include <splatd/render.h>
+#include "render/view.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "base/error.h"
+#include "base/sized.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
 #define PIXELS_MAX (1ull << 28)
 
-void spl_view_init(struct spl_view *view)
+void spl_view_init_sized(struct spl_view *view, size_t size)
 {
-    *view = (struct spl_view){
+    struct spl_view known = {
         .method = SPL_METHOD_DEFAULT,
         .layers = 1u << SPL_LAYER_COLOR,
         .lod = 1,
@@ -21,7 +22,11 @@ void spl_view_init(struct spl_view *view)
         .deadline_ns = UINT64_MAX,
     };
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
-        spl_view_set_param(view, i, spl_method_param_get(i)->otherwise);
+        spl_view_set_param(&known, i, spl_method_param_get(i)->otherwise);
+    spl_sized_init(view, size);
+    size_t bytes = size < sizeof known ? size : sizeof known;
+    if (bytes > sizeof size)
+        memcpy((char *)view + sizeof size, (const char *)&known + sizeof size, bytes - sizeof size);
 }
 
 uint64_t spl_view_get_samples(const struct spl_view *view)
@@ -36,7 +41,7 @@ uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
     return pixel * view->camera.width * view->camera.height;
 }
 
-int spl_view_check(const struct spl_view *view, struct spl_error *err)
+static int check(const struct spl_view *view, struct spl_error *err)
 {
     int rc = spl_camera_check(&view->camera, err);
     if (rc)
@@ -84,6 +89,19 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
                               "other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
     return SPL_OK;
+}
+
+int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)
+{
+    spl_view_init(view);
+    int rc = spl_sized_read(given, view, sizeof *view, "spl_view", err);
+    return rc ? rc : check(view, err);
+}
+
+int spl_view_check(const struct spl_view *view, struct spl_error *err)
+{
+    struct spl_view known;
+    return spl_view_read(view, &known, err);
 }
 
 void spl_frame_finish(struct spl_frame *frame)

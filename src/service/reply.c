@@ -81,6 +81,27 @@ char *spl_problem_print(const struct request *request, unsigned status, const ch
     return text;
 }
 
+/* The status of each code; what is not here is 500. */
+static unsigned status_of_code(int code)
+{
+    static const unsigned short statuses[] = {
+        [-SPL_OK] = MHD_HTTP_OK,
+        [-SPL_E_NOMEM] = MHD_HTTP_SERVICE_UNAVAILABLE,
+        [-SPL_E_INPUT] = MHD_HTTP_BAD_REQUEST,
+        [-SPL_E_USAGE] = MHD_HTTP_BAD_REQUEST,
+        [-SPL_E_UNSUPPORTED] = MHD_HTTP_NOT_IMPLEMENTED,
+        [-SPL_E_NOT_FOUND] = MHD_HTTP_NOT_FOUND,
+        [-SPL_E_LIMIT] = MHD_HTTP_CONTENT_TOO_LARGE,
+        [-SPL_E_BUSY] = MHD_HTTP_SERVICE_UNAVAILABLE,
+        [-SPL_E_TIMEOUT] = MHD_HTTP_SERVICE_UNAVAILABLE,
+        [-SPL_E_NO_DEVICE] = MHD_HTTP_SERVICE_UNAVAILABLE,
+        [-SPL_E_DEVICE_LOST] = MHD_HTTP_SERVICE_UNAVAILABLE,
+        [-SPL_E_CANCELLED] = MHD_HTTP_SERVICE_UNAVAILABLE,
+    };
+    bool known = code <= 0 && (size_t)-code < sizeof statuses / sizeof *statuses && statuses[-code];
+    return known ? statuses[-code] : MHD_HTTP_INTERNAL_SERVER_ERROR;
+}
+
 /* 413 is about bodies, which only PUT brings; a parameter beyond a limit is the client's to change, like any other, and
  * for a view the device has too little memory, whatever was sent. */
 static unsigned status_of(const struct request *request, const struct spl_error *err)
@@ -89,7 +110,7 @@ static unsigned status_of(const struct request *request, const struct spl_error 
         return MHD_HTTP_BAD_REQUEST;
     if (err->code == SPL_E_LIMIT && strcmp(request->method, MHD_HTTP_METHOD_PUT))
         return MHD_HTTP_INSUFFICIENT_STORAGE;
-    return (unsigned)spl_code_get_info(err->code)->http_status;
+    return status_of_code(err->code);
 }
 
 char *spl_problem_text(const struct request *request, const struct spl_error *err)

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/exit.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/access/access.h"
@@ -90,7 +91,7 @@ static void end_now(int number)
 
 static void end_in(const struct spl_service *service, unsigned seconds)
 {
-    end_code = service->failure.code ? spl_code_get_info(service->failure.code)->exit_code : 0;
+    end_code = spl_exit_code(service->failure.code);
     if (seconds)
         signal(SIGALRM, end_now);
     alarm(seconds);

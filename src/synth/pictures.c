@@ -70,7 +70,7 @@ static int write_image(const struct run *r, const char *name, const char *extens
                        enum spl_format format, struct spl_error *err)
 {
     struct spl_encoded encoded;
-    const struct spl_encode_options how = {.format = format, .quality = 95};
+    const struct spl_encode_options how = {.size = sizeof how, .format = format, .quality = 95};
     int result = spl_image_encode(image, &how, &encoded, err);
     if (!result)
         result = write_bytes(r, name, extension, encoded.bytes, encoded.length, err);

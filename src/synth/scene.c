@@ -7,10 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <splatd/synth.h>
-
 #include "base/memory.h"
 #include "synth/build.h"
+#include "synth/synth.h"
 #include "synth/vector.h"
 
 static const struct {

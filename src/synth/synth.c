@@ -1,7 +1,7 @@
 /* A scan, streamed: a batch of columns of pulses is cast and formatted by all threads, each column into its own slot,
  * and written in order by the caller's thread: the files are the same for any number of threads, and memory stays
  * small. */
-#include <splatd/synth.h>
+#include "synth/synth.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* The sample cameras of a scene as the JSON that renders, benchmarks and exact images are asked for with. Numbers are
  * printed so that they read back as the same doubles, with as few digits as that takes. Any thread. */
-#include <splatd/synth.h>
+#include "synth/synth.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -159,7 +159,7 @@ int main(int argc, char **argv)
         fail(err.message);
     double speed = bandwidth();
     for (int b = 0; b < 2; b++) {
-        struct spl_renderer_options options = {.device = backends[b]};
+        struct spl_renderer_options options = {.size = sizeof options, .device = backends[b]};
         struct spl_renderer *renderer;
         double mean[SETTINGS];
         if (spl_renderer_create(&options, &renderer, &err) || spl_renderer_add(renderer, dataset, &err))

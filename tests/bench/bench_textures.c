@@ -46,7 +46,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: bench-textures DATASET.spld [DEVICE [ROUNDS [DISTANCE...]]]\n");
         return 2;
     }
-    struct spl_renderer_options options = {.device = argc > 2 ? argv[2] : NULL};
+    struct spl_renderer_options options = {.size = sizeof options, .device = argc > 2 ? argv[2] : NULL};
     must(spl_dataset_open(argv[1], false, &dataset, &err), &err);
     must(spl_renderer_create(&options, &renderer, &err), &err);
     must(spl_renderer_add(renderer, dataset, &err), &err);

@@ -52,7 +52,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (rc ? err.code != rc || !err.message[0] : err.code != 0)
         abort();
     if (!rc && request.picks) {
-        const struct spl_pick *pick = &request.pick;
+        const struct spl_picked_point *pick = &request.pick;
         if (spl_camera_check(&pick->camera, &err) || !(pick->x >= 0 && pick->x <= pick->camera.width) ||
             !(pick->y >= 0 && pick->y <= pick->camera.height) || request.view.camera.width != 1 ||
             request.view.camera.height != 1 || spl_view_check(&request.view, &err))

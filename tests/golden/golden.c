@@ -15,10 +15,10 @@
 
 #include <splatd/pack.h>
 #include <splatd/render.h>
-#include <splatd/synth.h>
 
 #include "picture.h"
 #include "support/make_textures.h"
+#include "synth/synth.h"
 #include "views.h"
 
 enum { SKIPPED = 77, REPEATS = 100, POINTS = 60000, SEED = 1 };
@@ -36,7 +36,8 @@ static struct spl_dataset *make_courtyard(void)
     snprintf(packed, sizeof packed, "%s/courtyard.spld", folder);
     struct spl_synth_options synth = {.scene = "courtyard", .directory = folder, .points = POINTS, .seed = SEED,
                                       .noise = -1, .formats = "ptx"};
-    struct spl_pack_options pack = {.inputs = (const char *const[]){scan}, .input_count = 1, .output = packed};
+    struct spl_pack_options pack = {
+        .size = sizeof pack, .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed};
     if (spl_synth(&synth, NULL, &err) || spl_pack(&pack, NULL, &err) ||
         spl_dataset_open(packed, true, &dataset, &err))
         fprintf(stderr, "the courtyard could not be made: %s\n", err.message);
@@ -57,7 +58,7 @@ static struct spl_renderer *open_backend(const char *backend, const struct spl_d
 {
     struct spl_renderer *renderer = NULL;
     struct spl_error err = {0};
-    if (spl_renderer_create(&(struct spl_renderer_options){.device = backend}, &renderer, &err) ||
+    if (spl_renderer_create(&SPL_SIZED(spl_renderer_options, .device = backend), &renderer, &err) ||
         spl_renderer_add(renderer, dataset, &err)) {
         printf("%s: %s\n", backend, err.message);
         spl_renderer_destroy(renderer);
@@ -98,7 +99,8 @@ static bool render(struct spl_renderer *renderer, const struct spl_dataset *data
         fprintf(stderr, "rendering failed: %s\n", err.message);
         return false;
     }
-    bool good = !spl_image_encode(&frame.images[layer], &(struct spl_encode_options){SPL_FORMAT_PNG}, png, &err);
+    bool good = !spl_image_encode(&frame.images[layer], &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), png,
+                                  &err);
     if (!good)
         fprintf(stderr, "encoding failed: %s\n", err.message);
     spl_frame_finish(&frame);
@@ -330,7 +332,7 @@ static bool self_test(void)
     for (size_t i = 0; i < sizeof pixels; i++)
         pixels[i] = (uint8_t)(i * 37);
     struct spl_image image = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 20, 10, pixels};
-    const struct spl_encode_options options = {SPL_FORMAT_PNG};
+    const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
     struct spl_encoded original, nudged, shifted, small;
     bool made = !spl_image_encode(&image, &options, &original, NULL);
     image.height = 9;

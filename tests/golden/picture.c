@@ -80,7 +80,7 @@ bool picture_difference_image(const struct picture *a, const struct picture *b, 
     for (size_t i = 0; i < pixels; i++)
         bright[i] = (float)pixel_difference(a, b, i) * 16 / 255;
     struct spl_image image = {SPL_LAYER_COVERAGE, SPL_PIXEL_F32, a->width, a->height, bright};
-    bool good = !spl_image_encode(&image, &(struct spl_encode_options){SPL_FORMAT_PNG}, out, NULL);
+    bool good = !spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), out, NULL);
     free(bright);
     return good;
 }

@@ -215,7 +215,8 @@ static void sphere_depth_is_true(void **state)
 
 int main(int argc, char **argv)
 {
-    struct spl_renderer_options options = {.device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE")};
+    struct spl_renderer_options options = {
+        .size = sizeof options, .device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE")};
     struct spl_error err = {0};
     if (spl_renderer_create(&options, &renderer, &err)) {
         fprintf(stderr, "skipped: %s\n", err.message);

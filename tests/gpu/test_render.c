@@ -16,6 +16,7 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "gpu/gpu.h"
+#include "render/fault.h"
 #include "support/make_dataset.h"
 #include "support/reference.h"
 
@@ -170,7 +171,7 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     for (size_t i = 0; i < count; i++) {
         struct make_splat *s = &splats[i];
         size_t block = i / 128, in = i % 128;
-        if (block < blocks * blocks) {
+        if (block < blocks * blocks && block % 23 != 7) { // else a hole to look through
             s->position[0] = ((double)(block % blocks) * 16 + in % 16 + uniform()) * 0.005 - 0.96;
             s->position[2] = ((double)(block / blocks) * 8 + in / 16 + uniform()) * 0.01 - 0.96;
             s->position[1] = -1 + 0.01 * uniform();
@@ -199,8 +200,7 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     done(dataset);
 }
 
-/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more.
- */
+/* The widest codes: dust beside large discs, far apart, need 24 bits an axis and 12 for the radius, 97 and more. */
 static void the_widest_codes_match(void **state)
 {
     (void)state;
@@ -223,8 +223,7 @@ static void the_widest_codes_match(void **state)
     struct spl_dataset *dataset = make_dataset(splats, count);
     make_dataset_normal_error = M_PI / 180;
     free(splats);
-    uint64_t chunks;
-    uint32_t widest = 0;
+    uint64_t chunks, widest = 0;
     const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
     for (uint32_t i = 0; i < chunks; i++)
         widest = spl_chunk_geometry_width(&chunk[i]) > widest ? spl_chunk_geometry_width(&chunk[i]) : widest;
@@ -480,37 +479,43 @@ static void what_method_fill_takes_matches(void **state)
     done(dataset);
 }
 
-/* Two wires, points seven pixels apart with a gap of eighty: whole lines, one pixel wide, and nothing between them. */
-static void wires_are_joined_along_themselves(void **state)
+/* Two wires of vertices seven pixels apart, one with a gap of eighty, and points on them that are linear: whole lines, one
+ * pixel wide, and nothing between them. What is not fill does not draw them. */
+static void wires_are_lines_along_themselves(void **state)
 {
     (void)state;
-    struct make_splat splats[82] = {0};
+    struct make_splat splats[160] = {0};
     size_t count = 0;
-    for (int wire = 0; wire < 2; wire++)
-        for (int i = 0; i <= 40; i++)
-            if (wire == 0 || i < 18 || i > 28)
-                splats[count++] = (struct make_splat){.position = {0.05 * i - 1, 0, 0.3 * wire + 0.002 * (i % 3)},
-                                                      .normal = {0, -1, 0},
-                                                      .radius = 0.04f,
-                                                      .linear = i != 20,
-                                                      .color = {200, 100, 50}};
+    for (int vertices = 0; vertices < 2; vertices++)
+        for (int wire = 0; wire < 2; wire++)
+            for (int i = 0; i <= 40; i++)
+                if (wire == 0 || i < 18 || i > 28)
+                    splats[count++] = (struct make_splat){.position = {0.05 * i - 1, 0, 0.3 * wire + 0.002 * (i % 3)},
+                                                          .normal = {0, -1, 0},
+                                                          .radius = 0.04f,
+                                                          .vertex = vertices,
+                                                          .linear = vertices ? i < 40 : i != 20,
+                                                          .color = {(uint8_t)(5 * i), 100, 50}};
     struct spl_dataset *dataset = make_dataset(splats, count);
+    uint64_t discs = spl_dataset_get_info(dataset)->splats;
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     for (int fill = 0; fill < 2; fill++) {
         struct spl_view view = looking(origin, 3, 401, 301);
         const double eye[3] = {0, -3, 0.1}, target[3] = {0, 0, 0.1}, up[3] = {0, 0, 1};
         struct spl_frame frame;
-        unsigned once = 0;
+        unsigned once = 0, of_lines = 0;
         assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
         view.method = fill ? SPL_METHOD_FILL : SPL_METHOD_POINTS;
         assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
         const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels, *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+        const uint32_t *id = frame.images[SPL_LAYER_ID].pixels;
         int from = (int)(view.camera.cx - view.camera.fx / 3) + 2, to = (int)(view.camera.cx + view.camera.fx / 3) - 2;
         assert_true(from > 0 && to < 401);
         for (int x = from; x < to; x++) {
             unsigned covered = 0;
             for (int y = 0; y < 301; y++) {
                 covered += coverage[401 * y + x] > 0;
+                of_lines += id[401 * y + x] != SPL_NOTHING && id[401 * y + x] >= discs;
                 assert_true(isnan(depth[401 * y + x]) || fabsf(depth[401 * y + x] - 3) < 1e-3f);
             }
             assert_true(covered <= 3); /* 3: the one that is not linear, beside the line */
@@ -518,9 +523,19 @@ static void wires_are_joined_along_themselves(void **state)
         }
         printf("%s: %u of %d columns have both wires\n", fill ? "fill" : "points", once, to - from);
         assert_true(fill ? (int)once == to - from : (int)once < (to - from) / 4);
+        assert_true(fill ? of_lines > 0 : of_lines == 0);
         spl_frame_finish(&frame);
-        if (fill)
-            same_images(dataset, &view, "wires");
+        if (!fill)
+            continue;
+        same_images(dataset, &view, "wires");
+        /* along them, cut at the planes near and far; and from between two vertices */
+        const double eyes[2][3] = {{-1.3, -0.02, 0.16}, {0.1, -0.001, 0.001}}, along[3] = {1, 0, 0.1};
+        view.camera.far = 2.1;
+        for (int i = 0; i < 2; i++) {
+            view.camera.near = i ? 0.01 : 0.45;
+            assert_int_equal(spl_camera_look_at(&view.camera, eyes[i], along, up, NULL), SPL_OK);
+            same_images(dataset, &view, i ? "a wire from inside" : "wires, cut");
+        }
     }
     done(dataset);
 }
@@ -528,7 +543,7 @@ static void wires_are_joined_along_themselves(void **state)
 /* A pixel of method fill is the same in whatever tile it lies, to the bit. */
 static void tiles_of_method_fill_leave_no_seams(void **state)
 {
-    struct spl_renderer_options options = {.device = *state, .scratch_samples = 160 * 160};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     struct make_splat *splats = random_splats(20000, origin, 0.02);
@@ -569,7 +584,7 @@ static void tiles_of_method_fill_leave_no_seams(void **state)
 
 static void small_tiles_give_the_same_image(void **state)
 {
-    struct spl_renderer_options options = {.device = *state, .scratch_samples = 5000};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state, .scratch_samples = 5000};
     struct spl_renderer *small, *large = renderer;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     struct spl_dataset *dataset = random_cube(3000, origin, 0.02);
@@ -696,7 +711,7 @@ static void the_order_of_splats_changes_nothing(void **state)
 
 static void a_lost_device_is_reported_and_replaced(void **state)
 {
-    struct spl_renderer_options options = {.device = *state};
+    struct spl_renderer_options options = {.size = sizeof options, .device = *state};
     struct spl_dataset *dataset = random_cube(500, origin, 0.05);
     struct spl_view view = looking(origin, 3, 64, 48);
     struct spl_frame frame;
@@ -750,7 +765,7 @@ static void views_out_of_range_name_their_field(void **state)
 int main(int argc, char **argv)
 {
     char *device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
-    struct spl_renderer_options options = {.device = device, .debug = true};
+    struct spl_renderer_options options = {.size = sizeof options, .device = device, .debug = true};
     struct spl_error err = {0};
     if (spl_renderer_create(&options, &renderer, &err)) {
         fprintf(stderr, "skipped: %s\n", err.message);
@@ -759,7 +774,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_splats_match),
         cmocka_unit_test(what_method_fill_takes_matches),
-        cmocka_unit_test(wires_are_joined_along_themselves),
+        cmocka_unit_test(wires_are_lines_along_themselves),
         cmocka_unit_test_prestate(tiles_of_method_fill_leave_no_seams, device),
         cmocka_unit_test(a_wall_that_hides_the_rest_changes_nothing),
         cmocka_unit_test(inside_the_cloud_matches),

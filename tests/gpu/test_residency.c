@@ -28,7 +28,8 @@ static double uniform(void)
 static struct spl_renderer *open_renderer(uint64_t memory_limit, struct spl_error *err)
 {
     struct spl_renderer *renderer = NULL;
-    struct spl_renderer_options options = {.device = device, .memory_limit = memory_limit, .scratch_samples = 1 << 16};
+    struct spl_renderer_options options = {
+        .size = sizeof options, .device = device, .memory_limit = memory_limit, .scratch_samples = 1 << 16};
     return spl_renderer_create(&options, &renderer, err) ? NULL : renderer;
 }
 

@@ -11,6 +11,7 @@
 
 #include <splatd/render.h>
 
+#include "render/fault.h"
 #include "support/make_dataset.h"
 
 enum { all_layers = (1 << SPL_LAYER_COUNT) - 1, count = 6000 };
@@ -58,6 +59,7 @@ static struct spl_renderer *open_renderer(uint64_t memory_limit)
 {
     struct spl_renderer *renderer = NULL;
     struct spl_renderer_options options = {
+        .size = sizeof options,
         .device = device, .memory_limit = memory_limit, .scratch_samples = 160 * 160, .debug = true};
     struct spl_error err = {0};
     if (spl_renderer_create(&options, &renderer, &err))

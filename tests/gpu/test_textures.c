@@ -222,6 +222,7 @@ static void textures_count_as_memory(void **state)
 
     struct spl_renderer *small, *other = renderer;
     struct spl_renderer_options options = {
+        .size = sizeof options,
         .device = *state, .scratch_samples = 1 << 16, .memory_limit = resident.taken_bytes + info->page_bytes / 2};
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     uint64_t base = spl_renderer_get_memory(small);
@@ -255,7 +256,8 @@ int main(void)
     const char *name = getenv("SPLATD_TEST_DEVICE");
     struct spl_error err = {0};
     strncpy(device, name ? name : "auto", sizeof device - 1);
-    struct spl_renderer_options options = {.device = device, .debug = true, .scratch_samples = 1 << 19};
+    struct spl_renderer_options options = {
+        .size = sizeof options, .device = device, .debug = true, .scratch_samples = 1 << 19};
     int rc = spl_renderer_create(&options, &renderer, &err);
     if (rc == SPL_E_NO_DEVICE)
         return 77;

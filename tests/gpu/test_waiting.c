@@ -18,6 +18,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/fault.h"
 #include "support/make_dataset.h"
 
 enum { few = 6000, many = 4000000, width = 96, height = 64, open_gate = 1 << 30 };
@@ -92,7 +93,8 @@ static struct spl_view looking(void)
 static struct spl_renderer *open_renderer(uint64_t memory_limit)
 {
     struct spl_renderer *renderer = NULL;
-    struct spl_renderer_options options = {.device = device,
+    struct spl_renderer_options options = {.size = sizeof options,
+                                           .device = device,
                                            .memory_limit = memory_limit,
                                            .scratch_samples = 1 << 16,
                                            .first_page_chunks = 100000, // draw lists need not grow
@@ -429,34 +431,6 @@ static void what_has_no_room_depends_on_the_view_alone(void **state)
     spl_frame_finish(&first);
 }
 
-static void the_least_recently_drawn_gives_way(void **state)
-{
-    (void)state;
-    struct spl_view view = looking();
-    struct spl_dataset *third = cube(few, 1);
-    struct spl_renderer *renderer = open_with(0, one, other);
-    uint64_t bare = look(renderer, NULL).taken_bytes;
-    struct spl_frame frame;
-    for (int i = 0; i < 2; i++) {
-        render(renderer, i ? other : one, &view, &frame);
-        spl_frame_finish(&frame);
-    }
-    uint64_t limit = bare + (look(renderer, NULL).taken_bytes - bare) * 5 / 4;
-    spl_renderer_destroy(renderer);
-    renderer = open_with(limit, one, other);
-    assert_int_equal(spl_renderer_add(renderer, third, NULL), SPL_OK);
-    const struct spl_dataset *drawn[] = {one, other, one, third};
-    for (size_t i = 0; i < sizeof drawn / sizeof *drawn; i++) {
-        render(renderer, drawn[i], &view, &frame);
-        spl_frame_finish(&frame);
-    }
-    assert_int_equal(look(renderer, other).bytes, 0);
-    assert_true(look(renderer, one).bytes > 0 && look(renderer, third).bytes > 0);
-    assert_int_equal(look(renderer, NULL).pages_evicted, 1);
-    spl_renderer_destroy(renderer);
-    spl_dataset_close(third);
-}
-
 static void failed_allocations_leave_it_working(void **state)
 {
     (void)state;
@@ -509,7 +483,6 @@ int main(void)
         cmocka_unit_test_setup(nothing_is_left_of_what_goes, reset),
         cmocka_unit_test_setup(frames_without_room_for_both_take_turns, reset),
         cmocka_unit_test_setup(what_has_no_room_depends_on_the_view_alone, reset),
-        cmocka_unit_test_setup(the_least_recently_drawn_gives_way, reset),
         cmocka_unit_test_setup(failed_allocations_leave_it_working, reset),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

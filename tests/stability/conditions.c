@@ -93,7 +93,7 @@ static void save_picture(const char *directory, const struct row *row, const str
                 *out++ = (uint8_t)((p[3] * p[k] + (255 - p[3]) * 128 + 127) / 255);
             *out++ = 255;
         }
-    must(spl_image_encode(&both, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, &err), &err);
+    must(spl_image_encode(&both, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, &err), &err);
     int length = snprintf(path, sizeof path, "%s/%s-%s-%s.png", directory, row->condition, row->value, row->method);
     for (int i = (int)strlen(directory) + 1; i < length && i < (int)sizeof path; i++)
         if (path[i] == ' ' || path[i] == '/')

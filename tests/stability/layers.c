@@ -17,7 +17,7 @@ static size_t pixels_of(const struct spl_image *image)
 }
 
 /* Pixels that break the rule of each layer. */
-static void count_broken(const struct spl_view *view, const struct spl_frame *f, uint64_t splats,
+static void count_broken(const struct spl_view *view, const struct spl_frame *f, uint64_t ids,
                          size_t broken[SPL_LAYER_COUNT])
 {
     const struct spl_camera *c = &view->camera;
@@ -40,7 +40,7 @@ static void count_broken(const struct spl_view *view, const struct spl_frame *f,
         double length = sqrt(normal[3 * i] * (double)normal[3 * i] + normal[3 * i + 1] * (double)normal[3 * i + 1] +
                              normal[3 * i + 2] * (double)normal[3 * i + 2]);
         broken[SPL_LAYER_NORMAL] += there ? !(fabs(length - 1) < 1e-3) : length != 0;
-        broken[SPL_LAYER_ID] += there ? id[i] >= splats : id[i] != UINT32_MAX;
+        broken[SPL_LAYER_ID] += there ? id[i] >= ids : id[i] != UINT32_MAX;
     }
 }
 
@@ -50,7 +50,7 @@ void check_kinds(struct suite *suite, const struct world *world, const struct sp
     size_t broken[SPL_LAYER_COUNT];
     if (view->layers != (1u << SPL_LAYER_COUNT) - 1)
         return; /* layers are held against each other */
-    count_broken(view, frame, spl_dataset_get_info(world->dataset)->splats, broken);
+    count_broken(view, frame, spl_dataset_get_info(world->dataset)->ids, broken);
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
         place.layer = spl_layer_name((enum spl_layer)layer);
         report_at_most(&suite->report, "layer-holds-its-kind", &place, (double)broken[layer], 0,

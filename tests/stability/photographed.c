@@ -189,7 +189,7 @@ static void write_file(const char *path, const void *bytes, size_t count)
 /* Photographs and views.json in `folder`. */
 static void write_photographs(const struct photographs *photographs, const char *folder)
 {
-    static const struct spl_encode_options png = {.format = SPL_FORMAT_PNG};
+    static const struct spl_encode_options png = {.size = sizeof png, .format = SPL_FORMAT_PNG};
     char path[512], *list = NULL;
     size_t length = 0;
     FILE *views = must_have(open_memstream(&list, &length));
@@ -236,7 +236,7 @@ void world_init_photographed(struct world *world, struct spl_scene *scene, const
     write_photographs(photographs, folder);
     snprintf(views, sizeof views, "%s/views.json", folder);
     const struct spl_photo_options options = {
-        .cameras = views, .device = "vulkan", .textures = coding, .texture_quality = quality};
+        .size = sizeof options, .cameras = views, .device = "vulkan", .textures = coding, .texture_quality = quality};
     world_init_photos(world, scene->name, points, count, &options);
     world->scene = scene;
     remove_photographs(photographs->count, folder);

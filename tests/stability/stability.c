@@ -33,7 +33,7 @@ static const struct {
 static bool open_renderer(const char *backend, struct spl_renderer **renderer)
 {
     struct spl_error err = {0};
-    if (spl_renderer_create(&(struct spl_renderer_options){.device = backend}, renderer, &err)) {
+    if (spl_renderer_create(&SPL_SIZED(spl_renderer_options, .device = backend), renderer, &err)) {
         printf("%s: %s\n", backend, err.message);
         return false;
     }

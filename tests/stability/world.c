@@ -8,10 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <splatd/synth.h>
-
 #include "support/make_dataset.h"
 #include "synth/exact.h"
+#include "synth/synth.h"
 
 enum { TRUTH_SAMPLES = 4 };
 
@@ -35,6 +34,7 @@ static void pack(struct world *world, const char *folder, const char *scan, cons
     char packed[512];
     snprintf(packed, sizeof packed, "%s/world.spld", folder);
     const struct spl_pack_options options = {
+        .size = sizeof options,
         .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos};
     must(spl_pack(&options, NULL, &err), world->name, &err);
     must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);

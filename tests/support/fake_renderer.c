@@ -14,6 +14,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "render/fault.h"
 
 struct spl_renderer {
     struct spl_device_info device;

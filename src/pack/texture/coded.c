@@ -107,7 +107,7 @@ static bool report_epoch(void *context, const struct spl_train_progress *p)
     if (reporting->options->trained)
         reporting->options->trained(reporting->options->context, p->epoch, p->seconds, p->psnr, p->atoms_per_splat,
                                     p->dictionary);
-    return true;
+    return !spl_stage_is_cancelled(reporting->stage);
 }
 
 struct coding {
@@ -167,7 +167,9 @@ static void code_chunks(void *context, size_t begin, size_t end, unsigned worker
     for (uint32_t i = (uint32_t)begin; i < end && !atomic_load(&coding->failed); i++) {
         struct spl_error why = {0};
         uint32_t chunk = coding->stride ? i * coding->stride : i;
-        int rc = code_chunk(coding, chunk, worker, &coding->sums[i], &why);
+        int rc = spl_stage_check(coding->stage, &why);
+        if (!rc)
+            rc = code_chunk(coding, chunk, worker, &coding->sums[i], &why);
         if (!rc)
             continue;
         mtx_lock(&coding->mutex);

@@ -84,6 +84,8 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
         pass->dropped[i] = rc != 0;
         usable += !rc;
         rc = rc ? spl_photos_refuse(pass->options, pass->report, rc, &why, err) : SPL_OK;
+        if (!rc)
+            rc = spl_stage_check(pass->stage, err);
     }
     spl_stage_end(pass->stage);
     if (!rc && !usable)
@@ -195,7 +197,7 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
                      struct spl_photo_report *report, struct spl_error *err)
 {
     struct spl_photo_pass pass = {.options = options, .list = list, .report = report, .stage = stage};
-    const struct spl_renderer_options how = {.device = options->device};
+    const struct spl_renderer_options how = {.size = sizeof how, .device = options->device};
     uint64_t begin_ns = spl_now_ns();
     int rc = spl_splats_init(&pass.splats, dataset, err);
     if (rc || (rc = allocate(&pass, dataset, err)) || (rc = spl_renderer_create(&how, &pass.renderer, err)) ||

@@ -69,6 +69,8 @@ static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *
         rc = spl_textures_take(textures, &pass->splats, &pass->candidates, &pass->chosen, pass->gains, &photo,
                                (uint16_t)i, pass->stage, err);
         spl_photo_close(&photo);
+        if (!rc)
+            rc = spl_stage_check(pass->stage, err);
     }
     spl_stage_end(pass->stage);
     return rc ? rc : spl_textures_list(textures, pass->splats.count, err);

@@ -1,9 +1,7 @@
-/* A pick: one point of an image instead of the image.
- *
- * The camera that was asked for is cut down to one pixel whose centre is the point: principal point moved, nothing
- * else, so the splats, their sizes and the level of detail are those of the whole image. Pure functions, any thread. */
+/* A pick: one point of an image instead of the image (render/pick.h). Pure functions, any thread. */
 #include "service/request/request.h"
 
+#include "render/pick.h"
 #include "service/request/values.h"
 
 static int resolve_point(const struct values *values, enum param param, const char *name, double size, double *out,
@@ -30,12 +28,8 @@ static int resolve(const struct values *values, const struct spl_camera_defaults
         return rc;
     spl_values_resolve_splats(values, &out->view);
     spl_values_resolve_version(values, out);
-    out->view.layers = (1u << SPL_LAYER_COUNT) - 1;
-    out->view.disc.atoms = 0; // its colour is the splat's
     out->view.camera = *camera;
-    out->view.camera.cx += 0.5 - out->pick.x;
-    out->view.camera.cy += 0.5 - out->pick.y;
-    out->view.camera.width = out->view.camera.height = 1;
+    spl_pick_view(&out->view, out->pick.x, out->pick.y, &out->view);
     return spl_view_check(&out->view, err);
 }
 

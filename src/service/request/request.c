@@ -45,8 +45,8 @@ static int resolve_encoding(const struct values *values, struct spl_view_request
     if (!(scale >= 1e-6 && scale <= 1e9))
         return spl_fail_field(err, SPL_E_INPUT, "depth_scale", "depth_scale %g is outside 1e-6 to 1e9", scale);
     out->natural = !given(values, PARAM_format);
-    out->encode = (struct spl_encode_options){
-        .format = format, .quality = (int)quality, .chroma = (int)chroma, .depth_scale = scale};
+    out->encode = SPL_SIZED(spl_encode_options, .format = format, .quality = (int)quality, .chroma = (int)chroma,
+                            .depth_scale = scale);
     return 0;
 }
 

@@ -21,7 +21,7 @@ struct spl_view_request {
     struct spl_encode_options encode; /* of `layer`; see spl_view_get_encoding() for several */
     bool natural;                     /* format was left out: each layer has its own */
     bool picks;                       /* no image is wanted but what `pick` shows; view.camera sees that point alone */
-    struct spl_pick {
+    struct spl_picked_point {
         double x, y;              /* pixels of `camera` */
         struct spl_camera camera; /* that was asked for */
     } pick;

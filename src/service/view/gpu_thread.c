@@ -17,6 +17,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "render/fault.h"
 #include "service/view/gpu.h"
 
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;

@@ -31,9 +31,9 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
         if (catalog->slots[i].current)
             entries[count++] = catalog->slots[i].current;
     struct spl_pipeline_options options = {
-        .renderer = {.device = service->options->device,
-                     .require_gpu = service->options->require_gpu,
-                     .memory_limit = service->options->memory_limit},
+        .renderer = SPL_SIZED(spl_renderer_options, .device = service->options->device,
+                              .require_gpu = service->options->require_gpu,
+                              .memory_limit = service->options->memory_limit),
         .entries = entries,
         .entry_count = count,
         .queue = service->options->queue,

@@ -119,12 +119,41 @@ static void a_reader_that_sleeps_holds_nobody_up(void **state)
     assert_int_equal(count_lines(text), 2);
 }
 
+static char said[256];
+static int calls;
+
+static void listen(void *context, enum spl_log_level level, const char *message)
+{
+    calls++;
+    snprintf(said, sizeof said, "%s %d %s", (const char *)context, (int)level, message);
+}
+
+static void a_programs_callback_has_the_messages_instead(void **state)
+{
+    (void)state;
+    const struct spl_log_field field = {"ms", NULL, 0.25};
+    spl_log_set_callback(listen, "mine");
+    for (int format = SPL_LOG_TEXT; format <= SPL_LOG_JSON; format++) {
+        spl_log_set_format((enum spl_log_format)format);
+        spl_log_fields(SPL_LOG_WARN, "one\ntwo", &field, 1);
+        assert_string_equal(said, "mine 1 one?two ms=0.250");
+    }
+    spl_log_debug("not this");
+    assert_int_equal(calls, 2);
+    assert_string_equal(take(), "");
+    spl_log_set_callback(NULL, NULL);
+    spl_log_warn("back");
+    assert_int_equal(calls, 2);
+    assert_non_null(strstr(take(), "back"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(text_lines_hold_outside_text, begin, end),
         cmocka_unit_test_setup_teardown(json_lines_are_json, begin, end),
         cmocka_unit_test_setup_teardown(a_reader_that_sleeps_holds_nobody_up, begin, end),
+        cmocka_unit_test_setup_teardown(a_programs_callback_has_the_messages_instead, begin, end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -153,6 +153,38 @@ static void test_sizes_that_lie(void **state)
     assert_non_null(strstr(err.message, "1 of its"));
 }
 
+/* The same through the public header. */
+static void test_a_callers_reader(void **state)
+{
+    (void)state;
+    struct reader ours = {0};
+    struct spl_dataset *of_file, *of_reader;
+    struct spl_reader reader;
+    struct spl_open_options options;
+    struct spl_error err = {0};
+    spl_reader_init(&reader);
+    reader.bytes = size;
+    reader.close = note_close;
+    reader.context = &ours;
+    spl_open_options_init(&options);
+    options.verify = true;
+    options.reader = &reader;
+    assert_int_equal(spl_dataset_open_with("far/away.spld", &options, &of_reader, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "read");
+    reader.read = read_some;
+    assert_int_equal(spl_dataset_open(path, true, &of_file, NULL), SPL_OK);
+    assert_int_equal(spl_dataset_open_with("far/away.spld", &options, &of_reader, NULL), SPL_OK);
+    memset(&reader, 0xff, sizeof reader); // it was read while opening
+    assert_string_equal(spl_dataset_get_info(of_reader)->id, "away");
+    expect_same(of_file, of_reader);
+    spl_dataset_close(of_reader);
+    assert_int_equal(ours.closed, 1);
+    spl_dataset_close(of_file);
+    reader.size = 0;
+    assert_int_equal(spl_dataset_open_with("away", &options, &of_reader, NULL), SPL_E_USAGE);
+    assert_true(!of_reader && ours.closed == 1);
+}
+
 static void prepare(const char *folder)
 {
     struct make_splat *splats = calloc(count, sizeof *splats);
@@ -173,6 +205,7 @@ int main(void)
         cmocka_unit_test(test_any_source_is_the_same),
         cmocka_unit_test(test_readers_that_fail),
         cmocka_unit_test(test_sizes_that_lie),
+        cmocka_unit_test(test_a_callers_reader),
     };
     char folder[256];
     make_folder(folder);

@@ -70,6 +70,15 @@ static void whoever_nobody_waits_for_gives_up(void **state)
         assert_int_equal(spl_dataset_open_until(path, verify, &cancelled, &dataset, NULL), SPL_OK);
         spl_dataset_close(dataset);
     }
+    struct spl_cancel cancel = {0};
+    struct spl_open_options options;
+    spl_open_options_init(&options);
+    options.cancel = &cancel;
+    spl_cancel_set(&cancel);
+    assert_int_equal(spl_dataset_open_with(path, &options, &dataset, NULL), SPL_E_CANCELLED);
+    spl_cancel_clear(&cancel);
+    assert_int_equal(spl_dataset_open_with(path, &options, &dataset, NULL), SPL_OK);
+    spl_dataset_close(dataset);
 }
 
 int main(void)

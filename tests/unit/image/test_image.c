@@ -15,7 +15,7 @@
 
 #include "base/memory.h"
 
-#define ENCODE(image, ...) encode(image, &(struct spl_encode_options){__VA_ARGS__})
+#define ENCODE(image, ...) encode(image, &SPL_SIZED(spl_encode_options, __VA_ARGS__))
 
 static struct spl_encoded encode(const struct spl_image *image, const struct spl_encode_options *options)
 {
@@ -83,7 +83,7 @@ static void png_color_is_lossless_and_keeps_alpha(void **state)
 {
     (void)state;
     struct spl_image image = make_color(67, 31);
-    struct spl_encoded png = ENCODE(&image, SPL_FORMAT_PNG);
+    struct spl_encoded png = ENCODE(&image, .format = SPL_FORMAT_PNG);
     struct spng_ihdr header;
     uint8_t *decoded = decode_png(&png, &header, NULL);
     assert_int_equal(header.width, 67);
@@ -103,7 +103,7 @@ static void png_depth_is_16_bit_with_scale_and_saturation(void **state)
     float depth[] = {NAN, 1.0f, 0.0001f, 65.5349f, 65.5351f, 65.6f, INFINITY, 0.2584f, -1.0f};
     static const uint16_t expected[] = {0, 1000, 1, 65535, 65535, 65535, 65535, 258, 0};
     struct spl_image image = {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 3, 3, depth};
-    struct spl_encoded png = ENCODE(&image, SPL_FORMAT_PNG);
+    struct spl_encoded png = ENCODE(&image, .format = SPL_FORMAT_PNG);
     struct spng_ihdr header;
     char note[128];
     uint8_t *decoded = decode_png(&png, &header, note);
@@ -118,7 +118,7 @@ static void png_depth_is_16_bit_with_scale_and_saturation(void **state)
     /* TUM's scale; 13.2 m no longer fits */
     image.layer = SPL_LAYER_RANGE;
     depth[3] = 13.2f;
-    png = ENCODE(&image, SPL_FORMAT_PNG, .depth_scale = 5000);
+    png = ENCODE(&image, .format = SPL_FORMAT_PNG, .depth_scale = 5000);
     decoded = decode_png(&png, &header, note);
     assert_int_equal(((uint16_t *)decoded)[1], 5000);
     assert_int_equal(png.saturated, 5 - 1);
@@ -133,7 +133,7 @@ static void png_depth_is_big_endian_in_the_file(void **state)
     (void)state;
     float depth = 0.258f;
     struct spl_image image = {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 1, 1, &depth};
-    struct spl_encoded png = ENCODE(&image, SPL_FORMAT_PNG);
+    struct spl_encoded png = ENCODE(&image, .format = SPL_FORMAT_PNG);
     spng_ctx *ctx = spng_ctx_new(0);
     spng_set_png_buffer(ctx, png.bytes, png.length);
     uint8_t raw[2];
@@ -150,7 +150,7 @@ static void png_of_normals_ids_and_coverage(void **state)
     float normals[] = {0, 0, 0, 1, 0, -1, 0, 0.6f, 0.8f, NAN, 0, 1};
     static const uint8_t normal_bytes[] = {0, 0, 0, 255, 128, 0, 128, 204, 230, 0, 0, 0};
     struct spl_image image = {SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 2, 2, normals};
-    struct spl_encoded png = ENCODE(&image, SPL_FORMAT_PNG);
+    struct spl_encoded png = ENCODE(&image, .format = SPL_FORMAT_PNG);
     struct spng_ihdr header;
     char note[128];
     uint8_t *decoded = decode_png(&png, &header, note);
@@ -163,7 +163,7 @@ static void png_of_normals_ids_and_coverage(void **state)
     uint32_t ids[] = {0x04030201, UINT32_MAX};
     static const uint8_t id_bytes[] = {1, 2, 3, 4, 255, 255, 255, 255};
     struct spl_image id_image = {SPL_LAYER_ID, SPL_PIXEL_U32, 2, 1, ids};
-    png = ENCODE(&id_image, SPL_FORMAT_PNG);
+    png = ENCODE(&id_image, .format = SPL_FORMAT_PNG);
     decoded = decode_png(&png, &header, NULL);
     assert_memory_equal(decoded, id_bytes, sizeof id_bytes);
     free(decoded);
@@ -172,7 +172,7 @@ static void png_of_normals_ids_and_coverage(void **state)
     float coverage[] = {0, 1, 0.5f, 1.5f, -1, NAN};
     static const uint8_t coverage_bytes[] = {0, 255, 128, 255, 0, 0};
     struct spl_image coverage_image = {SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 6, 1, coverage};
-    png = ENCODE(&coverage_image, SPL_FORMAT_PNG);
+    png = ENCODE(&coverage_image, .format = SPL_FORMAT_PNG);
     decoded = decode_png(&png, &header, NULL);
     assert_int_equal(header.bit_depth, 8);
     assert_memory_equal(decoded, coverage_bytes, sizeof coverage_bytes);
@@ -185,7 +185,7 @@ static void jpeg_of_color_is_close_and_opaque(void **state)
     (void)state;
     struct spl_image image = make_color(160, 120);
     for (int quality = 0; quality <= 95; quality += 95) {
-        struct spl_encoded jpeg = ENCODE(&image, SPL_FORMAT_JPEG, .quality = quality);
+        struct spl_encoded jpeg = ENCODE(&image, .format = SPL_FORMAT_JPEG, .quality = quality);
         int width, height, sampling;
         uint8_t *rgb = decode_jpeg(&jpeg, &width, &height, &sampling);
         assert_int_equal(width, 160);
@@ -215,7 +215,7 @@ static void jpeg_of_depth_ends_its_map_at_the_robust_range(void **state)
     depth[N - 1] = 1e6f; /* strays at both ends do not stretch the map */
     depth[N - 2] = 1e-3f;
     struct spl_image image = {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 64, 64, depth};
-    struct spl_encoded jpeg = ENCODE(&image, SPL_FORMAT_JPEG, .quality = 100);
+    struct spl_encoded jpeg = ENCODE(&image, .format = SPL_FORMAT_JPEG, .quality = 100);
     assert_true(fabsf(jpeg.near - 15.15f) < 0.2f);
     assert_true(fabsf(jpeg.far - 29.85f) < 0.3f);
     int width, height, sampling;
@@ -233,12 +233,12 @@ static void jpeg_of_flat_and_empty_depth(void **state)
     (void)state;
     float depth[] = {7, 7, 7, 7};
     struct spl_image image = {SPL_LAYER_RANGE, SPL_PIXEL_F32, 2, 2, depth};
-    struct spl_encoded jpeg = ENCODE(&image, SPL_FORMAT_JPEG);
+    struct spl_encoded jpeg = ENCODE(&image, .format = SPL_FORMAT_JPEG);
     assert_true(jpeg.near == 7 && jpeg.far == 7);
     spl_encoded_finish(&jpeg);
     for (int i = 0; i < 4; i++)
         depth[i] = NAN;
-    jpeg = ENCODE(&image, SPL_FORMAT_JPEG);
+    jpeg = ENCODE(&image, .format = SPL_FORMAT_JPEG);
     assert_true(jpeg.near == 0 && jpeg.far == 0);
     int width, height, sampling;
     uint8_t *rgb = decode_jpeg(&jpeg, &width, &height, &sampling);
@@ -262,7 +262,7 @@ static void jpeg_of_the_other_layers(void **state)
                                  {SPL_LAYER_ID, SPL_PIXEL_U32, 16, 16, ids},
                                  {SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 16, 16, coverage}};
     for (int i = 0; i < 3; i++) {
-        struct spl_encoded jpeg = ENCODE(&images[i], SPL_FORMAT_JPEG, .quality = 100);
+        struct spl_encoded jpeg = ENCODE(&images[i], .format = SPL_FORMAT_JPEG, .quality = 100);
         int width, height, sampling;
         uint8_t *rgb = decode_jpeg(&jpeg, &width, &height, &sampling);
         const uint8_t *above = rgb + 3 * 40, *below = rgb + 3 * 230;
@@ -285,12 +285,12 @@ static void npy_header_is_as_numpy_writes_it(void **state)
         "\x93NUMPY\x01\x00v\x00{'descr': '|u1', 'fortran_order': False, 'shape': (2, 3, 4), }"
         "                                                       \n";
     struct spl_image image = make_color(3, 2);
-    struct spl_encoded npy = ENCODE(&image, SPL_FORMAT_NPY);
+    struct spl_encoded npy = ENCODE(&image, .format = SPL_FORMAT_NPY);
     assert_int_equal(npy.length, 128 + 24);
     assert_memory_equal(npy.bytes, header, 128);
     assert_memory_equal(npy.bytes + 128, image.pixels, 24);
     spl_encoded_finish(&npy);
-    struct spl_encoded raw = ENCODE(&image, SPL_FORMAT_RAW);
+    struct spl_encoded raw = ENCODE(&image, .format = SPL_FORMAT_RAW);
     assert_int_equal(raw.length, 24);
     assert_memory_equal(raw.bytes, image.pixels, 24);
     assert_string_equal(raw.media_type, "application/octet-stream");
@@ -308,7 +308,7 @@ static void npy_header_is_as_numpy_writes_it(void **state)
         "{'descr': '<u4', 'fortran_order': False, 'shape': (1, 1), }",
     };
     for (int i = 0; i < 3; i++) {
-        npy = ENCODE(&others[i], SPL_FORMAT_NPY);
+        npy = ENCODE(&others[i], .format = SPL_FORMAT_NPY);
         size_t header_bytes = 10u + npy.bytes[8] + 256u * npy.bytes[9];
         assert_int_equal(header_bytes % 64, 0);
         assert_memory_equal(npy.bytes + 10, dictionaries[i], strlen(dictionaries[i]));
@@ -323,7 +323,7 @@ static void one_pixel_encodes_everywhere(void **state)
     (void)state;
     struct spl_image image = make_color(1, 1);
     for (int format = 0; format < SPL_FORMAT_COUNT; format++) {
-        struct spl_encoded out = ENCODE(&image, (enum spl_format)format);
+        struct spl_encoded out = ENCODE(&image, .format = (enum spl_format)format);
         assert_true(out.length >= 4);
         spl_encoded_finish(&out);
     }
@@ -343,24 +343,56 @@ static void assert_refused(const struct spl_image *image, struct spl_encode_opti
     assert_memory_equal(&out, &zero, sizeof out);
 }
 
+static void rows_may_lie_apart(void **state)
+{
+    (void)state;
+    enum { width = 5, height = 3, apart = 4 * width + 12 };
+    static uint8_t packed[height][4 * width], strided[height][apart];
+    memset(strided, 0xee, sizeof strided);
+    for (int y = 0; y < height; y++)
+        for (int i = 0; i < 4 * width; i++)
+            strided[y][i] = packed[y][i] = (uint8_t)(i % 4 == 3 ? 255 : 40 * y + 3 * i);
+    struct spl_image image = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, width, height, packed}, other = image;
+    other.pixels = strided;
+    other.row_bytes = apart;
+    for (int format = 0; format < SPL_FORMAT_COUNT; format++) {
+        if (!spl_format_is_built((enum spl_format)format))
+            continue;
+        struct spl_encoded one = ENCODE(&image, .format = (enum spl_format)format);
+        struct spl_encoded two = ENCODE(&other, .format = (enum spl_format)format);
+        assert_int_equal(one.length, two.length);
+        assert_memory_equal(one.bytes, two.bytes, one.length);
+        spl_encoded_finish(&one);
+        spl_encoded_finish(&two);
+    }
+    other.row_bytes = 4 * width - 4;
+    struct spl_encoded out;
+    assert_int_equal(spl_image_encode(&other, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &out, NULL),
+                     SPL_E_USAGE);
+}
+
 static void bad_requests_are_refused_by_field(void **state)
 {
     (void)state;
     struct spl_image image = make_color(2, 2), wide = make_color(65536, 1), high = make_color(1, 65536);
-    assert_refused(&wide, (struct spl_encode_options){SPL_FORMAT_JPEG}, SPL_E_LIMIT, "width");
-    assert_refused(&high, (struct spl_encode_options){SPL_FORMAT_JPEG}, SPL_E_LIMIT, "height");
-    struct spl_encoded png = ENCODE(&wide, SPL_FORMAT_PNG);
+    assert_refused(&wide, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_JPEG), SPL_E_LIMIT, "width");
+    assert_refused(&high, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_JPEG), SPL_E_LIMIT, "height");
+    struct spl_encoded png = ENCODE(&wide, .format = SPL_FORMAT_PNG);
     spl_encoded_finish(&png);
-    assert_refused(&image, (struct spl_encode_options){SPL_FORMAT_JPEG, .quality = 101}, SPL_E_USAGE, "quality");
-    assert_refused(&image, (struct spl_encode_options){SPL_FORMAT_JPEG, .quality = -1}, SPL_E_USAGE, "quality");
-    assert_refused(&image, (struct spl_encode_options){SPL_FORMAT_PNG, .depth_scale = NAN}, SPL_E_USAGE, "depth_scale");
-    assert_refused(&image, (struct spl_encode_options){SPL_FORMAT_PNG, .depth_scale = -5}, SPL_E_USAGE, "depth_scale");
-    assert_refused(&image, (struct spl_encode_options){SPL_FORMAT_COUNT}, SPL_E_UNSUPPORTED, "format");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_JPEG, .quality = 101), SPL_E_USAGE,
+                   "quality");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_JPEG, .quality = -1), SPL_E_USAGE,
+                   "quality");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG, .depth_scale = NAN), SPL_E_USAGE,
+                   "depth_scale");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG, .depth_scale = -5), SPL_E_USAGE,
+                   "depth_scale");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_COUNT), SPL_E_UNSUPPORTED, "format");
     struct spl_image mistyped = image, empty = image;
     mistyped.type = SPL_PIXEL_F32;
-    assert_refused(&mistyped, (struct spl_encode_options){SPL_FORMAT_RAW}, SPL_E_UNSUPPORTED, "layer");
+    assert_refused(&mistyped, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_RAW), SPL_E_UNSUPPORTED, "layer");
     empty.height = 0;
-    assert_refused(&empty, (struct spl_encode_options){SPL_FORMAT_RAW}, SPL_E_USAGE, "");
+    assert_refused(&empty, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_RAW), SPL_E_USAGE, "");
     spl_image_finish(&image);
     spl_image_finish(&wide);
     spl_image_finish(&high);
@@ -384,7 +416,8 @@ static void every_failed_allocation_is_reported(void **state)
                 struct spl_error err = {0};
                 struct spl_encoded out;
                 spl_memory_fail_after(attempt);
-                rc = spl_image_encode(layer ? &distance : &color, &(struct spl_encode_options){(enum spl_format)format},
+                rc = spl_image_encode(layer ? &distance : &color, &SPL_SIZED(spl_encode_options,
+                                      .format = (enum spl_format)format),
                                       &out, &err);
                 spl_memory_fail_after(0);
                 assert_int_equal(rc, err.code);
@@ -429,6 +462,7 @@ int main(void)
         cmocka_unit_test(jpeg_of_the_other_layers),
         cmocka_unit_test(npy_header_is_as_numpy_writes_it),
         cmocka_unit_test(one_pixel_encodes_everywhere),
+        cmocka_unit_test(rows_may_lie_apart),
         cmocka_unit_test(bad_requests_are_refused_by_field),
         cmocka_unit_test(every_failed_allocation_is_reported),
         cmocka_unit_test(names_round_trip),

@@ -28,7 +28,7 @@ static void put(const void *bytes, size_t length)
 static struct spl_encoded put_encoded(const struct spl_image *image, enum spl_format format)
 {
     struct spl_encoded encoded;
-    struct spl_encode_options options = {.format = format, .quality = 100};
+    struct spl_encode_options options = {.size = sizeof options, .format = format, .quality = 100};
     assert_int_equal(spl_image_encode(image, &options, &encoded, NULL), 0);
     put(encoded.bytes, encoded.length);
     return encoded;
@@ -199,7 +199,7 @@ static void depth_png_has_steps_and_nothing(void **state)
     assert_int_equal(back.layer, SPL_LAYER_RANGE);
     spl_image_finish(&back);
     spl_encoded_finish(&encoded);
-    struct spl_encode_options options = {.format = SPL_FORMAT_PNG, .depth_scale = 100};
+    struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG, .depth_scale = 100};
     assert_int_equal(spl_image_encode(&image, &options, &encoded, NULL), 0);
     put(encoded.bytes, encoded.length);
     spl_encoded_finish(&encoded);

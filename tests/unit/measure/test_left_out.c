@@ -180,7 +180,7 @@ static void the_lens_is_taken_out(void **state)
     make_folder(folder);
     snprintf(path, sizeof path, "%s/ramp.png", folder);
     assert_int_equal(
-        spl_image_encode(&pictures[0], &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, &err), 0);
+        spl_image_encode(&pictures[0], &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, &err), 0);
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(encoded.bytes, 1, encoded.length, file), encoded.length);

@@ -296,7 +296,7 @@ static void write_png(const char *name, uint32_t width, uint32_t height)
     struct spl_encoded encoded;
     struct spl_image image = {.layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = width, .height = height};
     image.pixels = calloc((size_t)width * height, 4);
-    assert_int_equal(spl_image_encode(&image, &(struct spl_encode_options){.format = SPL_FORMAT_PNG}, &encoded, NULL),
+    assert_int_equal(spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &encoded, NULL),
                      0);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     FILE *file = fopen(path, "w");

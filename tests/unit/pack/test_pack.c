@@ -48,7 +48,8 @@ static void write_ply(const char *path, const double (*position)[3], size_t coun
 static int pack_file(const char *input, const char *output, unsigned threads, struct spl_pack_report *report,
                      struct spl_error *err)
 {
-    struct spl_pack_options options = {.inputs = &input, .input_count = 1, .output = output, .threads = threads};
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = &input, .input_count = 1, .output = output, .threads = threads};
     return spl_pack(&options, report, err);
 }
 
@@ -296,7 +297,7 @@ static void test_linear_and_bare_points(void **state)
     write_ply(path_of("in.ply"), (const double(*)[3])position, count);
     for (int run = 0; run < 4; run++) {
         const char *input = path_of("in.ply");
-        struct spl_pack_options options = {.inputs = &input,
+        struct spl_pack_options options = {.size = sizeof options, .inputs = &input,
                                            .input_count = 1,
                                            .output = path_of("out.spld"),
                                            .threads = 2,
@@ -368,7 +369,8 @@ static void test_refusals(void **state)
     assert_int_equal(before.st_size, after.st_size);
     struct spl_error err = {0};
     const char *input = path_of("one.ply");
-    struct spl_pack_options options = {.inputs = &input, .input_count = 1, .output = path_of("out.spld")};
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = &input, .input_count = 1, .output = path_of("out.spld")};
     struct spl_pack_options wrong = options;
     wrong.neighbours = 2;
     assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
@@ -379,7 +381,7 @@ static void test_refusals(void **state)
     assert_int_equal(spl_pack(&wrong, NULL, &err), SPL_E_USAGE);
     wrong = options;
     wrong.points_only = true;
-    wrong.photos = &(struct spl_photo_options){.cameras = "poses"};
+    wrong.photos = &SPL_SIZED(spl_photo_options, .cameras = "poses");
     err = (struct spl_error){0};
     assert_true(spl_pack(&wrong, NULL, &err) != 0);
     assert_string_equal(err.field, "points-only");
@@ -415,6 +417,63 @@ static void test_refused_memory(void **state)
     unlink(path_of("out.spld"));
 }
 
+/* Cancels when a stage is first reported; then no other stage may begin. */
+struct canceller {
+    struct spl_cancel cancel;
+    const char *at;      // NULL = never
+    char names[16][64];  /* of stages, in their order */
+    int count, begun_after;
+};
+
+static void watch_stages(void *context, const struct spl_progress *progress)
+{
+    struct canceller *c = context;
+    if (!c->count || strcmp(c->names[c->count - 1], progress->stage)) {
+        assert_in_range(c->count, 0, 15);
+        snprintf(c->names[c->count++], sizeof c->names[0], "%s", progress->stage);
+        c->begun_after += spl_cancel_is_set(&c->cancel);
+    }
+    if (c->at && !strcmp(c->at, progress->stage))
+        spl_cancel_set(&c->cancel);
+}
+
+static void test_cancelled_in_any_stage(void **state)
+{
+    (void)state;
+    enum { count = 20000 };
+    static double position[count][3];
+    for (int i = 0; i < count; i++) {
+        position[i][0] = 0.01 * (i % 200);
+        position[i][1] = 0.01 * (i / 200);
+    }
+    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    const char *input = path_of("in.ply");
+    struct canceller whole = {0};
+    struct spl_pack_options options = {.size = sizeof options,
+                                       .inputs = &input,
+                                       .input_count = 1,
+                                       .output = path_of("out.spld"),
+                                       .threads = 2,
+                                       .progress = watch_stages,
+                                       .progress_context = &whole,
+                                       .cancel = &whole.cancel};
+    assert_int_equal(spl_pack(&options, NULL, NULL), SPL_OK);
+    unlink(path_of("out.spld"));
+    int files = files_in_folder();
+    assert_string_equal(whole.names[whole.count - 1], "writing");
+    for (int i = 0; i < whole.count - 1; i++) {
+        struct canceller now = {.at = whole.names[i]};
+        struct spl_error err = {0};
+        options.progress_context = &now;
+        options.cancel = &now.cancel;
+        assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_CANCELLED);
+        if (now.begun_after)
+            fail_msg("cancelled in '%s', '%s' was begun all the same", now.at, now.names[now.count - 1]);
+        assert_int_equal(files_in_folder(), files);
+    }
+    assert_true(whole.count > 5);
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -437,7 +496,7 @@ int main(void)
         cmocka_unit_test(test_every_point_is_there),   cmocka_unit_test(test_default_view),
         cmocka_unit_test(test_threads_do_not_matter),  cmocka_unit_test(test_degenerate_clouds),
         cmocka_unit_test(test_linear_and_bare_points), cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_refused_memory),
+        cmocka_unit_test(test_refused_memory),         cmocka_unit_test(test_cancelled_in_any_stage),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -132,7 +132,7 @@ static void listen(void *context, const char *text)
 static const char *pack_two(const char *a, const char *b, bool intensity, struct spl_dataset **out)
 {
     const char *inputs[2] = {a, b}, *output = path_of("out.spld");
-    struct spl_pack_options options = {.inputs = inputs,
+    struct spl_pack_options options = {.size = sizeof options, .inputs = inputs,
                                        .input_count = b ? 2 : 1,
                                        .output = output,
                                        .intensity = intensity,

@@ -63,7 +63,7 @@ static void on_done(struct ticket *ticket, struct spl_rendering *rendering, cons
 /* Asks for view `n`. */
 static int ask(struct passenger *passenger, uint64_t n, uint64_t deadline_ms)
 {
-    struct spl_view_request request = {.encode = {.format = SPL_FORMAT_RAW}};
+    struct spl_view_request request = {.encode = SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_RAW)};
     spl_view_init(&request.view);
     request.view.camera = (struct spl_camera){.width = 4, .height = 4};
     struct spl_key key = {.words = {n, n}};

@@ -14,13 +14,13 @@
 #include <cmocka.h>
 
 #include <jansson.h>
-#include <splatd/synth.h>
 
 #include "base/memory.h"
 #include "image/load.h"
 #include "synth/exact.h"
 #include "synth/photos.h"
 #include "synth/pictures.h"
+#include "synth/synth.h"
 #include "synth/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))

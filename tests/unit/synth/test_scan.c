@@ -15,12 +15,11 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include <splatd/synth.h>
-
 #include "base/memory.h"
 #include "cloud/cloud.h"
 #include "synth/light.h"
 #include "synth/scene.h"
+#include "synth/synth.h"
 #include "synth/vector.h"
 
 static char folder[] = "/tmp/splatd-synth-XXXXXX";

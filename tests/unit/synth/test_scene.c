@@ -9,12 +9,11 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include <splatd/synth.h>
-
 #include "base/memory.h"
 #include "cloud/views.h"
 #include "synth/build.h"
 #include "synth/random.h"
+#include "synth/synth.h"
 #include "synth/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))

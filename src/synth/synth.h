@@ -1,6 +1,6 @@
 /* Analytic scenes and the scanners that sample them: exact truth for tests, and the sample scan of the quickstart. */
-#ifndef SPLATD_SYNTH_H
-#define SPLATD_SYNTH_H
+#ifndef SPL_SYNTH_SYNTH_H
+#define SPL_SYNTH_SYNTH_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,0 +1,57 @@
+/* The geometry of picks, shared by the library and the service. The world position is the point on the pixel's ray at
+ * the depth that was rendered, so it agrees with the depth layer to the bit; the class is that of the nearest splat.
+ * Pure functions; any thread. */
+#include "render/pick.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "dataset/dataset.h"
+
+void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
+{
+    *out = *view;
+    out->layers = (1u << SPL_LAYER_COUNT) - 1;
+    out->disc.atoms = 0; // its colour is the splat's
+    out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
+    out->camera.cx += 0.5 - x;
+    out->camera.cy += 0.5 - y;
+    out->camera.width = out->camera.height = 1;
+}
+
+/* The point at view depth `z` on the ray through (u, v). */
+static void place(const struct spl_camera *camera, double u, double v, double z, double p[3])
+{
+    const double *r = camera->rotation;
+    double x = (u - camera->cx) / camera->fx * z, y = (v - camera->cy) / camera->fy * z;
+    for (int i = 0; i < 3; i++)
+        p[i] = camera->eye[i] + r[i] * x + r[3 + i] * y + r[6 + i] * z;
+}
+
+static int32_t classification(const struct spl_dataset *dataset, uint32_t id)
+{
+    double value;
+    bool known = dataset && spl_dataset_find_value(dataset, spl_dataset_find_stream(dataset, "class"), id, &value);
+    return known ? (int32_t)fmin(value, INT32_MAX) : -1;
+}
+
+void spl_pick_read(const struct spl_camera *camera, double x, double y, const struct spl_frame *frame,
+                   const struct spl_dataset *dataset, struct spl_pick *pick)
+{
+    const struct spl_image *images = frame->images;
+    float depth = *(const float *)images[SPL_LAYER_DEPTH].pixels;
+    uint32_t id = *(const uint32_t *)images[SPL_LAYER_ID].pixels;
+    const float *normal = images[SPL_LAYER_NORMAL].pixels;
+    *pick = (struct spl_pick){.hit = isfinite(depth)};
+    if (!pick->hit)
+        return;
+    pick->depth = (double)depth;
+    pick->distance = (double)*(const float *)images[SPL_LAYER_RANGE].pixels;
+    place(camera, x, y, pick->depth, pick->position);
+    for (int i = 0; i < 3 && normal; i++)
+        pick->normal[i] = (double)normal[i];
+    memcpy(pick->color, images[SPL_LAYER_COLOR].pixels, sizeof pick->color);
+    bool named = id != UINT32_MAX;
+    pick->splat = named ? (int64_t)id : -1;
+    pick->classification = named ? classification(dataset, id) : -1;
+}
