@@ -200,8 +200,7 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     done(dataset);
 }
 
-/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more.
- */
+/* The widest codes: dust beside large discs, far apart, need 24 bits an axis and 12 for the radius, 97 and more. */
 static void the_widest_codes_match(void **state)
 {
     (void)state;
@@ -224,8 +223,7 @@ static void the_widest_codes_match(void **state)
     struct spl_dataset *dataset = make_dataset(splats, count);
     make_dataset_normal_error = M_PI / 180;
     free(splats);
-    uint64_t chunks;
-    uint32_t widest = 0;
+    uint64_t chunks, widest = 0;
     const struct spl_chunk *chunk = spl_dataset_get_chunks(dataset, &chunks);
     for (uint32_t i = 0; i < chunks; i++)
         widest = spl_chunk_geometry_width(&chunk[i]) > widest ? spl_chunk_geometry_width(&chunk[i]) : widest;
