@@ -160,8 +160,7 @@ static void random_splats_match(void **state)
     done(dataset);
 }
 
-/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most of what follows.
- */
+/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most behind it. */
 static void a_wall_that_hides_the_rest_changes_nothing(void **state)
 {
     (void)state;
@@ -200,8 +199,7 @@ static void a_wall_that_hides_the_rest_changes_nothing(void **state)
     done(dataset);
 }
 
-/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis and 12 for the radius, 97 bits and more.
- */
+/* The widest codes: dust beside large discs, far apart, needs 24 bits an axis, 12 for the radius, 97 bits and more. */
 static void the_widest_codes_match(void **state)
 {
     (void)state;
