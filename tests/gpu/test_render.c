@@ -160,8 +160,7 @@ static void random_splats_match(void **state)
     done(dataset);
 }
 
-/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most of what follows.
- */
+/* Occlusion drops chunks; the reference drops none. A dense wall in blocks of a chunk each hides most behind it. */
 static void a_wall_that_hides_the_rest_changes_nothing(void **state)
 {
     (void)state;
