@@ -58,7 +58,7 @@ SPL_API int spl_view_check(const struct spl_view *view, struct spl_error *err);
 
 /* Has a dataset the layers that the view asks for? SPL_E_INPUT (field "layer") of normals where it has no surface and
  * the method makes none, and of ids where it has more splats than 32 bits number. Every renderer asks. */
-int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
+SPL_API int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
 
 struct spl_frame_stats {
     uint64_t splats_drawn, chunks_drawn, nodes_drawn;

@@ -114,7 +114,10 @@ static void print_param(FILE *out, enum spl_method_param param)
         snprintf(text, sizeof text, "%s: %s (%s)", range, info->help, info->choice_name((int)info->otherwise));
     else
         snprintf(text, sizeof text, "%s; %s (%g)", info->help, range, info->otherwise);
-    used = fprintf(out, "    --%s %s", info->name, info->kind == SPL_PARAM_CHOICE ? "NAME" : info->kind == SPL_PARAM_WHOLE ? "N" : "X");
+    used = fprintf(out, "    --%s %s", info->name,
+                   info->kind == SPL_PARAM_CHOICE  ? "NAME"
+                   : info->kind == SPL_PARAM_WHOLE ? "N"
+                                                   : "X");
     spl_cmd_print_wrapped(out, (size_t)used, 27, text);
 }
 

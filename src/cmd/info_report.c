@@ -145,10 +145,9 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     json_t *levels = json_array();
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct spl_info_level *l = &report->levels[i];
-        json_array_append_new(levels,
-                              json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                        (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
-                                        (json_int_t)l->pieces, "spacing", l->spacing));
+        json_array_append_new(levels, json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
+                                                (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
+                                                (json_int_t)l->pieces, "spacing", l->spacing));
     }
     json_t *widths = json_object();
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
@@ -173,9 +172,9 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "splat_radius",
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
-        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds", kinds_to_json(report), "bytes_per_splat", bytes,
-        "by_level", levels, "widths", widths, "textures", textures_to_json(report), "sources",
-        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
+        "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
+        kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
+        textures_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
         json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"));

@@ -13,28 +13,28 @@
 
 /* A line that a disc ends at, in its plane. */
 struct spl_clip {
-    float direction[3];   /* world, across the line and away from the centre, unit; all 0 = no line */
-    float offset;         /* of the line from the centre, radii, 0..1 */
+    float direction[3]; /* world, across the line and away from the centre, unit; all 0 = no line */
+    float offset;       /* of the line from the centre, radii, 0..1 */
 };
 
 /* A splat relative to its node's origin. */
 struct spl_splat {
-    float position[3];    /* metres from the node's origin; the encoder takes them as doubles, see below */
-    float normal[3];      /* unit */
-    float radius;         /* metres, > 0 */
-    uint8_t color[3];     /* sRGB */
-    bool linear; /* lies on a wire, a pole or a cable; a vertex of a line: a piece goes to the next */
+    float position[3]; /* metres from the node's origin; the encoder takes them as doubles, see below */
+    float normal[3];   /* unit */
+    float radius;      /* metres, > 0 */
+    uint8_t color[3];  /* sRGB */
+    bool linear;       /* lies on a wire, a pole or a cable; a vertex of a line: a piece goes to the next */
     struct spl_clip clip;
 };
 
 struct spl_chunk_options {
-    double position_error;   /* mean error as a share of the splat radius; default 0.016 */
-    double normal_error;     /* mean error, radians; default 1 degree */
-    double radius_error;     /* largest relative error; default 0.05 */
-    uint32_t kind;           /* enum spl_chunk_kind, which has what of these and of a splat's fields it knows */
+    double position_error; /* mean error as a share of the splat radius; default 0.016 */
+    double normal_error;   /* mean error, radians; default 1 degree */
+    double radius_error;   /* largest relative error; default 0.05 */
+    uint32_t kind;         /* enum spl_chunk_kind, which has what of these and of a splat's fields it knows */
 };
 
-struct spl_chunk_error {     /* what quantisation did to one chunk, sums over its splats */
+struct spl_chunk_error { /* what quantisation did to one chunk, sums over its splats */
     double position_over_radius, normal_radians;
 };
 
@@ -43,7 +43,7 @@ struct spl_chunk_error {     /* what quantisation did to one chunk, sums over it
 uint32_t spl_chunk_words(const struct spl_chunk *chunk);
 uint32_t spl_chunk_geometry_width(const struct spl_chunk *chunk); /* bits a splat */
 uint32_t spl_chunk_color_width(const struct spl_chunk *chunk);
-uint32_t spl_chunk_color_word(const struct spl_chunk *chunk);     /* offset in the page */
+uint32_t spl_chunk_color_word(const struct spl_chunk *chunk); /* offset in the page */
 uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk);
 
 /* Straight pieces between the vertices of a chunk of lines, as its header says; 0 of discs. */
@@ -62,11 +62,12 @@ enum {
 };
 
 /* Chooses widths and codes for `count` splats (1..128; of lines 2..128 vertices, of which the last is joined to none
- * and of two in a row one is) whose order is kept, writes `words` (room for SPL_CHUNK_WORDS_MAX) and everything in *chunk
- * but geometry_word and first_id, which it zeroes. Positions are doubles in `position` (count × 3, relative to the
- * node's origin); splats[].position is not read. `error` may be NULL. Returns the number of words. Every splat must be finite with radius > 0 (an assertion: the packer has cleaned them).
- * The bounds hold for the chunk's means (radius: for each splat) except where 24 bits an axis, 12 bits a normal's
- * coordinate or radius, or the floats that decoding adds up cannot hold them; *error tells. */
+ * and of two in a row one is) whose order is kept, writes `words` (room for SPL_CHUNK_WORDS_MAX) and everything in
+ * *chunk but geometry_word and first_id, which it zeroes. Positions are doubles in `position` (count × 3, relative to
+ * the node's origin); splats[].position is not read. `error` may be NULL. Returns the number of words. Every splat must
+ * be finite with radius > 0 (an assertion: the packer has cleaned them). The bounds hold for the chunk's means (radius:
+ * for each splat) except where 24 bits an axis, 12 bits a normal's coordinate or radius, or the floats that decoding
+ * adds up cannot hold them; *error tells. */
 uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error);

@@ -21,20 +21,20 @@ struct spl_gpu_buffer;
 struct spl_gpu_kernel;
 
 struct spl_gpu_options {
-    const char *device;      /* as spl_renderer_options.device */
+    const char *device; /* as spl_renderer_options.device */
     bool require_gpu;
     bool debug;
-    uint64_t memory_limit;   /* 0 = 3/4 of the device's */
-    const char *cache_dir;   /* pipeline cache; NULL = $XDG_CACHE_HOME/splatd or ~/.cache/splatd; "" = none */
+    uint64_t memory_limit; /* 0 = 3/4 of the device's */
+    const char *cache_dir; /* pipeline cache; NULL = $XDG_CACHE_HOME/splatd or ~/.cache/splatd; "" = none */
 };
 
-struct spl_gpu_limits {          /* 0 = cannot */
-    uint64_t memory_bytes;       /* what may be allocated in all: the limit or the device's */
-    uint64_t buffer_bytes;       /* largest buffer */
-    uint64_t binding_bytes;      /* largest range a storage binding or a texel buffer sees */
-    uint32_t workgroups;         /* largest dispatch, in x */
-    uint32_t subgroup;           /* lanes */
-    bool atomics_64;             /* 64 bit integer atomics on storage buffers */
+struct spl_gpu_limits {     /* 0 = cannot */
+    uint64_t memory_bytes;  /* what may be allocated in all: the limit or the device's */
+    uint64_t buffer_bytes;  /* largest buffer */
+    uint64_t binding_bytes; /* largest range a storage binding or a texel buffer sees */
+    uint32_t workgroups;    /* largest dispatch, in x */
+    uint32_t subgroup;      /* lanes */
+    bool atomics_64;        /* 64 bit integer atomics on storage buffers */
     bool timestamps;
 };
 
@@ -55,9 +55,9 @@ uint64_t spl_gpu_count_complaints(void);
 size_t spl_gpu_list(struct spl_device_info *devices, size_t capacity);
 
 enum spl_gpu_buffer_kind {
-    SPL_GPU_DEVICE,    /* storage on the device; filled by spl_gpu_copy/_fill */
-    SPL_GPU_UPLOAD,    /* mapped for writing; usable as storage binding and as copy source */
-    SPL_GPU_READBACK,  /* mapped for reading after a wait; storage binding or copy target */
+    SPL_GPU_DEVICE,   /* storage on the device; filled by spl_gpu_copy/_fill */
+    SPL_GPU_UPLOAD,   /* mapped for writing; usable as storage binding and as copy source */
+    SPL_GPU_READBACK, /* mapped for reading after a wait; storage binding or copy target */
 };
 
 /* Refused with SPL_E_LIMIT and both numbers before anything is taken when it exceeds limits or the memory budget.
@@ -80,11 +80,11 @@ void spl_gpu_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel);
 /* What a dispatch sees of a resource; buffer NULL = nothing. */
 struct spl_gpu_binding {
     struct spl_gpu_buffer *buffer;
-    uint64_t offset, bytes;   /* offset multiple of 256; bytes 0 = to the end */
+    uint64_t offset, bytes; /* offset multiple of 256; bytes 0 = to the end */
 };
 
-/* Recording. One list at a time: begin … submit. Lists run one after the other, each seeing all that the one before wrote. Errors
- * of recording (bad ranges are our bugs: assertions) surface at submit. */
+/* Recording. One list at a time: begin … submit. Lists run one after the other, each seeing all that the one before
+ * wrote. Errors of recording (bad ranges are our bugs: assertions) surface at submit. */
 int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
 /* Runs `kernel` over what it binds of `bindings`; the others are ignored. */
 void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
@@ -92,9 +92,9 @@ void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
 /* The same with the number of workgroups in three words (x, y, z; at most limits.workgroups in x, 1 in y and z: the
  * caller's kernel that wrote them keeps to that) at `offset`, a multiple of 4, of `counts`. */
 void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT],
-                               struct spl_gpu_buffer *counts, uint64_t offset);
-void spl_gpu_barrier(struct spl_gpu *gpu);   /* everything before is visible to everything after (and to the host) */
+                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], struct spl_gpu_buffer *counts,
+                               uint64_t offset);
+void spl_gpu_barrier(struct spl_gpu *gpu); /* everything before is visible to everything after (and to the host) */
 void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
                   uint64_t to_offset, uint64_t bytes);
 void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes, uint32_t word);

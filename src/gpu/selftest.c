@@ -1,6 +1,7 @@
-/* The self-test at open: a small kernel touches storage buffers and texels, every field of the shared structs, every specialisation
- * constant and each kind of atomic that our kernels use, and each word it writes is compared with what C says. A driver
- * that miscompiles or lays out differently is refused here, with the first wrong word, instead of rendering nonsense.
+/* The self-test at open: a small kernel touches storage buffers and texels, every field of the shared structs, every
+ * specialisation constant and each kind of atomic that our kernels use, and each word it writes is compared with what C
+ * says. A driver that miscompiles or lays out differently is refused here, with the first wrong word, instead of
+ * rendering nonsense.
  */
 #include "gpu/backend.h"
 
@@ -12,9 +13,9 @@
 
 /* The kernel's storage buffers in the order of their numbers; the first four are read. */
 enum place { FRAME, ENTRIES, CHUNKS, PAGE, DEPTH, SUMS, OUTPUT, IDS, PLACES };
-static const enum spl_resource resources[PLACES] = {
-    SPL_RESOURCE_FRAME, SPL_RESOURCE_ENTRIES, SPL_RESOURCE_CHUNKS, SPL_RESOURCE_PAGE,
-    SPL_RESOURCE_DEPTH, SPL_RESOURCE_SUMS,    SPL_RESOURCE_OUTPUT, SPL_RESOURCE_IDS};
+static const enum spl_resource resources[PLACES] = {SPL_RESOURCE_FRAME,  SPL_RESOURCE_ENTRIES, SPL_RESOURCE_CHUNKS,
+                                                    SPL_RESOURCE_PAGE,   SPL_RESOURCE_DEPTH,   SPL_RESOURCE_SUMS,
+                                                    SPL_RESOURCE_OUTPUT, SPL_RESOURCE_IDS};
 
 enum {
     N = 1000, /* not a multiple of the workgroup: the last one is partly idle */
@@ -97,8 +98,8 @@ static int compare(const struct spl_gpu *gpu, const char *name, bool atomics_64,
             if (got[i] != want[i])
                 return spl_fail(err, SPL_E_NO_DEVICE,
                                 "self-test '%s' failed on device '%s' (%s): word %u of binding %u is 0x%08" PRIx32
-                                ", not 0x%08" PRIx32 "; its driver is not usable", name, gpu->info.name,
-                                gpu->info.driver, i, place, got[i], want[i]);
+                                ", not 0x%08" PRIx32 "; its driver is not usable",
+                                name, gpu->info.name, gpu->info.driver, i, place, got[i], want[i]);
     }
     return 0;
 }
@@ -119,9 +120,8 @@ static int run(struct spl_gpu *gpu, const char *name, bool atomics_64, struct sp
     fill_inputs(spl_gpu_buffer_map(input));
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {0};
     for (uint32_t i = 0; i < PLACES; i++)
-        bindings[resources[i]] = (struct spl_gpu_binding){.buffer = i < INPUTS ? input : device,
-                                                          .offset = (i < INPUTS ? i : i - INPUTS) * REGION,
-                                                          .bytes = REGION};
+        bindings[resources[i]] = (struct spl_gpu_binding){
+            .buffer = i < INPUTS ? input : device, .offset = (i < INPUTS ? i : i - INPUTS) * REGION, .bytes = REGION};
     bindings[SPL_RESOURCE_ENTRIES].bytes = 4 * N; /* the kernel takes its count from the range */
     spl_gpu_fill(gpu, device, 0, outputs, 0);
     spl_gpu_barrier(gpu);

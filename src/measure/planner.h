@@ -39,7 +39,7 @@ struct spl_planner {
         double fixed_ms, ms_per_mpx;
         double psnr, bound; /* mean and lower bound, dB; the mean without a profile is a rank, the bound NAN */
         double learned;     /* ln of this setting's own factor */
-    } *candidates;
+    } * candidates;
     size_t count;
     bool atoms; /* candidates differ in them; else every number of atoms is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
@@ -61,9 +61,10 @@ void spl_planner_finish(struct spl_planner *planner);
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
  * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
- * what is learned may bring them to the front; one that needs more samples than samples_max is none. SPL_E_INPUT names the kept parameter that no setting has. Atoms that
- * nobody measured are kept: they are drawn in place of the next more, or the most, that were measured, whose time they
- * are taken to need, and nothing is promised of their accuracy; methods without textures have any number of them. */
+ * what is learned may bring them to the front; one that needs more samples than samples_max is none. SPL_E_INPUT names
+ * the kept parameter that no setting has. Atoms that nobody measured are kept: they are drawn in place of the next
+ * more, or the most, that were measured, whose time they are taken to need, and nothing is promised of their accuracy;
+ * methods without textures have any number of them. */
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
                        struct spl_error *err);
 

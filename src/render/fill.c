@@ -43,7 +43,7 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, struct spl_reach *reach, con
     double looks = params->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
     reach->align = 1u << top;
     reach->guard = 1u << (uint32_t)ceil(log2(fmin(fmax(kernel, 4), around))); /* 4: of whole groups of lanes */
-    reach->apron = round_up(looks + (2u << plan->levels) + 2, reach->align);   /* 2: normals look so far */
+    reach->apron = round_up(looks + (2u << plan->levels) + 2, reach->align);  /* 2: normals look so far */
 }
 
 void spl_fill_set_params(struct spl_tile *tile)
@@ -115,18 +115,22 @@ static int record_pass(struct spl_tile *tile, const struct planes *planes, const
 /* Which samples are visible: depths alone, so the same for every group of layers. */
 static int record_visibility(struct spl_tile *tile, const struct planes *p, struct spl_error *err)
 {
-    uint32_t rings = tile->fill.rings, wide = has_wide(tile), adaptive = tile->view->fill.visibility != SPL_VISIBILITY_CONSTANT;
+    uint32_t rings = tile->fill.rings, wide = has_wide(tile),
+             adaptive = tile->view->fill.visibility != SPL_VISIBILITY_CONSTANT;
     int rc = SPL_OK;
     for (uint32_t level = 1; level <= rings && !rc; level++)
         rc = record_pass(tile, p,
-                         &(struct pass){{"fill_pull", false, {level == 1, wide}}, level, p->nearest[level - 1],
-                                        p->nearest[level], p->samples[level]},
+                         &(struct pass){{"fill_pull", false, {level == 1, wide}},
+                                        level,
+                                        p->nearest[level - 1],
+                                        p->nearest[level],
+                                        p->samples[level]},
                          err);
     return rc ? rc
               : record_pass(
                     tile, p,
-                    &(struct pass){{"fill_visible", false, {adaptive, wide}}, 0, p->states, p->nearest[rings],
-                                   p->samples[0]},
+                    &(struct pass){
+                        {"fill_visible", false, {adaptive, wide}}, 0, p->states, p->nearest[rings], p->samples[0]},
                     err);
 }
 
@@ -140,13 +144,19 @@ int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct sp
     int rc = first ? record_visibility(tile, &p, err) : SPL_OK;
     for (uint32_t level = 1; level <= levels && !rc; level++)
         rc = record_pass(tile, &p,
-                         &(struct pass){{"fill_gather", false, {group, level == 1, wide}}, level, p.means[level - 1],
-                                        p.means[level], p.samples[level]},
+                         &(struct pass){{"fill_gather", false, {group, level == 1, wide}},
+                                        level,
+                                        p.means[level - 1],
+                                        p.means[level],
+                                        p.samples[level]},
                          err);
     for (uint32_t level = levels; level-- > 0 && !rc;)
         rc = record_pass(tile, &p,
-                         &(struct pass){{"fill_push", false, {group, level == 0, wide}}, level, p.means[level + 1],
-                                        p.means[level], p.samples[level]},
+                         &(struct pass){{"fill_push", false, {group, level == 0, wide}},
+                                        level,
+                                        p.means[level + 1],
+                                        p.means[level],
+                                        p.samples[level]},
                          err);
     if (!rc && group == SPL_SUMS_NORMAL && !spl_dataset_get_info(tile->resident->dataset)->has_surface)
         rc = record_pass(tile, &p, &(struct pass){{"fill_normal", false, {wide}}, 0, 0, 0, p.samples[0]}, err);

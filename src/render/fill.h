@@ -20,16 +20,17 @@ struct spl_fill_plan {
     uint32_t levels; /* of the pyramid that holes are filled from */
 };
 
-/* `spacing`: how far points lie apart where the image shows them sparsest, samples. `reach`: what that makes of tiles. */
+/* `spacing`: how far points lie apart where the image shows them sparsest, samples. `reach`: what that makes of tiles.
+ */
 void spl_fill_plan_init(struct spl_fill_plan *plan, struct spl_reach *reach, const struct spl_view *view,
                         double spacing);
 
 /* Fills in what the kernels read of the tile's parameters. */
 void spl_fill_set_params(struct spl_tile *tile);
 
-/* Records the filter over the depth and payloads of `group`, as spl_points_record() leaves them `filled`; leaves them the
- * same way, with plain depths. Normals of datasets without any are the filled depth's. What the `first` group leaves in
- * the planes, the visible samples, serves the tile's other groups. */
+/* Records the filter over the depth and payloads of `group`, as spl_points_record() leaves them `filled`; leaves them
+ * the same way, with plain depths. Normals of datasets without any are the filled depth's. What the `first` group
+ * leaves in the planes, the visible samples, serves the tile's other groups. */
 int spl_fill_record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err);
 
 #endif

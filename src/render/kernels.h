@@ -12,8 +12,8 @@
 enum { SPL_KERNEL_CONSTANTS = 3 };
 
 struct spl_kernel_key {
-    const char *name; /* of shaders/meson.build; static */
-    bool wide;        /* its variant with 64 bit atomics where the device has them */
+    const char *name;                         /* of shaders/meson.build; static */
+    bool wide;                                /* its variant with 64 bit atomics where the device has them */
     uint32_t constants[SPL_KERNEL_CONSTANTS]; /* as the shader numbers them; those that it does not declare are 0 */
 };
 

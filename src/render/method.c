@@ -51,15 +51,32 @@ SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {
-#define REAL(id, field, low, high, value, shape, text)                                                               \
-    {.name = #id, .help = text, .kind = SPL_PARAM_REAL, .least = low, .most = high, .otherwise = value, .shapes = shape},
-#define COUNT(id, field, low, high, value, shape, text)                                                              \
-    {.name = #id, .help = text, .kind = SPL_PARAM_WHOLE, .least = low, .most = high, .otherwise = value, .shapes = shape},
+#define REAL(id, field, low, high, value, shape, text)                                                                 \
+    {.name = #id,                                                                                                      \
+     .help = text,                                                                                                     \
+     .kind = SPL_PARAM_REAL,                                                                                           \
+     .least = low,                                                                                                     \
+     .most = high,                                                                                                     \
+     .otherwise = value,                                                                                               \
+     .shapes = shape},
+#define COUNT(id, field, low, high, value, shape, text)                                                                \
+    {.name = #id,                                                                                                      \
+     .help = text,                                                                                                     \
+     .kind = SPL_PARAM_WHOLE,                                                                                          \
+     .least = low,                                                                                                     \
+     .most = high,                                                                                                     \
+     .otherwise = value,                                                                                               \
+     .shapes = shape},
 #define CHOICE(id, field, prefix, value, shape, text)                                                                  \
-    {.name = #id, .help = text, .kind = SPL_PARAM_CHOICE, .most = CHOICE_MOST_##prefix, .otherwise = value, .shapes = shape, \
-     .choice_name = choice_##id, .choice_from_name = spl_##prefix##_from_name},
-    SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)
-};
+    {.name = #id,                                                                                                      \
+     .help = text,                                                                                                     \
+     .kind = SPL_PARAM_CHOICE,                                                                                         \
+     .most = CHOICE_MOST_##prefix,                                                                                     \
+     .otherwise = value,                                                                                               \
+     .shapes = shape,                                                                                                  \
+     .choice_name = choice_##id,                                                                                       \
+     .choice_from_name = spl_##prefix##_from_name},
+    SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)};
 
 const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param)
 {

@@ -21,8 +21,8 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
         if (filled && (rc = spl_kernels_get(&r->kernels, r->gpu, &lines, &kernel, err)))
             return rc;
         if (filled)
-            spl_tile_dispatch_splats(
-                tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
+            spl_tile_dispatch_splats(tile, kernel,
+                                     &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

@@ -1,5 +1,5 @@
-/* The renderer's inside, shared by renderer.c (life), frame.c (tiles), scratch.c (buffers), tile.c (recording) and the methods. Everything
- * belongs to the renderer's thread. */
+/* The renderer's inside, shared by renderer.c (life), frame.c (tiles), scratch.c (buffers), tile.c (recording) and the
+ * methods. Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_RENDERER_H
 #define SPL_RENDER_RENDERER_H
 
@@ -13,11 +13,11 @@
 
 /* Fixed, pre-sized device memory of one tile. */
 struct spl_scratch {
-    uint64_t samples;                /* capacity */
-    uint64_t taken_bytes;            /* by all buffers below */
-    struct spl_gpu_buffer *depth;    /* 4 bytes a sample; 8 with 64 bit atomics (where the nearest wins) */
-    struct spl_gpu_buffer *large;    /* 16 bytes a sample; see enum spl_area */
-    struct spl_gpu_buffer *small;    /* 4 bytes a sample, and room for the summed textures of a run; the same */
+    uint64_t samples;              /* capacity */
+    uint64_t taken_bytes;          /* by all buffers below */
+    struct spl_gpu_buffer *depth;  /* 4 bytes a sample; 8 with 64 bit atomics (where the nearest wins) */
+    struct spl_gpu_buffer *large;  /* 16 bytes a sample; see enum spl_area */
+    struct spl_gpu_buffer *small;  /* 4 bytes a sample, and room for the summed textures of a run; the same */
     struct spl_gpu_buffer *output; /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
                                       write where the host reads */
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
@@ -45,7 +45,7 @@ struct spl_renderer {
     struct spl_residency residency;
     struct spl_scratch scratch;
     struct spl_kernels kernels;
-    struct spl_draw_list list;       /* reused from tile to tile */
+    struct spl_draw_list list; /* reused from tile to tile */
 };
 
 /* One tile being recorded. */
@@ -53,14 +53,14 @@ struct spl_tile {
     struct spl_renderer *renderer;
     const struct spl_resident_dataset *resident;
     const struct spl_view *view;
-    struct spl_camera camera;        /* of the tile and what is drawn around it, in samples */
-    struct spl_fill_plan fill;       /* of methods that fill */
-    uint32_t x, y, width, height;    /* in the image, pixels */
+    struct spl_camera camera;     /* of the tile and what is drawn around it, in samples */
+    struct spl_fill_plan fill;    /* of methods that fill */
+    uint32_t x, y, width, height; /* in the image, pixels */
     uint64_t samples;
-    struct spl_frame_params params;  /* common to all dispatches of the tile */
-    uint32_t slots_used;             /* of scratch.params; first those of the draw list's batches */
-    uint32_t areas;                  /* bit per enum spl_area: those that hold */
-    uint32_t stamps;                 /* timestamps written */
+    struct spl_frame_params params;              /* common to all dispatches of the tile */
+    uint32_t slots_used;                         /* of scratch.params; first those of the draw list's batches */
+    uint32_t areas;                              /* bit per enum spl_area: those that hold */
+    uint32_t stamps;                             /* timestamps written */
     uint8_t stamp_stage[SPL_GPU_TIMESTAMPS_MAX]; /* enum spl_stage that ended at each */
 };
 
@@ -85,8 +85,8 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
 /* Gives the draw list's batches their slots of parameters, before anything else of the tile takes one. SPL_E_LIMIT. */
 int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err);
 
-/* The kernel of `key`, and where chunks are drawn that have clip lines the one of theirs (constant 2, common/clip.glsl);
- * else NULL. */
+/* The kernel of `key`, and where chunks are drawn that have clip lines the one of theirs (constant 2,
+ * common/clip.glsl); else NULL. */
 int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_gpu_kernel **plain,
                               struct spl_gpu_kernel **clipped, struct spl_error *err);
 
@@ -95,8 +95,8 @@ enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
  * chunks. */
 struct spl_dispatch {
     enum spl_phase phases;
-    uint32_t kind;     /* enum spl_chunk_kind */
-    bool by_texture;   /* only chunks drawn with `planes` planes of atoms, interpolated or not */
+    uint32_t kind;   /* enum spl_chunk_kind */
+    bool by_texture; /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
     struct spl_gpu_kernel *clipped; /* for chunks with clip lines; NULL = as the others */
@@ -104,7 +104,8 @@ struct spl_dispatch {
 };
 void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
                               const struct spl_dispatch *what);
-/* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides; `wide`: of words of 64 bits. */
+/* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides; `wide`: of words of 64 bits.
+ */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err);
 /* Records a kernel, one invocation for each of `items`, and a barrier. */
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,

@@ -1,4 +1,5 @@
-/* An image cut into tiles that fit the scratch buffers. Tiles overlap by as far as samples act on each other. Everything belongs to the renderer's thread. */
+/* An image cut into tiles that fit the scratch buffers. Tiles overlap by as far as samples act on each other.
+ * Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_TILING_H
 #define SPL_RENDER_TILING_H
 

@@ -41,9 +41,9 @@ struct spl_node_lines {
 
 /* The pieces of points [begin, end), as lines. With `spacing` 0 as they were joined; else simplified for a level whose
  * splats lie so far apart: no vertex that is left out lies farther off than spacing * SPL_WIRES_ERROR, lines of less
- * than spacing * SPL_WIRES_SHORTEST are left out whole, colours and normals are means, and radii are those of the level. Where that
- * is more than SPL_NODE_VERTICES vertices, as of a coarser level. Ends of a node's lines at pieces of other nodes stay
- * as they are, so lines meet whatever levels stand beside each other. False: no memory. Any thread. */
+ * than spacing * SPL_WIRES_SHORTEST are left out whole, colours and normals are means, and radii are those of the
+ * level. Where that is more than SPL_NODE_VERTICES vertices, as of a coarser level. Ends of a node's lines at pieces of
+ * other nodes stay as they are, so lines meet whatever levels stand beside each other. False: no memory. Any thread. */
 #define SPL_WIRES_ERROR 0.25
 #define SPL_WIRES_SHORTEST 0.5
 enum { SPL_NODE_VERTICES = 8192 };

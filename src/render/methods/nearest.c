@@ -1,6 +1,6 @@
-/* Method nearest: each sample keeps one disc, the nearest by a depth that is bent into a cone (shaders/nearest.comp), and
- * no sums: with 64 bit atomics one pass instead of two. Resolving smooths colours over the samples around. Chunks that
- * the nearer half hides are dropped, as of splats that blend. */
+/* Method nearest: each sample keeps one disc, the nearest by a depth that is bent into a cone (shaders/nearest.comp),
+ * and no sums: with 64 bit atomics one pass instead of two. Resolving smooths colours over the samples around. Chunks
+ * that the nearer half hides are dropped, as of splats that blend. */
 #include "render/method.h"
 #include "render/renderer.h"
 
@@ -51,6 +51,10 @@ const struct spl_method_row spl_method_nearest = {
     .apron = 1, /* smoothing looks at the samples beside it */
     .record = record,
     .resolve = SPL_RESOLVED_BENT,
-    .guesses = {{2, 0.25, 4, 19, 20.95}, {1, 0.25, 4, 27, 21.83}, {2, 0.5, 4, 50, 22.53}, {1, 0.5, 4, 52, 23.19},
-                {2, 1, 4, 90, 23.59}, {1, 1, 5, 120, 24.23}},
+    .guesses = {{2, 0.25, 4, 19, 20.95},
+                {1, 0.25, 4, 27, 21.83},
+                {2, 0.5, 4, 50, 22.53},
+                {1, 0.5, 4, 52, 23.19},
+                {2, 1, 4, 90, 23.59},
+                {1, 1, 5, 120, 24.23}},
 };

@@ -9,7 +9,8 @@ static int record_depth(struct spl_tile *tile, struct spl_error *err)
     struct spl_renderer *r = tile->renderer;
     struct spl_gpu_kernel *depth;
     struct spl_dispatch what = {.phases = SPL_PHASE_FRONT};
-    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, &what.clipped, err);
+    int rc =
+        spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, &what.clipped, err);
     if (rc)
         return rc;
     spl_tile_dispatch_splats(tile, depth, &what);
@@ -31,7 +32,9 @@ static int get_texture_kernels(struct spl_tile *tile, struct spl_dispatch *what,
     if (!what->smooth)
         return spl_tile_get_disc_kernels(tile, key, kernel, &what->clipped, err);
     int rc = spl_kernels_get(&r->kernels, r->gpu, &sum, &what->sum, err);
-    return rc ? rc : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_summed", true, {0}}, kernel, &what->clipped, err);
+    return rc ? rc
+              : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_summed", true, {0}}, kernel,
+                                          &what->clipped, err);
 }
 
 /* Colours: chunks with atoms by the kernels of their number of planes, the others by the one that knows none. */
@@ -66,7 +69,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 {
     struct spl_renderer *r = tile->renderer;
     struct spl_gpu_kernel *shade, *clipped;
-    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, &clipped, err);
+    int rc =
+        spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, &clipped, err);
     if (rc)
         return rc;
     if (first)
@@ -104,6 +108,11 @@ const struct spl_method_row spl_method_splat = {
     .apron = 1, /* specks look at the samples beside them */
     .record = record,
     .resolve = SPL_RESOLVED_SUMS,
-    .guesses = {{2, 0.25, 5, 30, 21.1}, {1, 0.25, 5, 42, 22.1}, {2, 0.5, 6, 72, 22.6}, {1, 0.5, 8, 90, 23.42},
-                {2, 1, 8, 180, 23.6}, {1, 1, 10, 250, 24.4}, {1, 2, 20, 900, 25.1}},
+    .guesses = {{2, 0.25, 5, 30, 21.1},
+                {1, 0.25, 5, 42, 22.1},
+                {2, 0.5, 6, 72, 22.6},
+                {1, 0.5, 8, 90, 23.42},
+                {2, 1, 8, 180, 23.6},
+                {1, 1, 10, 250, 24.4},
+                {1, 2, 20, 900, 25.1}},
 };
