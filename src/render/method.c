@@ -161,7 +161,7 @@ int spl_method_from_name(const char *name)
 const char *spl_method_names(void)
 {
 #define NAME(NAME, name) ", " #name
-    return SPL_METHODS(NAME) + 2;
+    return &(SPL_METHODS(NAME))[2];
 #undef NAME
 }
 
