@@ -39,15 +39,17 @@ void draw_piece(vec3 from, vec3 to, float middle, uvec2 payloads)
     ivec2 size = upright ? ivec2(frame.height, frame.width) : ivec2(frame.width, frame.height);
     precise float inverse = 1.0 / (last.x - first.x);
     precise float w0 = 1.0 / from.z, w1 = 1.0 / to.z;
-    int k = int(ceil(clamp(min(first.x, last.x) - 0.5, 0.0, float(size.x))));
+    /* Clamped as a whole number too: ends of a forged chunk may be no numbers. */
+    int k = clamp(int(ceil(clamp(min(first.x, last.x) - 0.5, 0.0, float(size.x)))), 0, size.x);
     int end = min(int(floor(clamp(max(first.x, last.x) - 0.5, -1.0, float(size.x - 1)))), k + SPL_FILL_LINE_MOST - 1);
     for (;;) {
         precise float t = (float(k) + 0.5 - first.x) * inverse;
         precise float across = first.y + t * (last.y - first.y);
         precise float w = w0 + t * (w1 - w0);
         precise float z = 1.0 / w;
-        if (k <= end && across >= 0.0 && across < float(size.y)) {
-            uint at = sample_index(upright ? ivec2(int(floor(across)), k) : ivec2(k, int(floor(across))));
+        if (k <= end && k < size.x && across >= 0.0 && across < float(size.y)) {
+            int row = clamp(int(floor(across)), 0, size.y - 1);
+            uint at = sample_index(upright ? ivec2(row, k) : ivec2(k, row));
             uint bits = (floatBitsToUint(z) & ~SPL_FILL_DEPTH_BITS) | SPL_FILL_LINEAR;
             if (wins(at, bits))
                 put(at, bits, t * w1 * z < middle ? payloads.x : payloads.y);

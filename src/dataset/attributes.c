@@ -111,6 +111,8 @@ bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint6
     if (stream < 0 || !(node = spl_dataset_find_chunk(dataset, id, &index)))
         return false;
     const struct spl_chunk *chunk = &dataset->chunks[index];
+    if (spl_chunk_kind(chunk) != SPL_CHUNK_DISCS) // vertices of lines have no attributes
+        return false;
     const struct spl_stream *from = &dataset->streams[stream];
     struct spl_stream_code code = {from->base[index], from->width[index]};
     uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // opening has checked the page

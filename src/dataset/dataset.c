@@ -76,6 +76,9 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
 {
     *out = NULL;
+    if (source->size > INT64_MAX / 2) /* so that no sum of sizes wraps */
+        return spl_fail(err, SPL_E_LIMIT, "%s: %llu bytes are more than a dataset can have", name,
+                        (unsigned long long)source->size);
     struct spl_dataset *dataset = spl_alloc(1, sizeof *dataset, err);
     if (!dataset)
         return SPL_E_NOMEM;

@@ -23,6 +23,7 @@ static const struct kind {
     bool required;
     bool kept;    /* in memory, from open to close */
     bool texture; /* a file has all of these kinds or none */
+    const char *by_chunk; /* what is wrong where there is not an item for each chunk; NULL: need not be */
     uint32_t alignment, item_bytes;
     uint32_t room_bytes; /* of an item in memory, where that is more: items lie at the end of their copy, so that a
                             check can lay them out anew from its start */
@@ -36,14 +37,14 @@ static const struct kind {
     [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .kept = true, .texture = true, .alignment = 64, .item_bytes = 1,
                         .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = UINT64_MAX,
                         .wrong_size = "is shorter than its header", .check = spl_dataset_check_dictionary},
-    [SPL_KIND_CHUNK_TEXTURES] = {SPL_SECTION_CHUNK_TEXTURES, .kept = true, .texture = true, .alignment = 64,
+    [SPL_KIND_CHUNK_TEXTURES] = {SPL_SECTION_CHUNK_TEXTURES, .kept = true, .texture = true, .by_chunk = "has not one word for each chunk", .alignment = 64,
                                  .item_bytes = sizeof(uint32_t), .bytes_max = UINT64_MAX,
                                  .wrong_size = "has not one word for each chunk"},
     [SPL_KIND_CHUNKS] = {SPL_SECTION_CHUNKS, .required = true, .kept = true, .alignment = 64,
                          .item_bytes = SPL_CHUNK_BYTES, .room_bytes = sizeof(struct spl_chunk),
                          .bytes_min = SPL_CHUNK_BYTES, .bytes_max = UINT64_MAX,
                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_chunks},
-    [SPL_KIND_STREAMS] = {SPL_SECTION_STREAM, .number = BY_STREAM, .kept = true, .alignment = 64,
+    [SPL_KIND_STREAMS] = {SPL_SECTION_STREAM, .number = BY_STREAM, .kept = true, .by_chunk = "has not a base and a width for each chunk", .alignment = 64,
                           .item_bytes = SPL_STREAM_CHUNK_BYTES, .bytes_max = UINT64_MAX,
                           .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_streams},
     [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
@@ -254,6 +255,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
             return corrupt(dataset, err, section_name(s, name), kind->number ? "is out of order" : "occurs twice");
         if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
             return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
+        if (kind->number == BY_STREAM && list->count == SPL_STREAMS_MAX)
+            return corrupt(dataset, err, section_name(s, name), "is one more than a dataset can have");
         list->at[list->count++] = s;
         dataset->info.page_bytes += kind->number == BY_PAGE ? s->bytes : 0;
     }
@@ -263,6 +266,10 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
         return rc;
     dataset->info.nodes = dataset->found[SPL_KIND_NODES].at[0]->bytes / sizeof(struct spl_node);
     dataset->info.chunks = dataset->found[SPL_KIND_CHUNKS].at[0]->bytes / SPL_CHUNK_BYTES;
+    for (int k = 0; k < SPL_KIND_COUNT; k++) /* before any of them is copied */
+        for (uint32_t i = 0; i < dataset->found[k].count && kinds[k].by_chunk; i++)
+            if (dataset->found[k].at[i]->bytes != dataset->info.chunks * kinds[k].item_bytes)
+                return corrupt(dataset, err, section_name(dataset->found[k].at[i], name), kinds[k].by_chunk);
     return SPL_OK;
 }
 

@@ -97,7 +97,7 @@ int spl_dataset_source_read(const struct spl_dataset_source *source, const char 
     for (char *to = out; bytes;) {
         int64_t got = source->read(source->context, offset, to, bytes);
         if (got < 0)
-            return spl_fail_errno(err, (int)-got, "cannot read %s", name);
+            return spl_fail_errno(err, got > -4096 ? (int)-got : EIO, "cannot read %s", name); // a caller's may be anything
         if (!got)
             return spl_fail(err, SPL_E_CORRUPT,
                             "%s was cut short while in use; put the dataset back under another name and rename it",

@@ -137,17 +137,15 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
     }
 }
 
-/* Records every group and layer of the view; the n-th requested layer starts at word n * pixels. */
+/* Records every group and layer of the view into the list that was begun; the n-th requested layer starts at word n *
+ * pixels. */
 static int record(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
     bool first = true;
-    int rc = spl_gpu_begin(r->gpu, err);
-    if (rc)
-        return rc;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
-    rc = spl_tile_take_slots(tile, err);
+    int rc = spl_tile_take_slots(tile, err);
     for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
         uint32_t layers = 0;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)
@@ -188,21 +186,34 @@ static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats
     }
 }
 
+/* Has the device draw the tile. A list that could not be recorded to its end is run all the same, for nothing: parameters
+ * and half its work are the device's by then. */
+static int draw_tile(struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_gpu *gpu = tile->renderer->gpu;
+    uint64_t ticket;
+    int rc = spl_gpu_begin(gpu, err);
+    if (rc)
+        return rc;
+    rc = record(tile, err);
+    struct spl_error why = {0};
+    int ended = spl_gpu_submit(gpu, &ticket, &why);
+    /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
+    if (!ended)
+        ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + FRAME_DEADLINE_NS, &why);
+    return rc || !ended ? rc : spl_fail(err, ended, "%s", why.message);
+}
+
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
     struct spl_frame_stats *stats = &job->frame->stats;
-    uint64_t ticket, clock;
+    uint64_t clock;
     if (spl_now_ns() >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = list_tile(job, tile, err);
     if (!rc)
-        rc = record(tile, err);
-    if (!rc)
-        rc = spl_gpu_submit(r->gpu, &ticket, err);
-    /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
-    if (!rc)
-        rc = spl_gpu_wait(r->gpu, ticket, spl_now_ns() + FRAME_DEADLINE_NS, err);
+        rc = draw_tile(tile, err);
     if (rc)
         return rc;
     clock = spl_now_ns();

@@ -85,8 +85,11 @@ static int follow(struct spl_hold *hold, struct spl_error *err)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
         if (!page->buffer)
             return 1;
-        if (!page->filled)
+        if (!page->filled) {
+            if (!page->read && hold->begun > hold->come) /* it lost its room, and has another's: nobody reads it */
+                hold->begun = hold->come;
             return 0;
+        }
         hold->moved_ns = spl_now_ns();
     }
     return 1;

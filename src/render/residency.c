@@ -221,9 +221,13 @@ static int grow_staging(struct spl_residency *residency, bool evict_held, size_t
 {
     if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) >= bytes)
         return SPL_OK;
+    uint64_t had = residency->staging ? spl_gpu_buffer_get_bytes(residency->staging) : 0;
     spl_gpu_buffer_destroy(residency->gpu, residency->staging);
     residency->staging = NULL;
-    return make_buffer(residency, evict_held, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
+    int rc = make_buffer(residency, evict_held, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
+    if (rc && had) /* reads under way count on it */
+        spl_gpu_buffer_create(residency->gpu, SPL_GPU_UPLOAD, had, &residency->staging, NULL);
+    return rc;
 }
 
 /* Takes the slot's room. */
@@ -298,7 +302,7 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
         return SPL_SLOT_READY;
     residency->pending |= awaited;
     struct spl_io_rank rank = {.awaited = awaited, .walk = residency->frame};
-    if (!spl_residency_begin_read(residency, resident->dataset, page, slot, rank) && !awaited)
+    if (!spl_residency_begin_read(residency, resident->dataset, page, slot, rank) && !awaited && !page->holds)
         spl_residency_drop_slot(residency, page); // its room is for those who wait
     return SPL_SLOT_PENDING;
 }
@@ -337,9 +341,13 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
                 spl_residency_drop_slot(residency, page);
             continue;
         }
-        if ((rc = fill(residency, page, read, err))) {
+        struct spl_error why = {0};
+        if ((rc = fill(residency, page, read, &why))) {
             spl_residency_drop_slot(residency, page);
-            break;
+            if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
+                return spl_fail(err, rc, "%s", why.message);
+            rc = SPL_OK; /* no staging: who waits for it sees it gone, and asks again */
+            continue;
         }
         spl_io_end(residency->io, read);
         page->read = NULL;

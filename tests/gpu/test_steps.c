@@ -12,6 +12,7 @@
 #include <splatd/render.h>
 
 #include "render/fault.h"
+#include "base/memory.h"
 #include "support/make_dataset.h"
 
 enum { all_layers = (1 << SPL_LAYER_COUNT) - 1, count = 6000 };
@@ -205,6 +206,36 @@ static void a_frame_may_be_given_up_between_tiles(void **state)
     spl_dataset_close(one);
 }
 
+/* Whatever memory is refused while a tile is recorded (kernels are made then), the next frame is as good as any. */
+static void a_tile_that_fails_leaves_the_device_usable(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = cube();
+    int refused = 0;
+    for (long n = 1; n <= 24; n += 1 + n / 8) {
+        struct spl_renderer *renderer = open_renderer(0);
+        struct spl_frame frame, again;
+        struct spl_view view = looking(4, 64, 48);
+        view.method = n % 2 ? SPL_METHOD_NEAREST : SPL_METHOD_SPLAT;
+        assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_preload(renderer, dataset, NULL), SPL_OK);
+        spl_memory_fail_after(n);
+        int code = spl_renderer_render(renderer, dataset, &view, &frame, NULL);
+        spl_memory_fail_after(0);
+        refused += code != 0;
+        assert_true(code == 0 || code == SPL_E_NOMEM);
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &again, NULL), SPL_OK);
+        if (!code)
+            assert_same(&frame, &again);
+        spl_frame_finish(&frame);
+        spl_frame_finish(&again);
+        spl_renderer_remove(renderer, dataset);
+        spl_renderer_destroy(renderer);
+    }
+    assert_true(refused > 6);
+    spl_dataset_close(dataset);
+}
+
 int main(int argc, char **argv)
 {
     device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
@@ -216,6 +247,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(interrupted_frames_have_the_bytes_that_they_have_alone),
         cmocka_unit_test(pages_driven_out_between_tiles_come_back),
         cmocka_unit_test(a_frame_may_be_given_up_between_tiles),
+        cmocka_unit_test(a_tile_that_fails_leaves_the_device_usable),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -125,7 +125,10 @@ void spl_reply_view_head(struct request *request, const struct spl_view_request 
     spl_reply_stream(request, 16, read_nothing, NULL, NULL); // a GET's length is known only once it is rendered
     if (request->response) {
         add_headers(request, headers.text);
-        add_validator(request, key);
+        if (view->view.partial) /* what is on the device now may be less than what the key stands for */
+            spl_reply_add_header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
+        else
+            add_validator(request, key);
     }
     free(headers.text);
 }
