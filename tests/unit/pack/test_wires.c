@@ -244,6 +244,7 @@ static void a_gap_is_crossed_on_the_arc(void **state)
     }
     const struct spl_wire_vertex *v = c.wires.vertices;
     assert_true(!c.wires.cut_short && c.wires.piece_count == c.wires.count - 1);
+    assert_int_equal(c.wires.capacity, c.wires.count); /* pieces of gaps too: no more is reserved than is needed */
     double way = 0;
     for (size_t i = 0; i < c.wires.count; i++) {
         double x = v[i].position[0] - 5e6;
@@ -392,8 +393,10 @@ static void a_node_has_so_many_vertices_at_most(void **state)
     for (int i = 0; i < count; i++)
         c.points.radius[i] = 0.15f;
     join_cloud(&c);
+    assert_true(spl_wires_get_node(&c.wires, 0, count, 1, &lines));
+    assert_in_range(lines.capacity, lines.count, SPL_NODE_VERTICES); /* however many pieces lie below */
     assert_true(spl_wires_get_node(&c.wires, 0, count, 0, &lines));
-    assert_int_equal(lines.count, count);
+    assert_true(lines.count == count && lines.capacity == count);
     assert_true(spl_wires_get_node(&c.wires, 0, count, 0.2, &lines)); /* 2 x 6000 would be too many: only the longer */
     assert_int_equal(lines.count, wires);
     assert_true(spl_wires_get_node(&c.wires, 0, count / 2, 0.2, &lines));
