@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "dataset/dataset.h"
 #include "pack/emit.h"
 #include "pack/linear.h"
 #include "pack/median.h"
@@ -304,7 +305,7 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_stage 
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
     if (!rc && !(rc = pack_scan(options, path, photos.photographs, stage, report, err))) {
-        rc = spl_dataset_open(path, false, &dataset, err);
+        rc = spl_dataset_open_whole(path, false, &dataset, err);
         unlink(path);
     }
     if (!rc)

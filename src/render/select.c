@@ -21,7 +21,7 @@ struct walk {
     struct spl_draw_list *list;
     const struct spl_node *nodes;
     const struct spl_chunk *chunks;
-    const uint32_t *textures; /* words of CTEX, NULL = none */
+    const uint32_t *textures; /* words of the chunks, NULL = none */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
@@ -98,7 +98,7 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
-/* The chunk's word of CTEX as it is drawn: with as many planes, and interpolated where the finest texels, no part of
+/* The chunk's texture word as it is drawn: with as many planes, and interpolated where the finest texels, no part of
  * the chunk being nearer than `near`, are wider than a sample. 0 where the textures are less than so many samples wide
  * that their mean colours show all there is. */
 static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
