@@ -38,10 +38,10 @@ static void index_page(struct request *request, const struct spl_call *call)
     for (size_t i = 0; i < catalog->count; i++)
         if (catalog->slots[i].current && spl_access_may_see(request, catalog->slots[i].id))
             json_array_append_new(views, json_sprintf("%s/view", catalog->slots[i].current->uri));
-    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version",
-                                      SPLATD_VERSION, "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets",
-                                      "/v1/datasets", "methods", "/v1/methods", "status", "/v1/status", "views",
-                                      views));
+    spl_reply_json(request,
+                   json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION,
+                             "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets", "/v1/datasets",
+                             "methods", "/v1/methods", "status", "/v1/status", "views", views));
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT);
 }
