@@ -15,17 +15,22 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
     drawing->view.layers = 1u << SPL_LAYER_COLOR;
 }
 
-static int parse_name(const char *command, const char *option, const char *text, int (*from_name)(const char *),
-                      int *out, struct spl_error *err)
+static const char *method_name(int method)
 {
-    *out = from_name(text);
-    return *out < 0 ? spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd %s --help' lists what it knows",
-                               option, text, command)
-                    : SPL_OK;
+    return spl_method_name((enum spl_method)method);
 }
 
-static int parse_param(struct spl_view *view, const char *command, enum spl_method_param param, const char *text,
-                       struct spl_error *err)
+static const char *layer_name(int layer)
+{
+    return spl_layer_name((enum spl_layer)layer);
+}
+
+static const char *format_name(int format)
+{
+    return spl_format_name((enum spl_format)format);
+}
+
+static int parse_param(struct spl_view *view, enum spl_method_param param, const char *text, struct spl_error *err)
 {
     const struct spl_method_param_info *info = spl_method_param_get(param);
     char option[64];
@@ -35,7 +40,8 @@ static int parse_param(struct spl_view *view, const char *command, enum spl_meth
     snprintf(option, sizeof option, "--%s", info->name);
     switch (info->kind) {
     case SPL_PARAM_CHOICE:
-        rc = parse_name(command, option, text, info->choice_from_name, &choice, err);
+        rc = spl_cmd_parse_name(option, text, info->choice_from_name, info->choice_name, (int)info->most + 1, &choice,
+                                err);
         value = choice;
         break;
     case SPL_PARAM_WHOLE:
@@ -51,22 +57,21 @@ static int parse_param(struct spl_view *view, const char *command, enum spl_meth
     return rc;
 }
 
-int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id, const char *text,
-                          struct spl_error *err)
+int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, int id, const char *text, struct spl_error *err)
 {
     int rc = SPL_OK, choice = 0;
     uint64_t count = 0;
     if (id >= SPL_CMD_PARAM && id < SPL_CMD_OWN)
-        return parse_param(&d->view, command, (enum spl_method_param)(id - SPL_CMD_PARAM), text, err);
+        return parse_param(&d->view, (enum spl_method_param)(id - SPL_CMD_PARAM), text, err);
     switch (id) {
     case SPL_CMD_SIZE:
         return spl_cmd_parse_size("--size", text, &d->width, &d->height, err);
     case SPL_CMD_METHOD:
-        rc = parse_name(command, "--method", text, spl_method_from_name, &choice, err);
+        rc = spl_cmd_parse_name("--method", text, spl_method_from_name, method_name, SPL_METHOD_COUNT, &choice, err);
         d->view.method = (enum spl_method)choice;
         return rc;
     case SPL_CMD_LAYER:
-        rc = parse_name(command, "--layer", text, spl_layer_from_name, &d->layer, err);
+        rc = spl_cmd_parse_name("--layer", text, spl_layer_from_name, layer_name, SPL_LAYER_COUNT, &d->layer, err);
         d->view.layers = rc ? 0 : 1u << d->layer;
         return rc;
     case SPL_CMD_LOD:
@@ -76,7 +81,8 @@ int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id
     case SPL_CMD_BACKGROUND:
         return spl_cmd_parse_color("--background", text, d->view.background, err);
     case SPL_CMD_FORMAT:
-        return parse_name(command, "--format", text, spl_format_from_name, &d->format, err);
+        return spl_cmd_parse_name("--format", text, spl_format_from_name, format_name, SPL_FORMAT_COUNT, &d->format,
+                                  err);
     case SPL_CMD_QUALITY:
         rc = spl_cmd_parse_count("--quality", text, 1, 100, &count, err);
         d->encode.quality = (int)count;

@@ -50,9 +50,8 @@ enum spl_cmd_drawing_id {
 /* Writes what --help says of the methods and their parameters. */
 void spl_cmd_drawing_help(FILE *out);
 
-/* Takes the argument of a shared option, -o among them; `text` is borrowed. SPL_E_USAGE names the option, and `command`
- * for its help. */
-int spl_cmd_drawing_parse(struct spl_cmd_drawing *drawing, const char *command, int id, const char *text,
-                          struct spl_error *err);
+/* Takes the argument of a shared option, -o among them; `text` is borrowed. SPL_E_USAGE names the option and what it
+ * takes. */
+int spl_cmd_drawing_parse(struct spl_cmd_drawing *drawing, int id, const char *text, struct spl_error *err);
 
 #endif

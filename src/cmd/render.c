@@ -103,7 +103,7 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
     case OPT_FAR:
         return spl_cmd_parse_real("--far", text, 1e-9, 1e12, &a->far, err);
     default:
-        return spl_cmd_drawing_parse(&a->drawing, "render", id, text, err);
+        return spl_cmd_drawing_parse(&a->drawing, id, text, err);
     }
 }
 

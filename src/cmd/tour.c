@@ -100,14 +100,6 @@ static const struct option options[] = {
     {0},
 };
 
-static int parse_kind(const char *option, const char *text, const char *const *names, int *out, struct spl_error *err)
-{
-    for (*out = 0; names[*out]; (*out)++)
-        if (!strcmp(text, names[*out]))
-            return SPL_OK;
-    return spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd tour --help' lists what it knows", option, text);
-}
-
 static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
 {
     switch (id) {
@@ -121,16 +113,16 @@ static int parse_option(int id, const char *text, struct arguments *a, struct sp
     case OPT_FPS:
         return spl_cmd_parse_real("--fps", text, 1e-3, 1000, &a->fps, err);
     case OPT_POSITIONS:
-        return parse_kind("--positions", text, spl_path_positions_names, &a->positions, err);
+        return spl_cmd_parse_choice("--positions", text, spl_path_positions_names, &a->positions, err);
     case OPT_ROTATIONS:
-        return parse_kind("--rotations", text, spl_path_rotations_names, &a->rotations, err);
+        return spl_cmd_parse_choice("--rotations", text, spl_path_rotations_names, &a->rotations, err);
     case OPT_EASE:
-        return parse_kind("--ease", text, spl_path_ease_names, &a->ease, err);
+        return spl_cmd_parse_choice("--ease", text, spl_path_ease_names, &a->ease, err);
     case OPT_CLOSED:
         a->closed = true;
         return SPL_OK;
     default:
-        return spl_cmd_drawing_parse(&a->drawing, "tour", id, text, err);
+        return spl_cmd_drawing_parse(&a->drawing, id, text, err);
     }
 }
 
@@ -140,7 +132,8 @@ static int resolve_output(struct arguments *a, struct spl_error *err)
     struct stat status;
     int rc;
     if (!a->path)
-        return spl_fail(err, SPL_E_USAGE, "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
+        return spl_fail(err, SPL_E_USAGE,
+                        "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
     if (!output)
         return spl_fail(err, SPL_E_USAGE, "tour needs a video or a folder to write to: -o OUT.mp4 or -o FOLDER");
     a->video = !strcasecmp(spl_cmd_ending(output), "mp4");
@@ -173,8 +166,8 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     if (rc || (rc = spl_camera_path_load(a->path, &path_options, &path, err)))
         return rc;
     path.closed |= a->closed;
-    if ((rc = spl_camera_path_count(&path, a->frames, a->fps, a->seconds, SPL_CAMERA_PATH_MAX, &a->count, &a->fps,
-                                    err)))
+    if ((rc =
+             spl_camera_path_count(&path, a->frames, a->fps, a->seconds, SPL_CAMERA_PATH_MAX, &a->count, &a->fps, err)))
         goto done;
     if (!(a->cameras = spl_alloc_raw(a->count, sizeof *a->cameras, err)))
         rc = SPL_E_NOMEM;

@@ -27,6 +27,8 @@ if sorted(commands) != sorted("serve pack render tour info synth bench compare d
     wrong.append(f"splatd --help lists {commands}")
 for command in commands:
     text = check([command, "--help"], 0, "stdout")
+    if re.search(r" $", text, re.MULTILINE):
+        wrong.append(f"splatd {command} --help has lines that end in blanks")
     if len(re.findall(rf"^\s+(?:\S+ )*splatd {command}\b", text, re.MULTILINE)) < 2:
         wrong.append(f"splatd {command} --help shows fewer than two examples")
     check([command, "--no-such-option"], 2, "stderr")
@@ -54,6 +56,14 @@ for words, wanted in {
     "render a.spld --format png -o b.spld": r"ends in \.png", "render a.spld --format png -o b.jpg": r"ends in \.png",
     "render a.spld --memory-limit 1X -o b.png": "K, M, G or T",
     "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
+    # What is unknown is answered with what is known.
+    "render a.spld -o b.png --method fog": "--method takes splat, points, .*, not 'fog'",
+    "render a.spld -o b.png --visibility some": "--visibility takes adaptive, constant, none, not 'some'",
+    "render a.spld -o b.png --layer colour": "--layer takes color, depth, .*, not 'colour'",
+    "tour a.spld --path b.json -o c.mp4 --ease out-in": "--ease takes none, in, out, in-out, not 'out-in'",
+    "tour a.spld --path b.json -o c --format tiff": "--format takes jpeg, png, .*, not 'tiff'",
+    "serve nosuch": r"nosuch: there is no such file or directory of datasets.*splatd pack",
+    "sign /v1/datasets/a/view --key nosuch": "nosuch.*openssl rand -hex 32",
     "render a.spld -o": "requires an argument.*\n.*splatd render --help",
 }.items():
     said = check(words.split(), 2, "stderr")
