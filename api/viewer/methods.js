@@ -1,5 +1,5 @@
-// The methods and their parameters, as the service's own table has them, and a control for each parameter. Nothing here
-// or elsewhere on the page knows one by name, so what a newer service has more of is there too.
+// The methods and their parameters, as the service's own table has them, and a control for each parameter. The page knows
+// none by name (but atoms, which a budget chooses too), so a method that the service learns is there with all it takes.
 
 import {askJson} from "./service.js";
 
