@@ -8,6 +8,7 @@
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "geom/size.h"
 #include "shared.h"
 
@@ -283,7 +284,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     a->sweep.dataset_path = argv[optind];
     a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {
-        status = spl_dataset_open(argv[i], false, &a->datasets[a->bench.dataset_count], err);
+        status = spl_dataset_open_whole(argv[i], false, &a->datasets[a->bench.dataset_count], err);
         a->bench.dataset_count += !status;
     }
     return status;

@@ -100,32 +100,6 @@ int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, ui
     return 0;
 }
 
-int spl_cmd_parse_choice(const char *option, const char *text, const char *const *names, int *out,
-                         struct spl_error *err)
-{
-    char list[512] = "";
-    size_t used = 0;
-    for (*out = 0; names[*out]; (*out)++) {
-        if (!strcmp(text, names[*out]))
-            return SPL_OK;
-        if (used < sizeof list)
-            used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", *out ? ", " : "", names[*out]);
-    }
-    return spl_fail(err, SPL_E_USAGE, "%s takes %s, not '%s'", option, list, text);
-}
-
-int spl_cmd_parse_name(const char *option, const char *text, int (*from_name)(const char *), const char *(*name)(int),
-                       int count, int *out, struct spl_error *err)
-{
-    const char *names[SPL_CMD_NAMES_MAX] = {0};
-    if ((*out = from_name(text)) >= 0)
-        return SPL_OK;
-    spl_assert(count < SPL_CMD_NAMES_MAX);
-    for (int i = 0; i < count; i++)
-        names[i] = name(i);
-    return spl_cmd_parse_choice(option, text, names, out, err);
-}
-
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err)
 {
     if (spl_color_from_text(text, out))

@@ -31,14 +31,6 @@ int spl_cmd_parse_size(const char *option, const char *text, uint32_t *width, ui
 /* As over HTTP: "white", "#rrggbb", "#rrggbbaa", "transparent". */
 int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], struct spl_error *err);
 
-/* One of name(0) … name(count - 1), or whatever else from_name() knows, which gives -1 for the rest. */
-int spl_cmd_parse_name(const char *option, const char *text, int (*from_name)(const char *), const char *(*name)(int),
-                       int count, int *out, struct spl_error *err);
-
-/* The index of one of `names`, closed by NULL. */
-int spl_cmd_parse_choice(const char *option, const char *text, const char *const *names, int *out,
-                         struct spl_error *err);
-
 enum { SPL_CMD_NAMES_MAX = 96 };
 
 /* Which of `names`, closed by NULL, was probably meant by `word`, whose dashes in front and argument behind '=' do not
