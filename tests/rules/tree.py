@@ -64,7 +64,7 @@ def without_comments(text, suffix):
 
 def method_patterns(names):
     """What names a method: (the suffixes of files that it counts in, None for all; a pattern with the group "name")."""
-    every, rare = "|".join(names), "|".join(name for name in names if name not in HOMONYMS) or "(?!)"
+    every, rare = "|".join(names) or "(?!)", "|".join(name for name in names if name not in HOMONYMS) or "(?!)"
     no_file_or_call = r"\b(?!\.\w|\()"
     any_name, own = rf"(?P<name>{every}){no_file_or_call}", rf"(?P<name>{rare}){no_file_or_call}"
     upper = rf"(?P<name>{every.upper()})\b"
@@ -113,7 +113,7 @@ def violations(root):
     table = root / METHODS
     rows = re.findall(r"^    METHOD\((\w+), (\w+)\)", table.read_text(encoding="utf-8"), re.M) if table.exists() else []
     names = [name for _, name in rows]
-    patterns = method_patterns(names) if names else []
+    patterns, any_method = method_patterns(names), re.compile("|".join(names) or "(?!)", re.I)
     for name in names:
         if not (root / METHOD_FILES / f"{name}.c").exists():
             yield f"{METHODS}:1: method {name} has no file {METHOD_FILES}/{name}.c"
@@ -127,7 +127,8 @@ def violations(root):
         except UnicodeDecodeError:
             continue  # an image or a recorded scan
         lines = text.splitlines()
-        said = [""] * len(lines) if names_methods(relative, names) else without_comments(text, path.suffix).splitlines()
+        said = [] if names_methods(relative, names) else without_comments(text, path.suffix).splitlines()
+        named = {number for number, line in enumerate(said, 1) if any_method.search(line)}
         source = path.suffix in (".c", ".h", ".def", ".glsl", ".comp")
         code = source or path.suffix in (".sh", ".py", ".build")
         if source and len(lines) > LONGEST:
@@ -137,7 +138,7 @@ def violations(root):
                 yield f"{relative}:{number}: left open: {line.strip()}"
             found = INCLUDE.match(line) if source else None
             wrong = check_include(relative, parts, *found.groups()) if found else None
-            wrong = wrong or check_methods(relative, said[number - 1] if number <= len(said) else "", patterns)
+            wrong = wrong or (check_methods(relative, said[number - 1], patterns) if number in named else None)
             if wrong:
                 yield f"{relative}:{number}: {wrong}"
 
