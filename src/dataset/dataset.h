@@ -23,6 +23,12 @@ int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *can
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
 
+/* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
+ * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;
+ * let_go() closes the source, which may block. */
+void spl_dataset_hold(const struct spl_dataset *dataset);
+void spl_dataset_let_go(const struct spl_dataset *dataset);
+
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count);
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);

@@ -3,7 +3,7 @@
  * Invariants: `staged` counts the bytes of the read under way and of those ended that were not given back, and is raised
  * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. A read is in one list at a time, but for the
  * one that is being read and those taken, which are in none. Only the io thread waits without a deadline, for work;
- * destroy() wakes it. */
+ * destroy() wakes it, or, in the middle of a read, leaves it behind: then `io` is the thread's, which frees it. */
 #include "render/io.h"
 
 #include <pthread.h>
@@ -23,11 +23,11 @@ struct spl_io {
     bool started;
     void (*wake)(void *context); // may be NULL
     void *wake_context;
-    bool closing;                         // guarded by: mutex, as all below
+    bool closing, left_behind;            // guarded by: mutex, as all below
     struct read_list free, waiting, ended;
     struct spl_io_read *current; /* that is being read; NULL = none */
     size_t under_way;            /* waiting, current or ended */
-    uint64_t staged, numbers;
+    uint64_t staged, numbers, moved_ns;
     struct spl_io_read reads[SPL_IO_READS];
 };
 
@@ -52,8 +52,10 @@ static struct spl_io_read *choose(struct spl_io *io)
 
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
-    if (read->data)
+    if (read->data) {
         io->staged -= read->what.bytes;
+        io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
+    }
     free(read->data);
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
@@ -69,13 +71,19 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     read->state = BEING_READ;
     io->current = read;
     io->staged += what.bytes;
+    io->moved_ns = spl_now_ns();
+    if (what.hold)
+        what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
     void *data = spl_alloc_raw(what.bytes, 1, &err);
     if (data && what.read(what.source, what.index, data, &err)) {
         free(data);
         data = NULL;
     }
+    if (what.let_go)
+        what.let_go(what.source);
     pthread_mutex_lock(&io->mutex);
+    io->moved_ns = spl_now_ns();
     io->current = NULL;
     read->data = data;
     read->err = err;
@@ -91,6 +99,16 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     pthread_cond_broadcast(&io->ended_one);
 }
 
+static void release(struct spl_io *io)
+{
+    for (size_t i = 0; i < SPL_IO_READS; i++)
+        free(io->reads[i].data);
+    pthread_cond_destroy(&io->ended_one);
+    pthread_cond_destroy(&io->work);
+    pthread_mutex_destroy(&io->mutex);
+    free(io);
+}
+
 static void *run(void *argument)
 {
     struct spl_io *io = argument;
@@ -102,12 +120,16 @@ static void *run(void *argument)
             continue;
         }
         perform(io, next);
+        if (!io->wake || io->closing)
+            continue;
         pthread_mutex_unlock(&io->mutex);
-        if (io->wake)
-            io->wake(io->wake_context);
+        io->wake(io->wake_context); // destroy() waits for this, as nothing is being read
         pthread_mutex_lock(&io->mutex);
     }
+    bool left_behind = io->left_behind;
     pthread_mutex_unlock(&io->mutex);
+    if (left_behind)
+        release(io);
     return NULL;
 }
 
@@ -147,16 +169,21 @@ void spl_io_destroy(struct spl_io *io)
         return;
     pthread_mutex_lock(&io->mutex);
     io->closing = true;
+    io->left_behind = io->current != NULL;
+    bool left_behind = io->left_behind;
+    for (size_t i = 0; i < SPL_IO_READS; i++) {
+        free(io->reads[i].data);
+        io->reads[i].data = NULL;
+    }
+    if (left_behind)
+        pthread_detach(io->thread);
     pthread_cond_signal(&io->work);
     pthread_mutex_unlock(&io->mutex);
+    if (left_behind)
+        return;
     if (io->started)
         pthread_join(io->thread, NULL);
-    for (size_t i = 0; i < SPL_IO_READS; i++)
-        free(io->reads[i].data);
-    pthread_cond_destroy(&io->ended_one);
-    pthread_cond_destroy(&io->work);
-    pthread_mutex_destroy(&io->mutex);
-    free(io);
+    release(io);
 }
 
 struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what *what, struct spl_io_rank rank)
@@ -168,7 +195,8 @@ struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what
         TAILQ_REMOVE(&io->free, read, link);
         *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .state = WAITS};
         TAILQ_INSERT_TAIL(&io->waiting, read, link);
-        io->under_way++;
+        if (!io->under_way++)
+            io->moved_ns = spl_now_ns();
         pthread_cond_signal(&io->work);
     }
     pthread_mutex_unlock(&io->mutex);
@@ -241,15 +269,12 @@ bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns)
     return ended;
 }
 
-bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns)
+uint64_t spl_io_get_moved_ns(struct spl_io *io)
 {
     pthread_mutex_lock(&io->mutex);
-    while (io->current && io->current->what.source == source)
-        if (!wait_until(io, deadline_ns))
-            break;
-    bool none = !io->current || io->current->what.source != source;
+    uint64_t moved_ns = io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
-    return none;
+    return moved_ns;
 }
 
 size_t spl_io_count(struct spl_io *io)

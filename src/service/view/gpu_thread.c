@@ -319,7 +319,7 @@ static void run(struct gpu *gpu)
             break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
-        struct spl_job *job = choose(gpu, !loading || gpu->loading_waits);
+        struct spl_job *job = choose(gpu, (!loading || gpu->loading_waits) && !gpu->uploads_left);
         if (!job && closed) {
             if (!wait_for_pages(gpu))
                 break;
@@ -342,7 +342,6 @@ void *spl_gpu_thread_run(void *argument)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
     TAILQ_INIT(&gpu.entries);
-    STAILQ_INIT(&gpu.leaving);
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
