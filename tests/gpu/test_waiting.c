@@ -361,6 +361,45 @@ static void pages_are_put_on_the_device_some_at_a_time(void **state)
         spl_dataset_close(many_of[i]);
 }
 
+/* Pages of memory that the process has mapped. */
+static uint64_t mapped_bytes(void)
+{
+    unsigned long long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    assert_non_null(file);
+    assert_int_equal(fscanf(file, "%llu", &pages), 1);
+    fclose(file);
+    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+/* As many may wait as are let in: what they hold meanwhile is theirs times that. */
+static void frames_that_wait_hold_no_images(void **state)
+{
+    (void)state;
+    enum { frames = 8, side = 2048 };
+    struct spl_view view = looking();
+    struct spl_frame_steps *steps[2 * frames];
+    struct spl_renderer *renderer = open_with(0, one, NULL);
+    const double eye[3] = {4, 1.4, 1.3}, target[3] = {0}, up[3] = {0, 0, 1};
+    bool more;
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 50, side, side, NULL), SPL_OK);
+    atomic_store(&may_pass, 0);
+    uint64_t before = mapped_bytes();
+    for (int i = 0; i < 2 * frames; i++) {
+        view.method = (enum spl_method)(i % SPL_METHOD_COUNT);
+        view.supersample = i % 2 ? 0.5 : 1;
+        assert_int_equal(spl_frame_begin(renderer, one, &view, &steps[i], NULL), SPL_OK);
+        assert_int_equal(spl_frame_step(steps[i], SPL_NEVER, &more, NULL), SPL_OK);
+        assert_true(more && spl_frame_is_waiting(steps[i]));
+    }
+    assert_in_range(mapped_bytes() - before, 0, (uint64_t)frames * side * side * 4 / 2);
+    for (int i = 0; i < 2 * frames; i++)
+        spl_frame_end(steps[i], NULL);
+    atomic_store(&may_pass, open_gate);
+    spl_renderer_destroy(renderer);
+}
+
 /* Nobody waits for a read that does not end: dataset and renderer go while it hangs. */
 static void nothing_is_left_of_what_goes(void **state)
 {
@@ -546,6 +585,7 @@ int main(void)
         cmocka_unit_test_setup(a_read_that_hangs_costs_its_frame_only, reset),
         cmocka_unit_test_setup(a_slow_disk_is_no_dead_one, reset),
         cmocka_unit_test_setup(pages_are_put_on_the_device_some_at_a_time, reset),
+        cmocka_unit_test_setup(frames_that_wait_hold_no_images, reset),
         cmocka_unit_test_setup(nothing_is_left_of_what_goes, reset),
         cmocka_unit_test_setup(frames_without_room_for_both_take_turns, reset),
         cmocka_unit_test_setup(what_has_no_room_depends_on_the_view_alone, reset),
