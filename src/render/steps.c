@@ -116,8 +116,10 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     return rc;
 }
 
+/* What can be refused is, before the device or a page is touched. `options` NULL: a frame in steps, of which all layers are
+ * handed out; `handed_out`: those that have no image of the caller's are. */
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                 bool alone, const struct spl_render_options *options, struct spl_frame_steps **out,
+                 const struct spl_render_options *options, bool handed_out, struct spl_frame_steps **out,
                  struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
@@ -127,8 +129,6 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     int rc = spl_view_read(view, &known, err);
     if (!rc)
         rc = spl_view_check_layers(&known, info, err);
-    if (!rc)
-        rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
     view = &known;
@@ -143,10 +143,15 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
-    steps->job.hold.alone = alone;
+    steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
     if (options)
         rc = borrow_images(steps, options, err);
+    if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
+        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
+                            steps->wanted.layers & ~steps->borrowed);
+    if (!rc)
+        rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
         return rc;
@@ -159,7 +164,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err)
 {
-    return begin(renderer, dataset, view, false, NULL, out, err);
+    return begin(renderer, dataset, view, NULL, true, out, err);
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -281,10 +286,7 @@ int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dat
     bool more = true;
     int rc = spl_sized_read(options, &known, sizeof known, "spl_render_options", err);
     if (!rc)
-        rc = begin(renderer, dataset, view, true, &known, &steps, err);
-    if (!rc && !frame && steps->borrowed != steps->wanted.layers)
-        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
-                            steps->wanted.layers & ~steps->borrowed);
+        rc = begin(renderer, dataset, view, &known, frame, &steps, err);
     while (!rc && more) {
         rc = spl_frame_step(steps, steps->wanted.deadline_ns, &more, err);
         if (!rc && more && spl_frame_is_waiting(steps))

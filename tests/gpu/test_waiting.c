@@ -400,6 +400,33 @@ static void frames_that_wait_hold_no_images(void **state)
     spl_renderer_destroy(renderer);
 }
 
+/* Before any page is asked for, though the disk hangs. */
+static void what_cannot_be_drawn_is_refused_at_once(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_renderer *renderer = open_with(0, one, NULL);
+    struct spl_render_options options;
+    struct spl_error err = {0};
+    struct spl_pick pick;
+    spl_render_options_init(&options);
+    view.method = SPL_METHOD_FILL; // which walks while it prepares
+    atomic_store(&may_pass, 0);
+    assert_int_equal(spl_renderer_render_with(renderer, one, &view, &options, NULL, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "images");
+    assert_int_equal(look(renderer, NULL).pages_pending, 0);
+    struct spl_dataset_info *info = (struct spl_dataset_info *)spl_dataset_get_info(one);
+    const uint64_t ids = info->ids;
+    info->ids = (uint64_t)1 << 33;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_renderer_pick(renderer, one, &view, 1, 1, &pick, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "layer");
+    assert_int_equal(look(renderer, NULL).pages_pending, 0);
+    info->ids = ids;
+    atomic_store(&may_pass, open_gate);
+    spl_renderer_destroy(renderer);
+}
+
 /* Nobody waits for a read that does not end: dataset and renderer go while it hangs. */
 static void nothing_is_left_of_what_goes(void **state)
 {
@@ -586,6 +613,7 @@ int main(void)
         cmocka_unit_test_setup(a_slow_disk_is_no_dead_one, reset),
         cmocka_unit_test_setup(pages_are_put_on_the_device_some_at_a_time, reset),
         cmocka_unit_test_setup(frames_that_wait_hold_no_images, reset),
+        cmocka_unit_test_setup(what_cannot_be_drawn_is_refused_at_once, reset),
         cmocka_unit_test_setup(nothing_is_left_of_what_goes, reset),
         cmocka_unit_test_setup(frames_without_room_for_both_take_turns, reset),
         cmocka_unit_test_setup(what_has_no_room_depends_on_the_view_alone, reset),
