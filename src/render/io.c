@@ -1,7 +1,8 @@
 /* The io thread; see io.h.
  *
  * Invariants: `staged` counts the bytes of the read under way and of those ended that were not given back, and is raised
- * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. A read is in one list at a time, but for the
+ * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is more to
+ * read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one list at a time, but for the
  * one that is being read and those taken, which are in none. Only the io thread waits without a deadline, for work;
  * destroy() wakes it, or, in the middle of a read, leaves it behind: then `io` is the thread's, which frees it. */
 #include "render/io.h"
@@ -13,6 +14,8 @@
 #include "base/memory.h"
 
 enum state { FREE, WAITS, BEING_READ, ENDED, TAKEN };
+
+enum { SPARES = 4 };
 
 TAILQ_HEAD(read_list, spl_io_read);
 
@@ -28,6 +31,10 @@ struct spl_io {
     struct spl_io_read *current; /* that is being read; NULL = none */
     size_t under_way;            /* waiting, current or ended */
     uint64_t staged, numbers, moved_ns;
+    struct {
+        void *data;
+        size_t room;
+    } spares[SPARES]; /* memory for reads to come; NULL = none */
     struct spl_io_read reads[SPL_IO_READS];
 };
 
@@ -50,13 +57,56 @@ static struct spl_io_read *choose(struct spl_io *io)
     return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
 }
 
+static void drop_spares(struct spl_io *io)
+{
+    for (int i = 0; i < SPARES; i++) {
+        free(io->spares[i].data);
+        io->spares[i].data = NULL;
+    }
+}
+
+/* NULL where none fits, without much of it lying idle; what is left of the others is no longer counted on then. */
+static void *take_spare(struct spl_io *io, size_t bytes, size_t *room)
+{
+    for (int i = 0; i < SPARES; i++) {
+        void *data = io->spares[i].data;
+        if (!data || io->spares[i].room < bytes || io->spares[i].room - bytes > bytes / 8)
+            continue;
+        *room = io->spares[i].room;
+        io->spares[i].data = NULL;
+        return data;
+    }
+    drop_spares(io);
+    *room = bytes;
+    return NULL;
+}
+
+/* Takes the memory of a read that was given back. */
+static void keep(struct spl_io *io, void *data, size_t room)
+{
+    uint64_t kept = io->staged + room;
+    int at = -1;
+    for (int i = 0; i < SPARES; i++) {
+        at = io->spares[i].data ? at : i;
+        kept += io->spares[i].data ? io->spares[i].room : 0;
+    }
+    if (!io->under_way)
+        drop_spares(io);
+    if (!io->under_way || at < 0 || kept > SPL_IO_BYTES) {
+        free(data);
+        return;
+    }
+    io->spares[at].data = data;
+    io->spares[at].room = room;
+}
+
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
     if (read->data) {
         io->staged -= read->what.bytes;
         io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
+        keep(io, read->data, read->room);
     }
-    free(read->data);
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
     pthread_cond_signal(&io->work); // there is room again
@@ -69,13 +119,16 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     struct spl_error err = {0};
     TAILQ_REMOVE(&io->waiting, read, link);
     read->state = BEING_READ;
+    size_t room;
+    void *data = take_spare(io, what.bytes, &room);
     io->current = read;
     io->staged += what.bytes;
     io->moved_ns = spl_now_ns();
     if (what.hold)
         what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
-    void *data = spl_alloc_raw(what.bytes, 1, &err);
+    if (!data)
+        data = spl_alloc_raw(what.bytes, 1, &err);
     if (data && what.read(what.source, what.index, data, &err)) {
         free(data);
         data = NULL;
@@ -86,6 +139,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     io->moved_ns = spl_now_ns();
     io->current = NULL;
     read->data = data;
+    read->room = room;
     read->err = err;
     if (!data)
         io->staged -= what.bytes;
@@ -101,6 +155,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
 
 static void release(struct spl_io *io)
 {
+    drop_spares(io);
     for (size_t i = 0; i < SPL_IO_READS; i++)
         free(io->reads[i].data);
     pthread_cond_destroy(&io->ended_one);
@@ -170,6 +225,7 @@ void spl_io_destroy(struct spl_io *io)
     pthread_mutex_lock(&io->mutex);
     io->closing = true;
     io->left_behind = io->current != NULL;
+    drop_spares(io);
     bool left_behind = io->left_behind;
     for (size_t i = 0; i < SPL_IO_READS; i++) {
         free(io->reads[i].data);

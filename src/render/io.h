@@ -42,6 +42,7 @@ struct spl_io_read {
     int state;       /* enum state of io.c */
     bool unwanted;   /* ended by its owner while it was being read */
     void *data;      /* once taken: what.bytes; NULL: `err` says why not */
+    size_t room;     /* that `data` has */
     struct spl_error err;
 };
 

@@ -290,6 +290,33 @@ static void a_read_that_hangs_is_left_behind(void **state)
     assert_int_equal(atomic_load(&wakes), 1);
 }
 
+/* Of pages that are as large, while there are others to read; nothing once there are none, and never beyond the bound. */
+static void memory_serves_the_next_read(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    enum { bytes = 1 << 20 };
+    for (uint32_t i = 0; i < 4; i++)
+        begin(io, files, i, i < 3 ? bytes - 8 * i : bytes / 4, true, 1);
+    let_pass(files, 1, false);
+    struct spl_io_read *read = take(io);
+    void *data = read->data;
+    await_asked(files, 2); // has memory of its own
+    spl_io_end(io, read);
+    let_pass(files, 2, false);
+    struct spl_io_read *second = take(io);
+    read = take(io);
+    assert_ptr_equal(read->data, data);
+    spl_io_end(io, second);
+    spl_memory_fail_after(1); // a quarter is not taken from a whole
+    spl_io_end(io, read);
+    let_pass(files, 0, true);
+    while (spl_io_count(io) && !(read = spl_io_take(io)))
+        usleep(500);
+    spl_memory_fail_after(0);
+    spl_io_destroy(io);
+}
+
 static void it_says_when_anything_moved(void **state)
 {
     (void)state;
@@ -316,6 +343,7 @@ int main(void)
         cmocka_unit_test(failures_are_told),
         cmocka_unit_test(waits_end_at_their_deadline),
         cmocka_unit_test(a_read_that_hangs_is_left_behind),
+        cmocka_unit_test(memory_serves_the_next_read),
         cmocka_unit_test(it_says_when_anything_moved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
