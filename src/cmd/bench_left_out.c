@@ -12,6 +12,7 @@
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "image/load.h"
 #include "measure/left_out.h"
 
@@ -119,7 +120,7 @@ static int run(const struct arguments *a, struct spl_error *err)
     struct spl_renderer *renderer = NULL;
     struct spl_left_out sums = {0};
     int rc = spl_view_list_load_photographs(&list, a->cameras, &how, err);
-    if (rc || (rc = spl_dataset_open(a->dataset, true, &dataset, err)))
+    if (rc || (rc = spl_dataset_open_whole(a->dataset, true, &dataset, err)))
         goto done;
     if (!spl_dataset_get_info(dataset)->atoms) {
         rc = spl_fail(err, SPL_E_INPUT, "%s has no textures whose gain could be measured: pack it with --cameras",

@@ -11,6 +11,7 @@
 #include "cmd/bench_textures.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "image/load.h"
 
 static void show_epoch(void *context, const char *what, const struct spl_train_progress *epoch)
@@ -176,7 +177,7 @@ static int open_inputs(struct bench *b, struct spl_error *err)
     const struct spl_photograph_options photographs = {.images = b->a.images, .get_size = get_size};
     int rc = spl_texture_file_open(b->a.textures, &b->file, err);
     if (!rc && b->a.dataset)
-        rc = spl_dataset_open(b->a.dataset, true, &b->dataset, err);
+        rc = spl_dataset_open_whole(b->a.dataset, true, &b->dataset, err);
     if (!rc && b->a.cameras)
         rc = spl_view_list_load_photographs(&b->cameras, b->a.cameras, &photographs, err);
     if (!rc && mkdir(b->a.folder, 0777) && errno != EEXIST)

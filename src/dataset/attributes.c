@@ -1,11 +1,11 @@
-/* The optional attributes of a dataset: META's list of streams, the sections STRM with each chunk's base and width, and
- * values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
+/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
  * on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "base/error.h"
 #include "dataset/chunk.h"
 #include "dataset/open.h"
 
@@ -49,38 +49,8 @@ int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err)
         dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
     }
     info->stream_count = (uint32_t)json_array_size(streams);
-    if (info->stream_count != dataset->found[SPL_KIND_STREAMS].count)
-        return wrong(dataset, err, "are not as many as the sections STRM");
     info->has_class = spl_dataset_find_stream(dataset, "class") >= 0;
     info->has_uncertainty = spl_dataset_find_stream(dataset, "uncertainty") >= 0;
-    return SPL_OK;
-}
-
-int spl_dataset_check_streams(struct spl_dataset *dataset, struct spl_error *err)
-{
-    struct spl_dataset_info *info = &dataset->info;
-    for (uint32_t s = 0; s < info->stream_count; s++) {
-        uint64_t bytes;
-        const uint32_t *base = spl_dataset_get_copy(dataset, SPL_KIND_STREAMS, s, &bytes);
-        if (bytes / SPL_STREAM_CHUNK_BYTES != info->chunks)
-            return spl_fail(err, SPL_E_CORRUPT,
-                            "%s: section STRM %u has not a base and a width for each chunk; pack the dataset again",
-                            dataset->name, s);
-        const uint8_t *width = (const uint8_t *)(base + info->chunks);
-        dataset->streams[s].base = base;
-        dataset->streams[s].width = width;
-        uint64_t at, bits = 0, words = 0;
-        const char *what = spl_stream_judge(dataset->stream_types[s], base, width, info->chunks, &at);
-        if (what)
-            return spl_fail(err, SPL_E_CORRUPT, "%s: section STRM %u: chunk %llu %s; pack the dataset again",
-                            dataset->name, s, (unsigned long long)at, what);
-        for (uint64_t c = 0; c < info->chunks; c++) {
-            bits += (uint64_t)width[c] * dataset->chunks[c].count;
-            words += spl_stream_words(width[c], dataset->chunks[c].count);
-        }
-        info->streams[s].bits = bits;
-        info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 32 * words - bits + 8 * bytes;
-    }
     return SPL_OK;
 }
 
@@ -92,7 +62,11 @@ const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *datas
 
 uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk)
 {
-    return spl_streams_words(dataset->streams, streams, chunk, dataset->chunks[chunk].count);
+    spl_assert(dataset->whole.nodes);
+    uint32_t words = 0;
+    for (uint32_t s = 0; s < streams; s++)
+        words += spl_stream_words(dataset->whole.width[s][chunk], dataset->whole.chunks[chunk].count);
+    return words;
 }
 
 int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)
@@ -103,24 +77,31 @@ int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)
     return -1;
 }
 
-bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value)
+static bool read_value(const struct spl_dataset *dataset, const struct spl_place *place, uint32_t stream, uint64_t id,
+                       double *value)
 {
     uint32_t words[SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
-    uint64_t index = 0;
-    const struct spl_node *node = NULL;
-    if (stream < 0 || !(node = spl_dataset_find_chunk(dataset, id, &index)))
-        return false;
-    const struct spl_chunk *chunk = &dataset->chunks[index];
-    if (spl_chunk_kind(chunk) != SPL_CHUNK_DISCS) // vertices of lines have no attributes
-        return false;
-    const struct spl_stream *from = &dataset->streams[stream];
-    struct spl_stream_code code = {from->base[index], from->width[index]};
-    uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // opening has checked the page
+    const struct spl_tables *tables = place->tables;
+    const struct spl_chunk *chunk = place->chunk;
+    uint32_t index = (uint32_t)(chunk - tables->chunks);
+    struct spl_stream_code code = {tables->base[stream][index], tables->width[stream][index]};
+    uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // which the page has
     uint64_t word = (uint64_t)chunk->geometry_word + spl_chunk_words(chunk) +
-                    spl_dataset_get_stream_words(dataset, (uint32_t)stream, index);
-    if (spl_dataset_read(dataset, dataset->pages[node->page]->offset + word * sizeof *words, words,
+                    spl_tables_get_stream_words(tables, stream, index);
+    if (spl_dataset_read(dataset, dataset->pages[tables->page]->offset + word * sizeof *words, words,
                          count * sizeof *words, NULL))
         return false;
     *value = spl_stream_decode(dataset->stream_types[stream], code, words, (uint32_t)(id - chunk->first_id));
     return true;
+}
+
+bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value)
+{
+    if (stream < 0)
+        return false;
+    struct spl_place place = spl_dataset_find_place(dataset, id);
+    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices of lines have no attributes
+                 read_value(dataset, &place, (uint32_t)stream, id, value);
+    spl_place_finish(&place);
+    return found;
 }

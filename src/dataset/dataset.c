@@ -65,19 +65,37 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
 }
 
-int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
-                           struct spl_error *err)
+static int open_file(const char *path, bool verify, uint64_t tables_bytes, const atomic_bool *cancelled,
+                     struct spl_dataset **out, struct spl_error *err)
 {
     struct spl_dataset_source source;
     *out = NULL;
     int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_source(&source, path, verify, cancelled, out, err)))
+    if (!rc && (rc = spl_dataset_open_within(&source, path, verify, tables_bytes, cancelled, out, err)))
         spl_dataset_source_close(&source);
     return rc;
 }
 
+int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
+                           struct spl_error *err)
+{
+    return open_file(path, verify, SPL_TABLES_BYTES, cancelled, out, err);
+}
+
+int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
+{
+    return open_file(path, verify, UINT64_MAX, NULL, out, err);
+}
+
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
+{
+    return spl_dataset_open_within(source, name, verify, SPL_TABLES_BYTES, cancelled, out, err);
+}
+
+int spl_dataset_open_within(const struct spl_dataset_source *source, const char *name, bool verify,
+                            uint64_t tables_bytes, const atomic_bool *cancelled, struct spl_dataset **out,
+                            struct spl_error *err)
 {
     *out = NULL;
     if (source->size > INT64_MAX / 2) /* so that no sum of sizes wraps */
@@ -90,6 +108,7 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
     atomic_init(&dataset->references, 1);
     dataset->cancelled = cancelled;
     dataset->source = *source;
+    dataset->tables_limit = tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
@@ -105,6 +124,7 @@ done:
         dataset->source = (struct spl_dataset_source){0}; /* stays the caller's */
         spl_dataset_close(dataset);
     } else {
+        dataset->opened = true;
         *out = dataset;
     }
     return rc;
@@ -124,8 +144,14 @@ static void destroy(struct spl_dataset *dataset)
         free(dataset->copies[i]);
     free(dataset->copies);
     free(dataset->found_all);
-    free(dataset->page_nodes);
-    free(dataset->page_first);
+    free(dataset->tables);
+    free(dataset->whole.nodes);
+    free(dataset->whole.chunks);
+    free(dataset->whole.textures);
+    for (uint32_t s = 0; s < SPL_STREAMS_MAX; s++) {
+        free(dataset->whole.base[s]);
+        free(dataset->whole.width[s]);
+    }
     spl_dictionary_finish(&dataset->dictionary);
     free(dataset->sections);
     free(dataset->name);
@@ -154,16 +180,23 @@ const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *da
     return &dataset->info;
 }
 
+bool spl_dataset_keeps_all(const struct spl_dataset *dataset)
+{
+    return dataset->whole.nodes;
+}
+
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count)
 {
+    spl_assert(dataset->whole.nodes);
     *count = dataset->info.nodes;
-    return dataset->nodes;
+    return dataset->whole.nodes;
 }
 
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count)
 {
+    spl_assert(dataset->whole.nodes);
     *count = dataset->info.chunks;
-    return dataset->chunks;
+    return dataset->whole.chunks;
 }
 
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
@@ -171,21 +204,20 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
     return dataset->meta;
 }
 
-/* Errors of pages reach clients, whom the path is no business of. */
-static const char *name_of(const struct spl_dataset *dataset)
+const char *spl_dataset_get_name(const struct spl_dataset *dataset)
 {
     return dataset->info.id[0] ? dataset->info.id : dataset->name;
 }
 
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
 {
-    return spl_dataset_source_read(&dataset->source, name_of(dataset), offset, out, bytes, err);
+    return spl_dataset_source_read(&dataset->source, spl_dataset_get_name(dataset), offset, out, bytes, err);
 }
 
 int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err)
 {
     return spl_is_cancelled(dataset->cancelled)
-               ? spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", name_of(dataset))
+               ? spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", spl_dataset_get_name(dataset))
                : SPL_OK;
 }
 
@@ -222,7 +254,7 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
     if (!rc && dataset->verified && XXH3_64bits(out, page->bytes) != page->hash)
         rc = spl_fail(err, SPL_E_CORRUPT,
                       "%s: page %u was overwritten while in use; put the dataset back under another name and rename it",
-                      name_of(dataset), index);
+                      spl_dataset_get_name(dataset), index);
     return rc;
 }
 

@@ -145,6 +145,26 @@ static int check_color(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+/* What nodes and chunks add up to; held against them where all are read. */
+static int get_counts(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    struct spl_counts *counts = &dataset->counts;
+    if (!spl_counts_from_json(json_object_get(dataset->meta, "counts"), info->stream_count, counts))
+        return wrong(dataset, err, "counts", "must say how many splats, pieces and bits there are");
+    if (counts->splats < info->leaf_splats)
+        return wrong(dataset, err, "counts", "has fewer \"splats\" than \"leaf_splats\"");
+    counts->leaf_splats = info->leaf_splats;
+    counts->levels = info->levels;
+    info->splats = counts->splats;
+    info->pieces = counts->pieces;
+    info->has_linear = counts->linear_chunks > 0;
+    memcpy(info->attribute_bits, counts->bits, sizeof info->attribute_bits);
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        info->streams[s].bits = counts->stream_bits[s];
+    return SPL_OK;
+}
+
 int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
@@ -196,8 +216,8 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     info->splat_radius = json_number_value(radius);
     if (info->leaf_splats > info->points)
         return wrong(dataset, err, "leaf_splats", "is larger than \"points\"");
-    if (levels > UINT32_MAX)
+    if (levels > UINT8_MAX + 1)
         return wrong(dataset, err, "levels", "is absurd");
     info->levels = (uint32_t)levels;
-    return SPL_OK;
+    return get_counts(dataset, err);
 }

@@ -30,11 +30,11 @@ struct spl_stream_code {
 struct spl_stream {
     const char *name, *type, *unit; /* as in the file, borrowed; unit "" = none */
     const char *about;              // may be NULL: where it comes from, of those that we know
-    const uint32_t *base;           /* by chunk, borrowed */
+    const uint32_t *base;           /* by chunk, borrowed; NULL where the dataset does not keep all tables */
     const uint8_t *width;
 };
 
-/* What a section STRM has: the bases of all chunks, then the widths. */
+/* What a page's head has of a chunk and stream: its base and its width. */
 enum { SPL_STREAM_CHUNK_BYTES = 5 };
 
 /* The attributes that we know. */
@@ -47,16 +47,6 @@ enum { SPL_STREAM_WORDS_MAX = SPL_CHUNK_SPLATS };
 static inline uint32_t spl_stream_words(uint32_t width, uint32_t count)
 {
     return (count * width + 31) / 32;
-}
-
-/* Words of the first `count` streams of chunk `chunk`, which has so many splats. */
-static inline uint32_t spl_streams_words(const struct spl_stream *streams, uint32_t count, uint64_t chunk,
-                                         uint32_t splats)
-{
-    uint32_t words = 0;
-    for (uint32_t s = 0; s < count; s++)
-        words += spl_stream_words(streams[s].width[chunk], splats);
-    return words;
 }
 
 /* Chooses base and width for `count` (1..SPL_CHUNK_SPLATS) values, writes `words` (room for SPL_STREAM_WORDS_MAX) and

@@ -23,7 +23,7 @@ static inline uint32_t spl_texture_planes(uint32_t chunk_texture)
 }
 
 /* Writes `code` to `words` (room for SPL_TEXTURE_WORDS_MAX) with the widths that its planes state, and returns the
- * number of words; with the one that CTEX has, spl_chunk_code_bits() / 32. Codes that do not fit their widths are an
+ * number of words; with the one that its page's head has, spl_chunk_code_bits() / 32. Codes that do not fit their widths are an
  * assertion. */
 uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words);
 

@@ -21,7 +21,7 @@ struct walk {
     struct spl_draw_list *list;
     const struct spl_node *nodes;
     const struct spl_chunk *chunks;
-    const uint32_t *textures; /* words of CTEX, NULL = none */
+    const uint32_t *textures; /* words of the chunks, NULL = none */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
@@ -98,7 +98,7 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
-/* The chunk's word of CTEX as it is drawn: with as many planes, and interpolated where the finest texels, no part of
+/* The chunk's texture word as it is drawn: with as many planes, and interpolated where the finest texels, no part of
  * the chunk being nearer than `near`, are wider than a sample. 0 where the textures are less than so many samples wide
  * that their mean colours show all there is. */
 static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
@@ -117,6 +117,25 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
     planes = planes < params->atoms ? planes : params->atoms;
     return (texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1)) | planes << SPL_CHUNK_TEXTURE_PLANES |
            (samples > size ? 1u : 0u) << SPL_CHUNK_TEXTURE_SMOOTH;
+}
+
+static struct spl_view_box grown(struct spl_view_box box, double by)
+{
+    for (int i = 0; i < 3; i++)
+        box.half[i] += by;
+    return box;
+}
+
+static double largest_radius(const struct spl_chunk *chunk)
+{
+    double codes = (1u << (chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15u)) - 1;
+    return chunk->radius_min + chunk->radius_step * codes;
+}
+
+/* What pruning adds to most radii of a node, and more. */
+static double typical(const struct spl_node *node)
+{
+    return 2 * node->spacing;
 }
 
 /* The box of the chunk's positions, in view space, and where its origin lies from the eye. */
@@ -180,10 +199,8 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
-    double radius_codes = (1u << (chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15u)) - 1;
-    double radius = (chunk->radius_min + chunk->radius_step * radius_codes) * scale;
-    for (int i = 0; i < 3; i++)
-        box.half[i] += radius;
+    double radius = largest_radius(chunk) * scale;
+    box = grown(box, radius);
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
     if (w->covered) {
@@ -235,7 +252,7 @@ static int draw_node(struct walk *w, const struct spl_node *node, struct spl_err
     return SPL_OK;
 }
 
-/* Everything that the node and its descendants draw, in view space. */
+/* What the node and its descendants draw, in view space, but for discs much larger than most. */
 static struct spl_view_box node_box(const struct walk *w, const struct spl_node *node)
 {
     double least[3], size[3];
@@ -243,10 +260,39 @@ static struct spl_view_box node_box(const struct walk *w, const struct spl_node 
         least[i] = node->origin[i] - w->params->camera->eye[i] + node->box_min[i];
         size[i] = (double)node->box_max[i] - node->box_min[i];
     }
-    struct spl_view_box box = spl_view_box(w->params->camera, least, size);
+    return grown(spl_view_box(w->params->camera, least, size), typical(node));
+}
+
+/* Is the node drawn itself, were it alone to say? */
+static bool is_drawn(const struct walk *w, const struct spl_node *node, const struct spl_view_box *box)
+{
+    double near = fmax(box->center[2] - box->half[2], w->params->camera->near), lod = w->params->lod;
+    return !node->child_count || (lod > 0 && node->spacing * w->focal <= lod * near);
+}
+
+/* Can anything of the node be seen? Pruned discs grow by up to their radius, and that of the largest is at most half of
+ * what is thinnest of the box, which holds all of them whole. Where so much decides, which is seldom, the chunks of a
+ * node that is drawn say how large theirs are; else its children are asked one by one. */
+static bool is_seen(const struct walk *w, const struct spl_node *node, const struct spl_view_box *box)
+{
+    const struct spl_camera *camera = w->params->camera;
+    double pad = w->params->low_pass, largest = INFINITY;
+    if (spl_view_box_visible(camera, box, pad))
+        return true;
+    if (!(w->params->lod > 0)) /* nothing is pruned */
+        return false;
     for (int i = 0; i < 3; i++)
-        box.half[i] += 2 * node->spacing; /* pruned splats grow by up to their radius */
-    return box;
+        largest = fmin(largest, ((double)node->box_max[i] - node->box_min[i]) / 2);
+    struct spl_view_box all = grown(*box, largest - typical(node));
+    if (largest <= typical(node) || !spl_view_box_visible(camera, &all, pad))
+        return false;
+    if (!is_drawn(w, node, box))
+        return true;
+    largest = 0;
+    for (uint32_t i = 0; i < node->chunk_count; i++)
+        largest = fmax(largest, largest_radius(&w->chunks[node->first_chunk + i]));
+    all = grown(*box, largest - typical(node));
+    return largest > typical(node) && spl_view_box_visible(camera, &all, pad);
 }
 
 /* Pushes the children that are in view, the nearest on top. False, and nothing pushed, when the page of one of them
@@ -259,7 +305,7 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
     bool all = true;
     for (uint64_t child = node->first_child; child < node->first_child + node->child_count; child++) {
         struct spl_view_box box = node_box(w, &w->nodes[child]);
-        if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
+        if (!is_seen(w, &w->nodes[child], &box))
             continue;
         enum spl_select_answer answer = w->params->resident(w->params->context, w->nodes[child].page);
         if (answer == SPL_SELECT_NO)
@@ -282,7 +328,6 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
 
 static int walk_tree(struct walk *w, struct spl_error *err)
 {
-    const struct spl_camera *camera = w->params->camera;
     uint64_t stack[stack_max];
     size_t depth = 0;
     if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
@@ -291,11 +336,9 @@ static int walk_tree(struct walk *w, struct spl_error *err)
     while (depth > 0) {
         const struct spl_node *node = &w->nodes[stack[--depth]];
         struct spl_view_box box = node_box(w, node);
-        if (!spl_view_box_visible(camera, &box, w->params->low_pass))
+        if (!is_seen(w, node, &box))
             continue;
-        double near = fmax(box.center[2] - box.half[2], camera->near);
-        bool fine = w->params->lod > 0 && node->spacing * w->focal <= w->params->lod * near;
-        if (!fine && node->child_count && depth + 8 <= stack_max) {
+        if (!is_drawn(w, node, &box) && depth + 8 <= stack_max) {
             if (push_children(w, node, stack, &depth))
                 continue;
             w->list->complete = false;

@@ -101,16 +101,6 @@ static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int r
     return 0;
 }
 
-static uint32_t count_first_page_chunks(const struct spl_dataset *dataset)
-{
-    uint64_t count;
-    uint32_t chunks = 0;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &count);
-    for (uint64_t i = 0; i < count; i++)
-        chunks += nodes[i].page == 0 ? nodes[i].chunk_count : 0; // every chunk is of one node
-    return chunks;
-}
-
 int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -123,7 +113,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
         size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
-        uint32_t chunks = count_first_page_chunks(entry->dataset);
+        uint32_t chunks = spl_dataset_get_tables(entry->dataset, 0)->chunk_count; // which are always kept
         if (options.first_page_chunks < chunks)
             options.first_page_chunks = chunks;
     }

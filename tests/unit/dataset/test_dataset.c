@@ -68,7 +68,7 @@ static void test_round_trip(void **state)
             bits += info->attribute_bits[a];
         for (uint32_t s = 0; s < info->stream_count; s++)
             bits += info->streams[s].bits;
-        uint64_t structs = 8 * (nodes * sizeof *node + chunks * (SPL_CHUNK_BYTES + 2 * SPL_STREAM_CHUNK_BYTES));
+        uint64_t structs = 8 * (nodes * SPL_NODE_BYTES + chunks * (SPL_CHUNK_BYTES + 2 * SPL_STREAM_CHUNK_BYTES));
         assert_true(bits > structs && bits <= 8 * bytes + structs);
         for (uint32_t i = 0; levels == 1 && i < count; i++) {
             struct spl_splat splat;
@@ -171,10 +171,8 @@ static const char *region_at(struct bytes b, size_t offset)
         if (offset >= s->offset && offset < s->offset + s->bytes)
             return s->type == SPL_SECTION_PAGE    ? "section PAGE 0 fails its checksum"
                    : s->type == SPL_SECTION_META  ? "section META fails its checksum"
-                   : s->type == SPL_SECTION_NODES ? "section NODE fails its checksum"
-                   : s->type == SPL_SECTION_STREAM
-                       ? (s->index ? "section STRM 1 fails its checksum" : "section STRM 0 fails its checksum")
-                       : "section CHNK fails its checksum";
+                   : s->type == SPL_SECTION_HEAD  ? "section HEAD 0 fails its checksum"
+                                                  : "section PDIR fails its checksum";
     }
     return NULL;
 }
@@ -209,7 +207,7 @@ static void test_every_flipped_bit(void **state)
         }
         assert_int_equal(pwrite(fd, &b.data[offset], 1, (off_t)offset), 1);
     }
-    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + SPL_CHUNK_BYTES));
+    assert_true(refused > 8 * (sizeof(struct spl_file_header) + SPL_NODE_BYTES + SPL_CHUNK_BYTES));
     close(fd);
     unlink(path);
     free(b.data);
