@@ -84,7 +84,10 @@ bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns)
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err)
 {
+    static long late;
     *more = false;
+    if (late++ < setting("FAKE_LOAD_LATE", 0))
+        return spl_fail(err, SPL_E_TIMEOUT, "no page has come for 10 s");
     *page = 1;
     return spl_renderer_add(renderer, dataset, err);
 }
