@@ -48,6 +48,11 @@ uint64_t spl_dataset_get_all_tables_bytes(const struct spl_dataset *dataset)
            (dataset->info.pages - 1) * sizeof(struct spl_tables);
 }
 
+uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset)
+{
+    return dataset->tables_limit;
+}
+
 /* The arrays behind each other in one block, those of items of 8, 4 and 1 byte in turn. */
 static void lay_out(struct spl_tables *tables, bool textured, void *memory)
 {

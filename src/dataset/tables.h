@@ -31,6 +31,9 @@ const struct spl_tables *spl_dataset_get_tables(const struct spl_dataset *datase
 size_t spl_dataset_get_tables_bytes(const struct spl_dataset *dataset, uint32_t page);
 uint64_t spl_dataset_get_all_tables_bytes(const struct spl_dataset *dataset);
 
+/* What tables may take altogether, as the dataset was opened. */
+uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset);
+
 /* Reads the tables of a page into `block`, which has room for their bytes and then begins with a struct spl_tables. Held
  * against checksum and directory, so that whoever has them checks nothing but what lies between a node and its children
  * (spl_node_judge_child()). SPL_E_CORRUPT, SPL_E_IO, SPL_E_NOMEM. Any thread; blocks on disk. */
@@ -45,6 +48,9 @@ const struct spl_tables *spl_dataset_borrow_tables(const struct spl_dataset *dat
 uint32_t spl_dataset_find_page_of_node(const struct spl_dataset *dataset, uint64_t node);
 uint32_t spl_dataset_find_page_of_chunk(const struct spl_dataset *dataset, uint64_t chunk);
 uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t id);
+
+/* The node behind the last one of a page. */
+uint64_t spl_dataset_get_page_end(const struct spl_dataset *dataset, uint32_t page);
 
 /* Words that the first `streams` streams of chunk `chunk` of the page take behind its own. */
 uint32_t spl_tables_get_stream_words(const struct spl_tables *tables, uint32_t streams, uint32_t chunk);

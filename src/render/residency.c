@@ -37,8 +37,11 @@ void spl_residency_drop_slot(struct spl_residency *residency, struct spl_residen
 {
     spl_io_end(residency->io, page->read);
     spl_gpu_buffer_destroy(residency->gpu, page->buffer);
+    free(page->tables);
     page->read = NULL;
     page->buffer = NULL;
+    page->tables = NULL;
+    page->host_bytes = 0;
     residency->failures -= page->failed;
     page->filled = page->failed = false;
 }
@@ -93,7 +96,8 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     }
     struct spl_resident_dataset resident = {.dataset = dataset,
                                             .page_count = spl_dataset_get_info(dataset)->pages,
-                                            .slot_count = spl_slot_count(dataset)};
+                                            .slot_count = spl_slot_count(dataset),
+                                            .device_slots = spl_slot_count_resident(dataset)};
     int rc = reserve_asked(residency, resident.slot_count, err);
     resident.pages = rc ? NULL : spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
@@ -142,7 +146,7 @@ static bool evict_one(struct spl_residency *residency, bool held)
     struct spl_resident_page *first = NULL;
     for (size_t i = 0; i < residency->dataset_count; i++) {
         struct spl_resident_dataset *resident = &residency->datasets[i];
-        for (uint32_t p = 0; p < resident->slot_count; p++) {
+        for (uint32_t p = 0; p < resident->device_slots; p++) {
             struct spl_resident_page *page = &resident->pages[p];
             if (page->buffer && page->last_frame < residency->frame && (held || !page->holds) &&
                 (!first || gives_way_before(page, first)))
@@ -230,6 +234,37 @@ static int grow_staging(struct spl_residency *residency, bool evict_held, size_t
     return rc;
 }
 
+/* Counts tables in, least recently asked for ones out, as the dataset's limit demands; what it keeps itself is of it. */
+static int take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                          bool evict_held, struct spl_error *err)
+{
+    const uint64_t limit = spl_dataset_get_tables_limit(resident->dataset);
+    const size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
+    for (;;) {
+        uint64_t used = spl_dataset_get_tables_bytes(resident->dataset, 0), held = 0;
+        struct spl_resident_page *first = NULL;
+        for (uint32_t s = resident->device_slots; s < resident->slot_count; s++) {
+            struct spl_resident_page *page = &resident->pages[s];
+            used += page->host_bytes;
+            if (!page->host_bytes || page->last_frame >= residency->frame)
+                continue;
+            held += page->holds && !evict_held ? page->host_bytes : 0;
+            if ((evict_held || !page->holds) && (!first || gives_way_before(page, first)))
+                first = page;
+        }
+        if (used + bytes <= limit) {
+            resident->pages[slot].host_bytes = bytes;
+            return SPL_OK;
+        }
+        if (!first && held && used - held + bytes <= limit)
+            return SPL_SLOT_CROWDED;
+        if (!first)
+            return spl_fail(err, SPL_E_LIMIT, "the tables of %s take more than %llu MiB",
+                            spl_dataset_get_info(resident->dataset)->id, (unsigned long long)(limit >> 20));
+        spl_residency_drop_slot(residency, first);
+    }
+}
+
 /* Takes the slot's room. */
 static int take_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
                      struct spl_error *err)
@@ -237,6 +272,8 @@ static int take_room(struct spl_residency *residency, struct spl_resident_datase
     bool software = is_software(residency), alone = residency->asker && residency->asker->alone;
     if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
         return SPL_SLOT_CROWDED;
+    if (slot >= resident->device_slots)
+        return take_host_room(residency, resident, slot, alone, err);
     struct spl_error why = {0};
     size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
     struct spl_gpu_buffer *buffer = NULL;
@@ -291,7 +328,7 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
         return tell_failure(residency, resident, page, err);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
-    int rc = page->buffer ? SPL_OK : take_room(residency, resident, slot, err);
+    int rc = spl_resident_has_room(page) ? SPL_OK : take_room(residency, resident, slot, err);
     if (rc) {
         residency->crowded |= awaited && rc == SPL_SLOT_CROWDED;
         return rc;
@@ -313,6 +350,10 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
 {
     size_t bytes = read->what.bytes;
     uint64_t ticket;
+    if (page->host_bytes) {
+        page->tables = spl_io_take_data(residency->io, page->read);
+        return SPL_OK;
+    }
     if (is_software(residency)) {
         memcpy(spl_gpu_buffer_map(page->buffer), read->data, bytes);
         return SPL_OK;
@@ -352,7 +393,7 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
         spl_io_end(residency->io, read);
         page->read = NULL;
         page->filled = true;
-        residency->pages_loaded++;
+        residency->pages_loaded += page->buffer != NULL;
     }
     return rc;
 }

@@ -1,4 +1,4 @@
-/* Which slots of which datasets are on the device. They are read when a view asks for them, on the io thread (io.h), and
+/* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
  * evicted, least recently drawn first, when the device's memory limit refuses another.
  *
  * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
@@ -19,18 +19,27 @@
 struct spl_hold;
 
 struct spl_resident_page {
-    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way */
+    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way, or tables */
+    size_t host_bytes;             /* of tables that are there or on their way; else 0 */
+    struct spl_tables *tables;     // that have come; may be NULL
     struct spl_io_read *read;      /* that is to fill it, or has failed; may be NULL */
     uint64_t last_frame;           /* when it was last asked for */
     uint32_t holds;                /* frames that wait with it */
     bool filled, failed;
 };
 
+/* Is it there, or on its way? */
+static inline bool spl_resident_has_room(const struct spl_resident_page *page)
+{
+    return page->buffer || page->host_bytes;
+}
+
 /* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
     uint32_t page_count, slot_count;
+    uint32_t device_slots;              /* those before tables */
 };
 
 static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)

@@ -16,12 +16,16 @@ enum { stack_max = 8 * 64 };
  */
 static const double cluster_radius_share = 0.9;
 
+/* A node that is yet to be looked at, and the tables that have it. */
+struct found {
+    const struct spl_node *node;
+    const struct spl_tables *tables;
+};
+
 struct walk {
     const struct spl_select_params *params;
     struct spl_draw_list *list;
-    const struct spl_node *nodes;
-    const struct spl_chunk *chunks;
-    const uint32_t *textures; /* words of the chunks, NULL = none */
+    const struct spl_tables *tables; /* of the node being drawn */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
@@ -105,7 +109,8 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
 {
     static const double least = 2.83; // samples: below, the coarsest level that is kept has texels of less than 0.7
     const struct spl_select_params *params = w->params;
-    uint32_t texture = params->atoms && w->textures ? w->textures[chunk - w->chunks] : 0;
+    const uint32_t *textures = w->tables->textures;
+    uint32_t texture = params->atoms && textures ? textures[chunk - w->tables->chunks] : 0;
     double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
     if (!texture || samples < least)
         return 0;
@@ -217,15 +222,18 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     return spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &out, &bounds, err);
 }
 
-static int draw_node(struct walk *w, const struct spl_node *node, struct spl_error *err)
+static int draw_node(struct walk *w, const struct found *found, struct spl_error *err)
 {
+    const struct spl_node *node = found->node;
+    const struct spl_chunk *chunks = found->tables->chunks + (node->first_chunk - found->tables->first_chunk);
+    w->tables = found->tables;
     double node_to_eye[3];
     for (int i = 0; i < 3; i++)
         node_to_eye[i] = node->origin[i] - w->params->camera->eye[i];
     w->list->nodes++;
     double radius_share = node->child_count ? cluster_radius_share : 1;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
-        const struct spl_chunk *chunk = &w->chunks[node->first_chunk + i];
+        const struct spl_chunk *chunk = &chunks[i];
         int rc = spl_chunk_kind(chunk) == SPL_CHUNK_LINES
                      ? draw_lines(w, node_to_eye, chunk, node->page, err)
                      : draw_discs(w, node_to_eye, chunk, node->page, radius_share, err);
@@ -249,21 +257,60 @@ static struct spl_view_box node_box(const struct walk *w, const struct spl_node 
     return box;
 }
 
-/* Pushes the children that are in view, the nearest on top. False, and nothing pushed, when the page of one of them
- * cannot be had: then the node itself is drawn. */
-static bool push_children(struct walk *w, const struct spl_node *node, uint64_t *stack, size_t *depth)
+/* The children of a node, in their order, on as many pages as they lie. */
+static enum spl_select_answer find_children(const struct walk *w, const struct spl_node *node, struct found children[8])
 {
-    uint64_t order[8];
+    const struct spl_select_params *params = w->params;
+    bool all = true;
+    uint32_t page = spl_dataset_find_page_of_node(params->dataset, node->first_child);
+    for (uint32_t i = 0; i < node->child_count; page++) {
+        const struct spl_tables *tables = spl_dataset_get_tables(params->dataset, page);
+        enum spl_select_answer answer = tables ? SPL_SELECT_YES : params->tables(params->context, page, &tables);
+        if (answer == SPL_SELECT_NO)
+            return SPL_SELECT_NO;
+        all &= answer == SPL_SELECT_YES;
+        for (; i < node->child_count && node->first_child + i < spl_dataset_get_page_end(params->dataset, page); i++)
+            if (all)
+                children[i] = (struct found){tables->nodes + (node->first_child + i - tables->first_node), tables};
+    }
+    return all ? SPL_SELECT_YES : SPL_SELECT_LATER;
+}
+
+/* What opening has left unchecked where it did not read all tables. */
+static int check_children(const struct walk *w, const struct spl_node *node, const struct found children[8],
+                          struct spl_error *err)
+{
+    const struct spl_dataset *dataset = w->params->dataset;
+    for (uint32_t i = 0; i < node->child_count && !spl_dataset_keeps_all(dataset); i++) {
+        const char *what = spl_node_judge_child(node, children[i].node);
+        if (what)
+            return spl_fail(err, SPL_E_CORRUPT, "%s: node %llu %s; pack the dataset again",
+                            spl_dataset_get_info(dataset)->id, (unsigned long long)(node->first_child + i), what);
+    }
+    return SPL_OK;
+}
+
+/* Pushes the children that are in view, the nearest on top. Nothing is pushed, and *pushed false, when the page or the
+ * tables of one of them cannot be had: then the node itself is drawn. */
+static int push_children(struct walk *w, const struct spl_node *node, struct found *stack, size_t *depth, bool *pushed,
+                         struct spl_error *err)
+{
+    struct found children[8], order[8];
     uint32_t count = 0;
     double depths[8];
     bool all = true;
-    for (uint64_t child = node->first_child; child < node->first_child + node->child_count; child++) {
-        struct spl_view_box box = node_box(w, &w->nodes[child]);
+    *pushed = false;
+    if (find_children(w, node, children) != SPL_SELECT_YES)
+        return SPL_OK;
+    int rc = check_children(w, node, children, err);
+    for (uint32_t i = 0; i < node->child_count && !rc; i++) {
+        const struct spl_node *child = children[i].node;
+        struct spl_view_box box = node_box(w, child);
         if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
             continue;
-        enum spl_select_answer answer = w->params->resident(w->params->context, w->nodes[child].page);
+        enum spl_select_answer answer = w->params->resident(w->params->context, child->page);
         if (answer == SPL_SELECT_NO)
-            return false;
+            return SPL_OK;
         all &= answer == SPL_SELECT_YES;
         uint32_t at = count++;
         for (; at > 0 && depths[at - 1] < box.center[2]; at--) {
@@ -271,36 +318,40 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
             order[at] = order[at - 1];
         }
         depths[at] = box.center[2];
-        order[at] = child;
+        order[at] = children[i];
     }
-    if (!all)
-        return false;
+    if (rc || !all)
+        return rc;
     memcpy(stack + *depth, order, count * sizeof *order);
     *depth += count;
-    return true;
+    *pushed = true;
+    return SPL_OK;
 }
 
 static int walk_tree(struct walk *w, struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    uint64_t stack[stack_max];
+    const struct spl_tables *first = spl_dataset_get_tables(w->params->dataset, 0); // always kept
+    struct found stack[stack_max];
     size_t depth = 0;
-    if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
+    if (w->params->resident(w->params->context, 0) != SPL_SELECT_YES)
         return spl_fail(err, SPL_E_LIMIT, "not even the coarsest level fits the device memory limit");
-    stack[depth++] = 0;
+    stack[depth++] = (struct found){first->nodes, first};
     while (depth > 0) {
-        const struct spl_node *node = &w->nodes[stack[--depth]];
+        const struct found found = stack[--depth];
+        const struct spl_node *node = found.node;
         struct spl_view_box box = node_box(w, node);
         if (!spl_view_box_visible(camera, &box, w->params->low_pass))
             continue;
         double near = fmax(box.center[2] - box.half[2], camera->near);
-        bool fine = w->params->lod > 0 && node->spacing * w->focal <= w->params->lod * near;
+        bool fine = w->params->lod > 0 && node->spacing * w->focal <= w->params->lod * near, pushed = false;
+        int rc = SPL_OK;
         if (!fine && node->child_count && depth + 8 <= stack_max) {
-            if (push_children(w, node, stack, &depth))
-                continue;
-            w->list->complete = false;
+            rc = push_children(w, node, stack, &depth, &pushed, err);
+            w->list->complete &= pushed;
         }
-        int rc = draw_node(w, node, err);
+        if (!rc && !pushed)
+            rc = draw_node(w, &found, err);
         if (rc)
             return rc;
     }
@@ -309,14 +360,7 @@ static int walk_tree(struct walk *w, struct spl_error *err)
 
 static struct walk begin_walk(const struct spl_select_params *params)
 {
-    uint64_t node_count, chunk_count;
-    return (struct walk){
-        .params = params,
-        .nodes = spl_dataset_get_nodes(params->dataset, &node_count),
-        .chunks = spl_dataset_get_chunks(params->dataset, &chunk_count),
-        .textures = spl_dataset_get_chunk_textures(params->dataset),
-        .focal = fmax(params->camera->fx, params->camera->fy),
-    };
+    return (struct walk){.params = params, .focal = fmax(params->camera->fx, params->camera->fy)};
 }
 
 int spl_select_spacing(const struct spl_select_params *params, double *spacing, bool *complete, struct spl_error *err)
