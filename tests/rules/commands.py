@@ -54,7 +54,14 @@ for words, wanted in {
     "render a.spld --format png -o b.spld": r"ends in \.png", "render a.spld --format png -o b.jpg": r"ends in \.png",
     "render a.spld --memory-limit 1X -o b.png": "K, M, G or T",
     "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
-    "render a.spld -o": "requires an argument.*\n.*splatd render --help",
+    "render a.spld -o": "requires an argument, FILE.*splatd render --help",
+    "tour a.spld --pth b -o c": "did you mean --path", "render a.spld --superample 2 -o b.png": "did you mean --supersample",
+    "render a.spld --layer colour -o b.png": "--layer takes color, depth.* or coverage, not 'colour'",
+    "tour a.spld --path b --format gif -o c": "--format takes jpeg, png.*, not 'gif'",
+    "render a.spld --visibility x -o b.png": "--visibility takes adaptive, constant or none, not 'x'",
+    "tour a.spld --path b --ease up -o c": "--ease takes none, in, out or in-out, not 'up'",
+    "render a.spld --eye 1,2 -o b.png": "--eye takes three numbers X,Y,Z, not '1,2'",
+    "tour a.spld --require-gpu=no --path b -o c": "--require-gpu takes no argument",
 }.items():
     said = check(words.split(), 2, "stderr")
     if not re.search(wanted, said):

@@ -265,7 +265,7 @@ static void a_walk_reads_the_heads_that_it_comes_to(void **state)
     struct view view = {.dataset = dataset, .tables = calloc(file.pages, sizeof *view.tables)};
     struct spl_camera camera = {0};
     const double eye[3] = {1000.5, 1000.5, 1000.5}, target[3] = {1100, 1100, 1010}, up[3] = {0, 0, 1};
-    assert_int_equal(spl_camera_set_fov(&camera, 40, 1280, 720, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&camera, 25, 1280, 720, NULL), SPL_OK);
     assert_int_equal(spl_camera_look_at(&camera, eye, target, up, NULL), SPL_OK);
     camera.near = 1;
     camera.far = 20000;
