@@ -49,7 +49,7 @@ static struct spl_node node_at(uint64_t number)
     float size = (float)(side / (1 << depth)), spacing = size / 160;
     struct spl_node node = {.size = size,
                             .spacing = spacing,
-                            .box_max = {size, size, size},
+                            .box_max = {size, size, size / 50}, // surfaces are thin
                             .chunk_count = node_chunks,
                             .child_count = depth < deepest ? 8 : 0,
                             .depth = (uint8_t)depth};
@@ -264,14 +264,14 @@ static void a_walk_reads_the_heads_that_it_comes_to(void **state)
     struct spl_dataset *dataset = open_it();
     struct view view = {.dataset = dataset, .tables = calloc(file.pages, sizeof *view.tables)};
     struct spl_camera camera = {0};
-    const double eye[3] = {1000.5, 1000.5, 1000.5}, target[3] = {1100, 1100, 1010}, up[3] = {0, 0, 1};
-    assert_int_equal(spl_camera_set_fov(&camera, 25, 1280, 720, NULL), SPL_OK);
+    const double eye[3] = {1000.5, 1000.5, 1000.5}, target[3] = {1100, 1100, 960}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_set_fov(&camera, 40, 1280, 720, NULL), SPL_OK);
     assert_int_equal(spl_camera_look_at(&camera, eye, target, up, NULL), SPL_OK);
     camera.near = 1;
     camera.far = 20000;
     struct spl_select_params params = {.dataset = dataset,
                                        .camera = &camera,
-                                       .lod = 8,
+                                       .lod = 4,
                                        .low_pass = (double)SPL_LOW_PASS,
                                        .discs = true,
                                        .tables = take_tables,
