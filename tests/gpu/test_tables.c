@@ -35,10 +35,11 @@ static int64_t read_gated(void *context, uint64_t offset, void *out, size_t byte
 
 static struct spl_dataset *open_within(uint64_t tables_bytes)
 {
+    const struct spl_dataset_opening how = {.tables_bytes = tables_bytes};
     const struct spl_dataset_source gated = {.size = file.size, .read = read_gated};
     struct spl_dataset *dataset;
     struct spl_error err = {0};
-    if (spl_dataset_open_within(&gated, "tree.spld", false, tables_bytes, NULL, &dataset, &err))
+    if (spl_dataset_open_source_as(&gated, "tree.spld", &how, &dataset, &err))
         fail_msg("%s", err.message);
     return dataset;
 }

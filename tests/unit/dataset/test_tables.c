@@ -27,12 +27,7 @@ static char folder[256], path[300];
 
 static int open_within(uint64_t tables_bytes, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    struct spl_dataset_source source;
-    *out = NULL;
-    int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_within(&source, path, verify, tables_bytes, NULL, out, err)))
-        spl_dataset_source_close(&source);
-    return rc;
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){verify, tables_bytes, NULL}, out, err);
 }
 
 static struct spl_dataset *open_good(uint64_t tables_bytes)
@@ -171,7 +166,8 @@ static int open_raw(const struct raw *raw, uint64_t tables_bytes, bool verify, s
                     struct spl_error *err)
 {
     const struct spl_dataset_source source = spl_dataset_source_of_memory(raw->data, raw->size);
-    return spl_dataset_open_within(&source, "raw", verify, tables_bytes, NULL, out, err);
+    const struct spl_dataset_opening how = {verify, tables_bytes, NULL};
+    return spl_dataset_open_source_as(&source, "raw", &how, out, err);
 }
 
 /* Refused by who opens all of it, with `part` in the message; else when page `page` is read, and only then. */
