@@ -155,9 +155,9 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_REAL(struct arguments, pack.position_error, 1e-6, 1)},
     {"normal-error", "DEG", "mean, degrees", .otherwise = "1",
      SPL_CMD_REAL(struct arguments, pack.normal_error, 0.01, 30)},
-    {"points-only", NULL, "position, color and class alone: no normals and radii; method splat draws as fill",
+    {"points-only", NULL, "position, color and class alone: no normals and radii, so nothing is drawn as discs",
      SPL_CMD_FLAG(struct arguments, pack.points_only)},
-    {"no-linear", NULL, "do not look for wires, poles and cables, which method fill draws as they are",
+    {"no-linear", NULL, "do not look for wires, poles and cables: they are drawn as the rest is",
      SPL_CMD_FLAG(struct arguments, pack.no_linear)},
     {"no-clip-lines", NULL, "discs are not cut where surfaces end", SPL_CMD_FLAG(struct arguments, pack.no_clip_lines)},
     {"cameras", "MODEL",
@@ -205,7 +205,7 @@ static const struct spl_cmd_table table = {
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"
         "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
-        "Points as they are, several times faster, to be rendered with method fill or points:\n"
+        "Points as they are, several times faster, for the methods that need no normals and radii:\n"
         "  splatd pack street.las --points-only -o street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",

@@ -156,7 +156,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
     uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
     bool first = true;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
-    int rc = spl_tile_take_slots(tile, err);
+    int rc = spl_tile_take_rounds(tile, err);
     for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
         uint32_t layers = 0;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)

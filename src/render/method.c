@@ -51,29 +51,29 @@ SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {
-#define REAL(id, field, low, high, value, shape, text)                                                                 \
+#define REAL(id, field, low, high, value, change, text)                                                                \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_REAL,                                                                                           \
      .least = low,                                                                                                     \
      .most = high,                                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape},
-#define COUNT(id, field, low, high, value, shape, text)                                                                \
+     .changes = change},
+#define COUNT(id, field, low, high, value, change, text)                                                               \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_WHOLE,                                                                                          \
      .least = low,                                                                                                     \
      .most = high,                                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape},
-#define CHOICE(id, field, prefix, value, shape, text)                                                                  \
+     .changes = change},
+#define CHOICE(id, field, prefix, value, change, text)                                                                 \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_CHOICE,                                                                                         \
      .most = CHOICE_MOST_##prefix,                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape,                                                                                                  \
+     .changes = change,                                                                                                \
      .choice_name = choice_##id,                                                                                       \
      .choice_from_name = spl_##prefix##_from_name},
     SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)};

@@ -203,7 +203,11 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
     for (size_t i = 0; i < path_count; i++) {
         struct stat status;
         if (stat(paths[i], &status))
-            return spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
+            return errno == ENOENT ? spl_fail(err, SPL_E_USAGE,
+                                              "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
+                                              "-o NAME.spld' makes one from a scan",
+                                              paths[i])
+                                   : spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
     }
     return 0;
 }

@@ -337,8 +337,8 @@ void *spl_gpu_thread_run(void *argument)
     struct gpu gpu = {.pipeline = argument};
     const struct spl_pipeline_options *options = &gpu.pipeline->options;
     struct spl_error err = {0};
-    const char *plan = getenv("SPLATD_INJECT_LOSS_AFTER");
-    if (plan && sscanf(plan, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
+    const char *losses = getenv("SPLATD_INJECT_LOSS_AFTER");
+    if (losses && sscanf(losses, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
     TAILQ_INIT(&gpu.entries);
