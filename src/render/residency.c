@@ -135,12 +135,6 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->pending = residency->crowded = false;
 }
 
-/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
-static bool gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
-{
-    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
-}
-
 static bool evict_one(struct spl_residency *residency, bool held)
 {
     struct spl_resident_page *first = NULL;
@@ -149,7 +143,7 @@ static bool evict_one(struct spl_residency *residency, bool held)
         for (uint32_t p = 0; p < resident->device_slots; p++) {
             struct spl_resident_page *page = &resident->pages[p];
             if (page->buffer && page->last_frame < residency->frame && (held || !page->holds) &&
-                (!first || gives_way_before(page, first)))
+                (!first || spl_resident_gives_way_before(page, first)))
                 first = page;
         }
     }
@@ -234,37 +228,6 @@ static int grow_staging(struct spl_residency *residency, bool evict_held, size_t
     return rc;
 }
 
-/* Counts tables in, least recently asked for ones out, as the dataset's limit demands; what it keeps itself is of it. */
-static int take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                          bool evict_held, struct spl_error *err)
-{
-    const uint64_t limit = spl_dataset_get_tables_limit(resident->dataset);
-    const size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
-    for (;;) {
-        uint64_t used = spl_dataset_get_tables_bytes(resident->dataset, 0), held = 0;
-        struct spl_resident_page *first = NULL;
-        for (uint32_t s = resident->device_slots; s < resident->slot_count; s++) {
-            struct spl_resident_page *page = &resident->pages[s];
-            used += page->host_bytes;
-            if (!page->host_bytes || page->last_frame >= residency->frame)
-                continue;
-            held += page->holds && !evict_held ? page->host_bytes : 0;
-            if ((evict_held || !page->holds) && (!first || gives_way_before(page, first)))
-                first = page;
-        }
-        if (used + bytes <= limit) {
-            resident->pages[slot].host_bytes = bytes;
-            return SPL_OK;
-        }
-        if (!first && held && used - held + bytes <= limit)
-            return SPL_SLOT_CROWDED;
-        if (!first)
-            return spl_fail(err, SPL_E_LIMIT, "the tables of %s take more than %llu MiB",
-                            spl_dataset_get_info(resident->dataset)->id, (unsigned long long)(limit >> 20));
-        spl_residency_drop_slot(residency, first);
-    }
-}
-
 /* Takes the slot's room. */
 static int take_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
                      struct spl_error *err)
@@ -273,7 +236,7 @@ static int take_room(struct spl_residency *residency, struct spl_resident_datase
     if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
         return SPL_SLOT_CROWDED;
     if (slot >= resident->device_slots)
-        return take_host_room(residency, resident, slot, alone, err);
+        return spl_residency_take_host_room(residency, resident, slot, alone, err);
     struct spl_error why = {0};
     size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
     struct spl_gpu_buffer *buffer = NULL;

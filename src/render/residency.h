@@ -34,6 +34,12 @@ static inline bool spl_resident_has_room(const struct spl_resident_page *page)
     return page->buffer || page->host_bytes;
 }
 
+/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
+static inline bool spl_resident_gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
+{
+    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
+}
+
 /* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
@@ -122,6 +128,11 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 /* Begins the read of a slot that has its room, unless it has begun; false when no more can be under way. */
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
+
+/* host_room.c: counts a slot of tables in, evicting others of the dataset, those of frames that wait where `evict_held`.
+ * SPL_SLOT_CROWDED, SPL_E_LIMIT. */
+int spl_residency_take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                 bool evict_held, struct spl_error *err);
 
 /* Gives up what has room and did not come. */
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
