@@ -65,13 +65,13 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
 }
 
-static int open_file(const char *path, bool verify, uint64_t tables_bytes, const atomic_bool *cancelled,
-                     struct spl_dataset **out, struct spl_error *err)
+int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                        struct spl_error *err)
 {
     struct spl_dataset_source source;
     *out = NULL;
     int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_within(&source, path, verify, tables_bytes, cancelled, out, err)))
+    if (!rc && (rc = spl_dataset_open_source_as(&source, path, how, out, err)))
         spl_dataset_source_close(&source);
     return rc;
 }
@@ -79,23 +79,24 @@ static int open_file(const char *path, bool verify, uint64_t tables_bytes, const
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err)
 {
-    return open_file(path, verify, SPL_TABLES_BYTES, cancelled, out, err);
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_as(path, &how, out, err);
 }
 
 int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    return open_file(path, verify, UINT64_MAX, NULL, out, err);
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){verify, UINT64_MAX, NULL}, out, err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
 {
-    return spl_dataset_open_within(source, name, verify, SPL_TABLES_BYTES, cancelled, out, err);
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_source_as(source, name, &how, out, err);
 }
 
-int spl_dataset_open_within(const struct spl_dataset_source *source, const char *name, bool verify,
-                            uint64_t tables_bytes, const atomic_bool *cancelled, struct spl_dataset **out,
-                            struct spl_error *err)
+int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
+                               const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err)
 {
     *out = NULL;
     if (source->size > INT64_MAX / 2) /* so that no sum of sizes wraps */
@@ -106,15 +107,15 @@ int spl_dataset_open_within(const struct spl_dataset_source *source, const char 
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
     atomic_init(&dataset->references, 1);
-    dataset->cancelled = cancelled;
+    dataset->cancelled = how->cancelled;
     dataset->source = *source;
-    dataset->tables_limit = tables_bytes;
+    dataset->tables_limit = how->tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
         goto done;
     strcpy(dataset->name, name);
-    rc = spl_dataset_read_sections(dataset, verify, err);
+    rc = spl_dataset_read_sections(dataset, how->verify, err);
     if (!rc)
         rc = spl_dataset_check_sections(dataset, err);
     if (!rc)

@@ -49,6 +49,16 @@ static enum spl_select_answer ask_textures(void *context, uint32_t page)
     return dictionary == SPL_SELECT_YES ? textures : dictionary;
 }
 
+/* The same of tables, which a walk cannot do without: what is on its way is not there. */
+static enum spl_select_answer ask_tables(void *context, uint32_t page, const struct spl_tables **tables)
+{
+    struct spl_frame_job *job = context;
+    uint32_t slot = spl_slot_of_tables(job->resident->dataset, page);
+    enum spl_select_answer answer = ask_slot(job, slot);
+    *tables = job->resident->pages[slot].tables;
+    return answer == SPL_SELECT_YES && !*tables ? SPL_SELECT_LATER : answer;
+}
+
 /* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page among
  * them. */
 static int end_walk(struct spl_frame_job *job, struct spl_error *err)
@@ -69,6 +79,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .low_pass = SPL_LOW_PASS,
         .discs = method->discs,
         .lines = method->lines,
+        .tables = ask_tables,
         .resident = ask_page,
         .atoms = spl_view_is_textured(job->view) ? job->view->disc.atoms : 0,
         .textured = ask_textures,

@@ -18,7 +18,7 @@ static void begin_reads(struct spl_hold *hold)
         uint32_t slot = hold->slots[hold->begun];
         struct spl_resident_page *page = &hold->pages[slot];
         struct spl_io_rank rank = {.awaited = true};
-        if (page->buffer && !page->filled && !page->failed &&
+        if (spl_resident_has_room(page) && !page->filled && !page->failed &&
             !spl_residency_begin_read(hold->residency, hold->dataset, page, slot, rank))
             return;
     }
@@ -83,7 +83,7 @@ static int follow(struct spl_hold *hold, struct spl_error *err)
         const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
         if (page->failed)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
-        if (!page->buffer)
+        if (!spl_resident_has_room(page))
             return 1;
         if (!page->filled) {
             if (!page->read && hold->begun > hold->come) /* it lost its room, and has another's: nobody reads it */
@@ -120,7 +120,7 @@ static void let_go(struct spl_hold *hold, bool all)
     struct spl_residency *residency = hold->residency;
     for (size_t i = 0; i < hold->count; i++) {
         struct spl_resident_page *page = &hold->pages[hold->slots[i]];
-        if (!--page->holds && (page->failed || (all && page->buffer && !page->filled)))
+        if (!--page->holds && (page->failed || (all && spl_resident_has_room(page) && !page->filled)))
             spl_residency_drop_slot(residency, page);
     }
     residency->releases += hold->count > 0;

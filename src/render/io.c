@@ -283,6 +283,17 @@ struct spl_io_read *spl_io_take(struct spl_io *io)
     return read;
 }
 
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read)
+{
+    pthread_mutex_lock(&io->mutex);
+    void *data = read->data;
+    spl_assert(read->state == TAKEN && data);
+    io->staged -= read->what.bytes;
+    read->data = NULL;
+    pthread_mutex_unlock(&io->mutex);
+    return data;
+}
+
 void spl_io_end(struct spl_io *io, struct spl_io_read *read)
 {
     if (!read)

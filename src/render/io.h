@@ -64,6 +64,9 @@ void spl_io_raise(struct spl_io *io, struct spl_io_read *read, struct spl_io_ran
 /* A read that has ended, well or not, in the order that they did; NULL: none. Never blocks. */
 struct spl_io_read *spl_io_take(struct spl_io *io);
 
+/* The data of a read that was taken, which is the caller's from here on. */
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read);
+
 /* Gives back a read, with its data; whatever its state. NULL-safe. */
 void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 

@@ -98,7 +98,7 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
         return rc;
     spl_residency_begin_walk(residency, asker);
     uint32_t next = *page;
-    for (; next < resident->slot_count && next < *page + preload_ahead; next++) {
+    for (; next < resident->device_slots && next < *page + preload_ahead; next++) {
         bool first = next == SPL_FIRST_SLOT;
         struct spl_error why = {0};
         if (!first && !spl_residency_has_room(residency, resident, next))

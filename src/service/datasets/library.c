@@ -33,7 +33,7 @@ struct opening {
     struct spl_service *service;
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     char *path;
-    bool verify;
+    struct spl_dataset_opening how;
     struct spl_file_mark mark;
     struct spl_catalog_entry *entry; // may be NULL
     struct spl_error err;
@@ -67,8 +67,7 @@ static void free_opening(struct opening *opening)
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
-    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->service->library->cancelled,
-                           &opening->entry, &opening->err);
+    spl_catalog_entry_open(opening->path, opening->path, &opening->how, &opening->entry, &opening->err);
 }
 
 static void after_opening(uv_work_t *work, int status)
@@ -94,6 +93,13 @@ static void after_opening(uv_work_t *work, int status)
     free_opening(opening);
 }
 
+struct spl_dataset_opening spl_library_get_opening(struct spl_service *service)
+{
+    return (struct spl_dataset_opening){.verify = service->options->verify,
+                                        .tables_bytes = service->options->tables_bytes,
+                                        .cancelled = &service->library->cancelled};
+}
+
 static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot)
 {
     struct opening *opening = spl_alloc(1, sizeof *opening, NULL);
@@ -103,7 +109,7 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
     }
     opening->work.data = opening;
     opening->service = service;
-    opening->verify = service->options->verify;
+    opening->how = spl_library_get_opening(service);
     opening->mark = slot->seen;
     snprintf(opening->id, sizeof opening->id, "%s", slot->id);
     if (uv_queue_work(&service->loop, &opening->work, run_opening, after_opening)) {

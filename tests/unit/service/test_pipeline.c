@@ -407,7 +407,7 @@ static struct spl_catalog_entry *open_entry(void)
     make_folder(path);
     strcat(path, "/one.spld");
     make_dataset_file(path, &splat, 1, 1);
-    assert_int_equal(spl_catalog_entry_open(path, path, true, NULL, &entry, NULL), 0);
+    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
     unlink(path);
     *strrchr(path, '/') = '\0';
     rmdir(path);
