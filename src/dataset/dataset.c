@@ -10,12 +10,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <xxhash.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "base/sized.h"
 #include "dataset/open.h"
+
+static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
 
@@ -102,6 +106,7 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
+    atomic_init(&dataset->references, 1);
     dataset->cancelled = how->cancelled;
     dataset->source = *source;
     dataset->tables_limit = how->tables_bytes;
@@ -126,10 +131,14 @@ done:
     return rc;
 }
 
-void spl_dataset_close(struct spl_dataset *dataset)
+void spl_dataset_hold(const struct spl_dataset *dataset)
 {
-    if (!dataset)
-        return;
+    unsigned before = atomic_fetch_add(&((struct spl_dataset *)dataset)->references, 1);
+    spl_assert(before > 0);
+}
+
+static void destroy(struct spl_dataset *dataset)
+{
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
     for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
@@ -148,6 +157,23 @@ void spl_dataset_close(struct spl_dataset *dataset)
     free(dataset->sections);
     free(dataset->name);
     free(dataset);
+}
+
+void spl_dataset_let_go(const struct spl_dataset *dataset)
+{
+    struct spl_dataset *mine = (struct spl_dataset *)dataset;
+    if (atomic_fetch_sub(&mine->references, 1) == 1)
+        destroy(mine);
+}
+
+void spl_dataset_close(struct spl_dataset *dataset)
+{
+    if (!dataset)
+        return;
+    uint64_t deadline_ns = spl_now_ns() + patience_ns;
+    while (!dataset->source.owned && atomic_load(&dataset->references) > 1 && spl_remaining_ns(deadline_ns))
+        usleep(1000); // what a caller lends is read no more when this returns
+    spl_dataset_let_go(dataset);
 }
 
 const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset)

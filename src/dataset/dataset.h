@@ -40,6 +40,12 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
 int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
                                const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err);
 
+/* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
+ * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;
+ * let_go() closes the source, which may block. */
+void spl_dataset_hold(const struct spl_dataset *dataset);
+void spl_dataset_let_go(const struct spl_dataset *dataset);
+
 /* Nodes, chunks and the words of chunks' textures (NULL without) of the whole dataset, which must keep all its tables:
  * spl_dataset_open_whole(), or spl_dataset_keeps_all(). */
 bool spl_dataset_keeps_all(const struct spl_dataset *dataset);

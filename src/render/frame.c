@@ -3,6 +3,7 @@
 #include "render/frame.h"
 
 #include "base/clock.h"
+#include "base/memory.h"
 #include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
@@ -148,6 +149,23 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
     }
 }
 
+int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        struct spl_image *image = &frame->images[layer];
+        if (!(view->layers >> layer & 1) || image->pixels)
+            continue;
+        *image = (struct spl_image){.layer = layer,
+                                    .type = spl_readback_type(layer),
+                                    .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
+        if (!image->pixels)
+            return SPL_E_NOMEM;
+    }
+    return SPL_OK;
+}
+
 /* Records every group and layer of the view into the list that was begun; the n-th requested layer starts at word n *
  * pixels. */
 static int record(struct spl_tile *tile, struct spl_error *err)
@@ -223,6 +241,8 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     if (spl_now_ns() >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = list_tile(job, tile, err);
+    if (!rc)
+        rc = spl_frame_make_images(job->frame, job->view, err);
     if (!rc)
         rc = draw_tile(tile, err);
     if (rc)

@@ -32,7 +32,7 @@ static void start_wait(struct spl_hold *hold, struct spl_residency *residency, s
     hold->waits = true;
     hold->dataset = resident->dataset;
     hold->pages = resident->pages;
-    hold->moved_ns = spl_now_ns();
+    hold->since_ns = spl_now_ns();
     hold->begun = hold->come = 0;
 }
 
@@ -90,7 +90,6 @@ static int follow(struct spl_hold *hold, struct spl_error *err)
                 hold->begun = hold->come;
             return 0;
         }
-        hold->moved_ns = spl_now_ns();
     }
     return 1;
 }
@@ -107,10 +106,10 @@ int spl_hold_poll(struct spl_hold *hold, struct spl_error *err)
     } else if (hold->residency->releases != hold->releases) {
         return SPL_OK;
     }
-    if (spl_now_ns() - hold->moved_ns < patience_ns)
+    uint64_t moved_ns = spl_io_get_moved_ns(hold->residency->io); // its own, and those of others that go before
+    if (spl_now_ns() - (moved_ns > hold->since_ns ? moved_ns : hold->since_ns) < patience_ns)
         return SPL_SLOT_PENDING;
-    return spl_fail(err, SPL_E_TIMEOUT, "no page of the dataset has come for %d s",
-                    (int)(patience_ns / SPL_NS_PER_S));
+    return spl_fail(err, SPL_E_TIMEOUT, "no page has come for %d s", (int)(patience_ns / SPL_NS_PER_S));
 }
 
 /* Ends a wait. Why reads failed is forgotten; where `all`, reads that nobody waits for any more are dropped. */

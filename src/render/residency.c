@@ -12,7 +12,10 @@
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
 
-enum { failures_max = 16 }; // that are remembered where nobody waits: each takes a read's place
+enum {
+    failures_max = 16, // that are remembered where nobody waits: each takes a read's place
+    uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
+};
 
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err)
@@ -106,17 +109,14 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     return SPL_OK;
 }
 
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns)
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset)
 {
     struct spl_resident_dataset *resident = spl_residency_get(residency, dataset);
     if (!resident)
-        return true;
+        return;
     drop_dataset(residency, resident);
-    if (!spl_io_wait_for(residency->io, dataset, deadline_ns))
-        return false;
     free(resident->pages);
     *resident = residency->datasets[--residency->dataset_count];
-    return true;
 }
 
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset)
@@ -257,6 +257,8 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank)
 {
     struct spl_io_what what = {.read = spl_slot_read,
+                               .hold = spl_slot_hold,
+                               .let_go = spl_slot_let_go,
                                .source = dataset,
                                .index = slot,
                                .bytes = spl_slot_get_bytes(dataset, slot),
@@ -337,8 +339,11 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
 {
     int rc = SPL_OK;
-    for (struct spl_io_read *read; !rc && (read = spl_io_take(residency->io));) {
+    uint64_t bytes = 0;
+    struct spl_io_read *read;
+    for (int i = 0; !rc && i < uploads_max && bytes < SPL_IO_BYTES && (read = spl_io_take(residency->io)); i++) {
         struct spl_resident_page *page = read->what.owner;
+        bytes += read->what.bytes;
         if (!read->data) {
             page->failed = true;
             if (residency->failures++ > failures_max && !page->holds)

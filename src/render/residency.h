@@ -81,14 +81,13 @@ struct spl_residency {
 /* `wake` as spl_io_create(). */
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err);
-/* Blocks until the read under way has ended. Holds are let go of. */
+/* Holds are let go of; the read under way is left to end by itself. */
 void spl_residency_finish(struct spl_residency *residency);
 
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* Lets go of the dataset: true once nothing of it is being read, which is waited for until `deadline_ns` (0 = never
- * blocks). False: it is as if it had just been added. */
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns);
+/* Lets go of the dataset. A page of it that is being read holds it until it has come, and is dropped. */
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset);
 
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
@@ -137,7 +136,8 @@ int spl_residency_take_host_room(struct spl_residency *residency, struct spl_res
 /* Gives up what has room and did not come. */
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
 
-/* Puts on the device what has been read since. Device errors only: a read that failed is told to who asks for it. */
+/* Puts on the device what has been read since, as much as holds up nobody; spl_io_wait() says whether that was all. Device
+ * errors only: a read that failed is told to who asks for it. */
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err);
 
 #endif

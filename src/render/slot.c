@@ -55,3 +55,13 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
     spl_dictionary_expand(spl_dataset_get_dictionary(dataset), out);
     return SPL_OK;
 }
+
+void spl_slot_hold(const void *source)
+{
+    spl_dataset_hold(source);
+}
+
+void spl_slot_let_go(const void *source)
+{
+    spl_dataset_let_go(source);
+}

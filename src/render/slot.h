@@ -29,4 +29,8 @@ size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot);
  * is a spl_io_what.read. SPL_E_IO, SPL_E_CORRUPT. Blocks on disk. */
 int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error *err);
 
+/* spl_dataset_hold() and spl_dataset_let_go(), for spl_io_what. */
+void spl_slot_hold(const void *source);
+void spl_slot_let_go(const void *source);
+
 #endif

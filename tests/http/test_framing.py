@@ -239,4 +239,22 @@ def test_headers_that_are_not_what_they_seem():
             assert wire.reply()[0] == 200 and wire.ended()
 
 
+def test_a_last_reply_arrives_whole_whatever_is_sent_behind_it():
+    """Closing a socket with bytes unread resets it, and what it still had to send is lost."""
+    with Daemon(FAKE) as d:
+        expected = d.ask("/v1/openapi.json").body
+        assert len(expected) > 50000
+        for _ in range(3):
+            s = socket.socket()
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that much of the reply has still to be sent
+            s.settimeout(30)
+            s.connect(("127.0.0.1", d.port))
+            s.sendall(b"GET /v1/openapi.json HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" + b"x" * 40000)
+            received = b""
+            while got := s.recv(512):
+                received += got
+            s.close()
+            assert received.endswith(expected), len(received)
+
+
 run(globals())

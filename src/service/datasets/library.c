@@ -52,6 +52,12 @@ static void refuse(struct spl_catalog_slot *slot, const struct spl_error *err)
                      err->message);
 }
 
+/* It is opened anew, after ever longer rests. */
+static void rest(struct spl_catalog_slot *slot)
+{
+    slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
+}
+
 static void free_opening(struct opening *opening)
 {
     free(opening->path);
@@ -73,7 +79,7 @@ static void after_opening(uv_work_t *work, int status)
     service->library->tasks--;
     if (slot && opening->err.code && !service->library->stopped) {
         if (spl_catalog_may_pass(&opening->err))
-            slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
+            rest(slot);
         else
             slot->opened = opening->mark;
         refuse(slot, &opening->err);
@@ -176,6 +182,10 @@ void spl_library_take_changes(struct spl_service *service)
         if (slot && (slot->next == entry || slot->current == entry)) {
             if (slot->current == entry) // at start: there is no version before it
                 slot->current = NULL;
+            if (entry->err.code == SPL_E_TIMEOUT) { // its disk did not answer
+                slot->opened = (struct spl_file_mark){0};
+                rest(slot);
+            }
             refuse(slot, &entry->err);
         }
         spl_catalog_entry_unref(entry);
