@@ -81,7 +81,8 @@ struct spl_reader {
      * many, at least one; 0 where there are no longer as many; -errno. Called by any thread that uses the dataset, by
      * several at once; may block. */
     int64_t (*read)(void *context, uint64_t offset, void *out, size_t count);
-    void (*close)(void *context); // may be NULL; called once, by spl_dataset_close(): not where opening fails
+    void (*close)(void *context); // may be NULL; called once, by spl_dataset_close() or behind the read that it could
+                                  // not wait for, on that thread: not where opening fails
     void *context;
 };
 
@@ -107,7 +108,9 @@ static inline void spl_open_options_init(struct spl_open_options *options)
 SPL_API int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
                                   struct spl_error *err);
 
-/* NULL-safe. */
+/* NULL-safe. Where a renderer that has let go of the dataset is still in a read of it, a file is closed behind that read. A
+ * reader's is waited for, 10 s at most: one that hangs longer goes on using `context` until it returns, so what lies
+ * there is freed by the reader's close(). */
 SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 
 /* Borrowed until close. */

@@ -140,6 +140,11 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
             return false;
         if (spl_fields_number(&field, &v[i]) != SPL_FIELD_OK)
             v[i] = NAN;
+    }
+    bool whole = spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+    if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2])) /* no point, so the rest of it says nothing */
+        return whole;
+    for (unsigned i = 0; i < layout->fields; i++) {
         sample->fraction[i] |= v[i] != floor(v[i]);
         sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
         sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
@@ -149,7 +154,7 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         sample->crooked[i] |= !(norm == 0 || fabs(norm - 1) < 0.02);
     }
     sample->lines++;
-    return spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+    return whole;
 }
 
 static bool is_normal(const struct spl_text_sample *s, unsigned i)

@@ -40,8 +40,8 @@ int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl
 
 int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err)
 {
-    int method = 0, rc = spl_cmd_take_name(option, text, spl_method_from_name, name_of_method, SPL_METHOD_COUNT, &method,
-                                           err);
+    int method = 0;
+    int rc = spl_cmd_take_name(option, text, spl_method_from_name, name_of_method, SPL_METHOD_COUNT, &method, err);
     if (!rc)
         ((struct spl_cmd_drawing *)drawing)->view.method = (enum spl_method)method;
     return rc;

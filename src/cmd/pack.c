@@ -213,7 +213,7 @@ static const struct spl_cmd_table table = {
         "  splatd pack street.las --points-only -o street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
-    .after = "\nAbout 80 bytes of memory a point, 180 where it lies on a wire. Progress and the summary go to stderr.\n",
+    .after = "\nAbout 80 bytes of memory a point, 180 on a wire. Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };

@@ -53,7 +53,8 @@ int spl_cmd_take_name(const char *option, const char *text, int (*from_name)(con
     for (int i = 0; i < count; i++)
         names[i] = name_of(i);
     join(names, all);
-    return spl_fail_field(err, SPL_E_USAGE, option + strspn(option, "-"), "%s takes %s, not '%.32s'", option, all, text);
+    return spl_fail_field(err, SPL_E_USAGE, option + strspn(option, "-"), "%s takes %s, not '%.32s'", option, all,
+                          text);
 }
 
 static int take_count_32(const struct spl_cmd_option *o, const char *option, const char *text, uint32_t *out,

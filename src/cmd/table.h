@@ -39,7 +39,7 @@ struct spl_cmd_option {
     const char *const *names; /* of a CHOICE, closed by NULL */
     /* `option` is what messages call it, "--lod"; `text` its argument, which may be cut in place, or NULL. */
     int (*take)(void *arguments, const char *option, char *text, struct spl_error *err);
-    void (*print)(FILE *out, size_t column); /* of a heading: what stands below it, help from `column` on; may be NULL */
+    void (*print)(FILE *out, size_t column); /* of a heading: what stands below it, help from `column` on, or NULL */
 };
 
 /* Initialisers of rows: the kind, and a member whose C type it must have. */
@@ -72,8 +72,8 @@ struct spl_cmd_table {
     size_t count;
 };
 
-/* Finds the place of an argument among names: `from_name` gives it or -1, `name_of` the name of each of `count`, which the
- * message lists. SPL_E_USAGE. */
+/* Finds the place of an argument among names: `from_name` gives it or -1, `name_of` the name of each of `count`, which
+ * the message lists. SPL_E_USAGE. */
 int spl_cmd_take_name(const char *option, const char *text, int (*from_name)(const char *),
                       const char *(*name_of)(int place), int count, int *out, struct spl_error *err);
 

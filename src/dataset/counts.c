@@ -26,8 +26,9 @@ void spl_counts_add_tables(struct spl_counts *counts, const struct spl_tables *t
     for (uint32_t s = 0; s < tables->stream_count; s++) {
         uint64_t bits = 0, words = 0;
         for (uint32_t c = 0; c < tables->chunk_count; c++) {
-            bits += (uint64_t)tables->width[s][c] * tables->chunks[c].count;
-            words += spl_stream_words(tables->width[s][c], tables->chunks[c].count);
+            uint32_t of_chunk = tables->width[s][c] * tables->chunks[c].count;
+            bits += of_chunk;
+            words += (of_chunk + 31) / 32;
         }
         counts->stream_bits[s] += bits;
         header_bits += 32 * words - bits + 8ull * SPL_STREAM_CHUNK_BYTES * tables->chunk_count;

@@ -10,12 +10,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <xxhash.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "base/sized.h"
 #include "dataset/open.h"
+
+static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
 
@@ -72,13 +76,13 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
 }
 
-static int open_file(const char *path, bool verify, uint64_t tables_bytes, const atomic_bool *cancelled,
-                     struct spl_dataset **out, struct spl_error *err)
+int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                        struct spl_error *err)
 {
     struct spl_dataset_source source;
     *out = NULL;
     int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_within(&source, path, verify, tables_bytes, cancelled, out, err)))
+    if (!rc && (rc = spl_dataset_open_source_as(&source, path, how, out, err)))
         spl_dataset_source_close(&source);
     return rc;
 }
@@ -86,23 +90,24 @@ static int open_file(const char *path, bool verify, uint64_t tables_bytes, const
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err)
 {
-    return open_file(path, verify, SPL_TABLES_BYTES, cancelled, out, err);
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_as(path, &how, out, err);
 }
 
 int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    return open_file(path, verify, UINT64_MAX, NULL, out, err);
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){verify, UINT64_MAX, NULL}, out, err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
 {
-    return spl_dataset_open_within(source, name, verify, SPL_TABLES_BYTES, cancelled, out, err);
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_source_as(source, name, &how, out, err);
 }
 
-int spl_dataset_open_within(const struct spl_dataset_source *source, const char *name, bool verify,
-                            uint64_t tables_bytes, const atomic_bool *cancelled, struct spl_dataset **out,
-                            struct spl_error *err)
+int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
+                               const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err)
 {
     *out = NULL;
     if (source->size > INT64_MAX / 2) /* so that no sum of sizes wraps */
@@ -112,15 +117,16 @@ int spl_dataset_open_within(const struct spl_dataset_source *source, const char 
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
-    dataset->cancelled = cancelled;
+    atomic_init(&dataset->references, 1);
+    dataset->cancelled = how->cancelled;
     dataset->source = *source;
-    dataset->tables_limit = tables_bytes;
+    dataset->tables_limit = how->tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
         goto done;
     strcpy(dataset->name, name);
-    rc = spl_dataset_read_sections(dataset, verify, err);
+    rc = spl_dataset_read_sections(dataset, how->verify, err);
     if (!rc)
         rc = spl_dataset_check_sections(dataset, err);
     if (!rc)
@@ -136,10 +142,14 @@ done:
     return rc;
 }
 
-void spl_dataset_close(struct spl_dataset *dataset)
+void spl_dataset_hold(const struct spl_dataset *dataset)
 {
-    if (!dataset)
-        return;
+    unsigned before = atomic_fetch_add(&((struct spl_dataset *)dataset)->references, 1);
+    spl_assert(before > 0);
+}
+
+static void destroy(struct spl_dataset *dataset)
+{
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
     for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
@@ -158,6 +168,23 @@ void spl_dataset_close(struct spl_dataset *dataset)
     free(dataset->sections);
     free(dataset->name);
     free(dataset);
+}
+
+void spl_dataset_let_go(const struct spl_dataset *dataset)
+{
+    struct spl_dataset *mine = (struct spl_dataset *)dataset;
+    if (atomic_fetch_sub(&mine->references, 1) == 1)
+        destroy(mine);
+}
+
+void spl_dataset_close(struct spl_dataset *dataset)
+{
+    if (!dataset)
+        return;
+    uint64_t deadline_ns = spl_now_ns() + patience_ns;
+    while (!dataset->source.owned && atomic_load(&dataset->references) > 1 && spl_remaining_ns(deadline_ns))
+        usleep(1000); // what a caller lends is read no more when this returns
+    spl_dataset_let_go(dataset);
 }
 
 const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset)

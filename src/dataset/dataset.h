@@ -14,6 +14,16 @@
 #include "dataset/tables.h"
 #include "sparse/dictionary.h"
 
+/* How to open one. */
+struct spl_dataset_opening {
+    bool verify;                  /* as of spl_dataset_open() */
+    uint64_t tables_bytes;        /* all tables are kept where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
+    const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
+};
+
+int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                        struct spl_error *err);
+
 /* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL)
  * with SPL_E_CANCELLED, as later does whatever else takes long with the dataset. */
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
@@ -27,10 +37,14 @@ int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **o
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
 
-/* The same, keeping all tables only where they take no more than `tables_bytes` (elsewhere SPL_TABLES_BYTES). */
-int spl_dataset_open_within(const struct spl_dataset_source *source, const char *name, bool verify,
-                            uint64_t tables_bytes, const atomic_bool *cancelled, struct spl_dataset **out,
-                            struct spl_error *err);
+int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
+                               const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err);
+
+/* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
+ * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;
+ * let_go() closes the source, which may block. */
+void spl_dataset_hold(const struct spl_dataset *dataset);
+void spl_dataset_let_go(const struct spl_dataset *dataset);
 
 /* Nodes, chunks and the words of chunks' textures (NULL without) of the whole dataset, which must keep all its tables:
  * spl_dataset_open_whole(), or spl_dataset_keeps_all(). */

@@ -82,3 +82,9 @@ uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t
 {
     return find(dataset, offsetof(struct spl_page_row, first_id), id);
 }
+
+uint64_t spl_dataset_get_page_end(const struct spl_dataset *dataset, uint32_t page)
+{
+    spl_assert(page < dataset->info.pages);
+    return dataset->rows[page + 1].first_node;
+}

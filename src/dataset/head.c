@@ -17,12 +17,6 @@ static char *put(char *to, const void *from, size_t bytes)
     return to + bytes;
 }
 
-static const char *get(void *to, const char *from, size_t bytes)
-{
-    memcpy(to, from, bytes);
-    return from + bytes;
-}
-
 void spl_head_write(const struct spl_tables *tables, char *bytes)
 {
     size_t words = tables->chunk_count * sizeof(uint32_t);
@@ -41,21 +35,17 @@ void spl_head_write(const struct spl_tables *tables, char *bytes)
         bytes = put(bytes, tables->width[s], tables->chunk_count);
 }
 
-void spl_head_read(const char *bytes, struct spl_tables *tables)
+void spl_head_read_nodes(const char *bytes, struct spl_node *nodes, uint32_t count)
 {
-    size_t words = tables->chunk_count * sizeof(uint32_t);
-    for (uint32_t n = 0; n < tables->node_count; n++)
-        bytes = get(&tables->nodes[n], bytes, SPL_NODE_BYTES);
-    for (uint32_t c = 0; c < tables->chunk_count; c++) {
-        struct spl_chunk *chunk = &tables->chunks[c];
-        bytes = get(chunk, bytes, SPL_CHUNK_BYTES);
-        chunk->count = chunk->extra_bits >> SPL_EXTRA_COUNT & 255;
-        chunk->extra_bits &= ~(255u << SPL_EXTRA_COUNT);
+    for (uint32_t n = 0; n < count; n++, bytes += SPL_NODE_BYTES)
+        memcpy(&nodes[n], bytes, SPL_NODE_BYTES);
+}
+
+void spl_head_read_chunks(const char *bytes, struct spl_chunk *chunks, uint32_t count)
+{
+    for (uint32_t c = 0; c < count; c++, bytes += SPL_CHUNK_BYTES) {
+        memcpy(&chunks[c], bytes, SPL_CHUNK_BYTES);
+        chunks[c].count = chunks[c].extra_bits >> SPL_EXTRA_COUNT & 255;
+        chunks[c].extra_bits &= ~(255u << SPL_EXTRA_COUNT);
     }
-    if (tables->textures)
-        bytes = get(tables->textures, bytes, words);
-    for (uint32_t s = 0; s < tables->stream_count; s++)
-        bytes = get(tables->base[s], bytes, words);
-    for (uint32_t s = 0; s < tables->stream_count; s++)
-        bytes = get(tables->width[s], bytes, tables->chunk_count);
 }

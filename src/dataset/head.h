@@ -10,7 +10,8 @@ uint64_t spl_head_bytes(uint64_t nodes, uint64_t chunks, uint32_t streams, bool 
 /* Writes as many bytes as spl_head_bytes() says of `tables`. */
 void spl_head_write(const struct spl_tables *tables, char *bytes);
 
-/* Reads them into the arrays of `tables`, whose numbers are set: as they are, without what is not on disk. */
-void spl_head_read(const char *bytes, struct spl_tables *tables);
+/* Reads `count` nodes or chunks as they lie there, without what is not on disk. */
+void spl_head_read_nodes(const char *bytes, struct spl_node *nodes, uint32_t count);
+void spl_head_read_chunks(const char *bytes, struct spl_chunk *chunks, uint32_t count);
 
 #endif

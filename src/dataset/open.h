@@ -27,6 +27,7 @@ enum spl_section_kind {
 };
 
 struct spl_dataset {
+    atomic_uint references; /* the opener's, and one of each read that may outlive it */
     struct spl_dataset_info info;
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;

@@ -128,6 +128,8 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
     memcpy(p.nodes, nodes, node_count * sizeof *nodes);
     if ((rc = allocate(&p, node_count, chunk_count, err)) || (rc = spl_dataset_writer_create(path, &p.writer, err)))
         goto done;
+    if (what.page_bytes)
+        spl_dataset_writer_set_page_bytes(p.writer, what.page_bytes);
     spl_dataset_writer_set_streams(p.writer, streams, p.stream_count);
     if (what.dictionary)
         rc = spl_dataset_writer_set_dictionary(p.writer, what.dictionary, err);

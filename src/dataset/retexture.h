@@ -21,6 +21,7 @@ struct spl_retexture {
     void *context;
     const json_t *color_source; /* put before what META's "color" has; NULL = nothing */
     const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */
+    size_t page_bytes;          /* of the new file's pages, about; 0 = SPL_PAGE_BYTES */
 };
 
 /* Writes `path` (temporary file, sync, rename): geometry and optional attributes are copied bit for bit. Blocks on

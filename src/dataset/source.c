@@ -75,7 +75,8 @@ int spl_dataset_source_open_file(const char *path, struct spl_dataset_source *ou
                                            .read = read_file,
                                            .close = close_file,
                                            .context = file,
-                                           .map = file->bytes ? file->map : NULL};
+                                           .map = file->bytes ? file->map : NULL,
+                                           .owned = true};
     return rc;
 }
 

@@ -48,6 +48,11 @@ uint64_t spl_dataset_get_all_tables_bytes(const struct spl_dataset *dataset)
            (dataset->info.pages - 1) * sizeof(struct spl_tables);
 }
 
+uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset)
+{
+    return dataset->tables_limit;
+}
+
 /* The arrays behind each other in one block, those of items of 8, 4 and 1 byte in turn. */
 static void lay_out(struct spl_tables *tables, bool textured, void *memory)
 {
@@ -63,21 +68,68 @@ static void lay_out(struct spl_tables *tables, bool textured, void *memory)
         tables->width[s] = widths;
 }
 
+/* A head being read, its checksum with it. */
+struct reader {
+    const struct spl_dataset *dataset;
+    uint64_t offset;
+    XXH3_state_t *hash;
+    char *block; /* room for some nodes or chunks, which are longer in memory */
+};
+
+enum { block_items = 4096, block_bytes = block_items * (SPL_NODE_BYTES > SPL_CHUNK_BYTES ? SPL_NODE_BYTES : SPL_CHUNK_BYTES) };
+
+static int take(struct reader *reader, void *out, size_t bytes, struct spl_error *err)
+{
+    int rc = spl_dataset_read(reader->dataset, reader->offset, out, bytes, err);
+    reader->offset += bytes;
+    if (!rc)
+        XXH3_64bits_update(reader->hash, out, bytes);
+    return rc;
+}
+
+static int take_all(struct reader *reader, struct spl_tables *tables, struct spl_error *err)
+{
+    const size_t words = tables->chunk_count * sizeof(uint32_t);
+    int rc = SPL_OK;
+    for (uint32_t n = 0, count; !rc && n < tables->node_count; n += count) {
+        count = tables->node_count - n < block_items ? tables->node_count - n : block_items;
+        if (!(rc = take(reader, reader->block, (size_t)count * SPL_NODE_BYTES, err)))
+            spl_head_read_nodes(reader->block, &tables->nodes[n], count);
+    }
+    for (uint32_t c = 0, count; !rc && c < tables->chunk_count; c += count) {
+        count = tables->chunk_count - c < block_items ? tables->chunk_count - c : block_items;
+        if (!(rc = take(reader, reader->block, (size_t)count * SPL_CHUNK_BYTES, err)))
+            spl_head_read_chunks(reader->block, &tables->chunks[c], count);
+    }
+    if (!rc && tables->textures)
+        rc = take(reader, tables->textures, words, err);
+    for (uint32_t s = 0; s < tables->stream_count && !rc; s++)
+        rc = take(reader, tables->base[s], words, err);
+    for (uint32_t s = 0; s < tables->stream_count && !rc; s++)
+        rc = take(reader, tables->width[s], tables->chunk_count, err);
+    return rc;
+}
+
 /* Reads a head to where `tables` has its arrays. */
 static int read_head(const struct spl_dataset *dataset, struct spl_tables *tables, struct spl_error *err)
 {
     const struct spl_section *section = dataset->found[SPL_KIND_HEADS].at[tables->page];
-    char *bytes = spl_alloc_raw(section->bytes, 1, err);
-    int rc = bytes ? spl_dataset_read(dataset, section->offset, bytes, section->bytes, err) : SPL_E_NOMEM;
-    if (!rc && XXH3_64bits(bytes, section->bytes) != section->hash)
+    struct reader reader = {dataset, section->offset, XXH3_createState(), spl_alloc_raw(block_bytes, 1, err)};
+    int rc = reader.block ? SPL_OK : SPL_E_NOMEM;
+    if (!reader.hash)
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for checksums");
+    else
+        XXH3_64bits_reset(reader.hash);
+    if (!rc)
+        rc = take_all(&reader, tables, err);
+    if (!rc && XXH3_64bits_digest(reader.hash) != section->hash)
         rc = spl_fail(err, SPL_E_CORRUPT,
                       dataset->opened ? "%s: section HEAD %u fails its checksum: it is damaged, or was overwritten while in "
                                         "use; put the dataset back under another name and rename it"
                                       : "%s: section HEAD %u fails its checksum; copy or pack the dataset again",
                       spl_dataset_get_name(dataset), tables->page);
-    if (!rc)
-        spl_head_read(bytes, tables);
-    free(bytes);
+    XXH3_freeState(reader.hash);
+    free(reader.block);
     return rc ? rc : spl_dataset_judge_head(dataset, tables, err);
 }
 
@@ -108,14 +160,6 @@ const struct spl_tables *spl_dataset_borrow_tables(const struct spl_dataset *dat
     free(*read);
     *read = NULL;
     return NULL;
-}
-
-uint32_t spl_tables_get_stream_words(const struct spl_tables *tables, uint32_t streams, uint32_t chunk)
-{
-    uint32_t words = 0;
-    for (uint32_t s = 0; s < streams; s++)
-        words += spl_stream_words(tables->width[s][chunk], tables->chunks[chunk].count);
-    return words;
 }
 
 /* Arrays of the whole dataset, each page's part in its place. */

@@ -10,6 +10,7 @@
 #include <splatd/dataset.h>
 
 #include "dataset/format.h"
+#include "dataset/streams.h"
 
 /* What the tables of a dataset may take before they are read by page: 10^8 splats and more. */
 #define SPL_TABLES_BYTES (64ull << 20)
@@ -31,6 +32,9 @@ const struct spl_tables *spl_dataset_get_tables(const struct spl_dataset *datase
 size_t spl_dataset_get_tables_bytes(const struct spl_dataset *dataset, uint32_t page);
 uint64_t spl_dataset_get_all_tables_bytes(const struct spl_dataset *dataset);
 
+/* What tables may take altogether, as the dataset was opened. */
+uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset);
+
 /* Reads the tables of a page into `block`, which has room for their bytes and then begins with a struct spl_tables. Held
  * against checksum and directory, so that whoever has them checks nothing but what lies between a node and its children
  * (spl_node_judge_child()). SPL_E_CORRUPT, SPL_E_IO, SPL_E_NOMEM. Any thread; blocks on disk. */
@@ -46,8 +50,17 @@ uint32_t spl_dataset_find_page_of_node(const struct spl_dataset *dataset, uint64
 uint32_t spl_dataset_find_page_of_chunk(const struct spl_dataset *dataset, uint64_t chunk);
 uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t id);
 
+/* The node behind the last one of a page. */
+uint64_t spl_dataset_get_page_end(const struct spl_dataset *dataset, uint32_t page);
+
 /* Words that the first `streams` streams of chunk `chunk` of the page take behind its own. */
-uint32_t spl_tables_get_stream_words(const struct spl_tables *tables, uint32_t streams, uint32_t chunk);
+static inline uint32_t spl_tables_get_stream_words(const struct spl_tables *tables, uint32_t streams, uint32_t chunk)
+{
+    uint32_t words = 0;
+    for (uint32_t s = 0; s < streams; s++)
+        words += spl_stream_words(tables->width[s][chunk], tables->chunks[chunk].count);
+    return words;
+}
 
 /* What is wrong between a child and its parent, or NULL. Opening has checked it where all tables are kept. */
 const char *spl_node_judge_child(const struct spl_node *parent, const struct spl_node *child);

@@ -3,6 +3,7 @@
 #include "render/frame.h"
 
 #include "base/clock.h"
+#include "base/memory.h"
 #include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
@@ -48,6 +49,16 @@ static enum spl_select_answer ask_textures(void *context, uint32_t page)
     return dictionary == SPL_SELECT_YES ? textures : dictionary;
 }
 
+/* The same of tables, which a walk cannot do without: what is on its way is not there. */
+static enum spl_select_answer ask_tables(void *context, uint32_t page, const struct spl_tables **tables)
+{
+    struct spl_frame_job *job = context;
+    uint32_t slot = spl_slot_of_tables(job->resident->dataset, page);
+    enum spl_select_answer answer = ask_slot(job, slot);
+    *tables = job->resident->pages[slot].tables;
+    return answer == SPL_SELECT_YES && !*tables ? SPL_SELECT_LATER : answer;
+}
+
 /* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page among
  * them. */
 static int end_walk(struct spl_frame_job *job, struct spl_error *err)
@@ -68,6 +79,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .low_pass = SPL_LOW_PASS,
         .discs = method->discs,
         .lines = method->lines,
+        .tables = ask_tables,
         .resident = ask_page,
         .atoms = spl_view_is_textured(job->view) ? job->view->disc.atoms : 0,
         .textured = ask_textures,
@@ -135,6 +147,23 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         if (rc || !again)
             return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
     }
+}
+
+int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        struct spl_image *image = &frame->images[layer];
+        if (!(view->layers >> layer & 1) || image->pixels)
+            continue;
+        *image = (struct spl_image){.layer = layer,
+                                    .type = spl_readback_type(layer),
+                                    .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
+        if (!image->pixels)
+            return SPL_E_NOMEM;
+    }
+    return SPL_OK;
 }
 
 /* Records every group and layer of the view into the list that was begun; the n-th requested layer starts at word n *
@@ -212,6 +241,8 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     if (spl_now_ns() >= job->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = list_tile(job, tile, err);
+    if (!rc)
+        rc = spl_frame_make_images(job->frame, job->view, err);
     if (!rc)
         rc = draw_tile(tile, err);
     if (rc)

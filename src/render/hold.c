@@ -18,7 +18,7 @@ static void begin_reads(struct spl_hold *hold)
         uint32_t slot = hold->slots[hold->begun];
         struct spl_resident_page *page = &hold->pages[slot];
         struct spl_io_rank rank = {.awaited = true};
-        if (page->buffer && !page->filled && !page->failed &&
+        if (spl_resident_has_room(page) && !page->filled && !page->failed &&
             !spl_residency_begin_read(hold->residency, hold->dataset, page, slot, rank))
             return;
     }
@@ -32,7 +32,7 @@ static void start_wait(struct spl_hold *hold, struct spl_residency *residency, s
     hold->waits = true;
     hold->dataset = resident->dataset;
     hold->pages = resident->pages;
-    hold->moved_ns = spl_now_ns();
+    hold->since_ns = spl_now_ns();
     hold->begun = hold->come = 0;
 }
 
@@ -83,14 +83,13 @@ static int follow(struct spl_hold *hold, struct spl_error *err)
         const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
         if (page->failed)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
-        if (!page->buffer)
+        if (!spl_resident_has_room(page))
             return 1;
         if (!page->filled) {
             if (!page->read && hold->begun > hold->come) /* it lost its room, and has another's: nobody reads it */
                 hold->begun = hold->come;
             return 0;
         }
-        hold->moved_ns = spl_now_ns();
     }
     return 1;
 }
@@ -107,10 +106,10 @@ int spl_hold_poll(struct spl_hold *hold, struct spl_error *err)
     } else if (hold->residency->releases != hold->releases) {
         return SPL_OK;
     }
-    if (spl_now_ns() - hold->moved_ns < patience_ns)
+    uint64_t moved_ns = spl_io_get_moved_ns(hold->residency->io); // its own, and those of others that go before
+    if (spl_now_ns() - (moved_ns > hold->since_ns ? moved_ns : hold->since_ns) < patience_ns)
         return SPL_SLOT_PENDING;
-    return spl_fail(err, SPL_E_TIMEOUT, "no page of the dataset has come for %d s",
-                    (int)(patience_ns / SPL_NS_PER_S));
+    return spl_fail(err, SPL_E_TIMEOUT, "no page has come for %d s", (int)(patience_ns / SPL_NS_PER_S));
 }
 
 /* Ends a wait. Why reads failed is forgotten; where `all`, reads that nobody waits for any more are dropped. */
@@ -121,7 +120,7 @@ static void let_go(struct spl_hold *hold, bool all)
     struct spl_residency *residency = hold->residency;
     for (size_t i = 0; i < hold->count; i++) {
         struct spl_resident_page *page = &hold->pages[hold->slots[i]];
-        if (!--page->holds && (page->failed || (all && page->buffer && !page->filled)))
+        if (!--page->holds && (page->failed || (all && spl_resident_has_room(page) && !page->filled)))
             spl_residency_drop_slot(residency, page);
     }
     residency->releases += hold->count > 0;

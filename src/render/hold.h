@@ -23,7 +23,7 @@ struct spl_hold {
     uint32_t *slots;                        /* `count` of them, held; in the order that they were asked for */
     size_t count, begun, come;              /* those whose reads have begun; that have come, without a gap */
     uint64_t releases;                      /* of residency, when there was no room */
-    uint64_t moved_ns;                      /* when one came last */
+    uint64_t since_ns;                      /* when it began to wait */
     bool crowded;                           /* no slots: it waits for room */
     bool alone;                             /* the caller makes no step of another frame meanwhile: holds give way */
 };
@@ -34,7 +34,7 @@ int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_datas
                       uint64_t *awaited, struct spl_error *err);
 
 /* SPL_SLOT_PENDING as long as there is nothing to do for its frame; 0: it is to let go and to walk (again). Why a slot
- * cannot be read; SPL_E_TIMEOUT when nothing has come for 10 s. */
+ * cannot be read; SPL_E_TIMEOUT when nothing has come for 10 s, neither for it nor for others. */
 int spl_hold_poll(struct spl_hold *hold, struct spl_error *err);
 
 /* Lets go: for another walk. */

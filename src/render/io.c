@@ -1,9 +1,10 @@
 /* The io thread; see io.h.
  *
  * Invariants: `staged` counts the bytes of the read under way and of those ended that were not given back, and is raised
- * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. A read is in one list at a time, but for the
+ * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is more to
+ * read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one list at a time, but for the
  * one that is being read and those taken, which are in none. Only the io thread waits without a deadline, for work;
- * destroy() wakes it. */
+ * destroy() wakes it, or, in the middle of a read, leaves it behind: then `io` is the thread's, which frees it. */
 #include "render/io.h"
 
 #include <pthread.h>
@@ -14,6 +15,8 @@
 
 enum state { FREE, WAITS, BEING_READ, ENDED, TAKEN };
 
+enum { SPARES = 4 };
+
 TAILQ_HEAD(read_list, spl_io_read);
 
 struct spl_io {
@@ -23,11 +26,15 @@ struct spl_io {
     bool started;
     void (*wake)(void *context); // may be NULL
     void *wake_context;
-    bool closing;                         // guarded by: mutex, as all below
+    bool closing, left_behind;            // guarded by: mutex, as all below
     struct read_list free, waiting, ended;
     struct spl_io_read *current; /* that is being read; NULL = none */
     size_t under_way;            /* waiting, current or ended */
-    uint64_t staged, numbers;
+    uint64_t staged, numbers, moved_ns;
+    struct {
+        void *data;
+        size_t room;
+    } spares[SPARES]; /* memory for reads to come; NULL = none */
     struct spl_io_read reads[SPL_IO_READS];
 };
 
@@ -50,11 +57,56 @@ static struct spl_io_read *choose(struct spl_io *io)
     return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
 }
 
+static void drop_spares(struct spl_io *io)
+{
+    for (int i = 0; i < SPARES; i++) {
+        free(io->spares[i].data);
+        io->spares[i].data = NULL;
+    }
+}
+
+/* NULL where none fits, without much of it lying idle; what is left of the others is no longer counted on then. */
+static void *take_spare(struct spl_io *io, size_t bytes, size_t *room)
+{
+    for (int i = 0; i < SPARES; i++) {
+        void *data = io->spares[i].data;
+        if (!data || io->spares[i].room < bytes || io->spares[i].room - bytes > bytes / 8)
+            continue;
+        *room = io->spares[i].room;
+        io->spares[i].data = NULL;
+        return data;
+    }
+    drop_spares(io);
+    *room = bytes;
+    return NULL;
+}
+
+/* Takes the memory of a read that was given back. */
+static void keep(struct spl_io *io, void *data, size_t room)
+{
+    uint64_t kept = io->staged + room;
+    int at = -1;
+    for (int i = 0; i < SPARES; i++) {
+        at = io->spares[i].data ? at : i;
+        kept += io->spares[i].data ? io->spares[i].room : 0;
+    }
+    if (!io->under_way)
+        drop_spares(io);
+    if (!io->under_way || at < 0 || kept > SPL_IO_BYTES) {
+        free(data);
+        return;
+    }
+    io->spares[at].data = data;
+    io->spares[at].room = room;
+}
+
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
-    if (read->data)
+    if (read->data) {
         io->staged -= read->what.bytes;
-    free(read->data);
+        io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
+        keep(io, read->data, read->room);
+    }
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
     pthread_cond_signal(&io->work); // there is room again
@@ -67,17 +119,27 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     struct spl_error err = {0};
     TAILQ_REMOVE(&io->waiting, read, link);
     read->state = BEING_READ;
+    size_t room;
+    void *data = take_spare(io, what.bytes, &room);
     io->current = read;
     io->staged += what.bytes;
+    io->moved_ns = spl_now_ns();
+    if (what.hold)
+        what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
-    void *data = spl_alloc_raw(what.bytes, 1, &err);
+    if (!data)
+        data = spl_alloc_raw(what.bytes, 1, &err);
     if (data && what.read(what.source, what.index, data, &err)) {
         free(data);
         data = NULL;
     }
+    if (what.let_go)
+        what.let_go(what.source);
     pthread_mutex_lock(&io->mutex);
+    io->moved_ns = spl_now_ns();
     io->current = NULL;
     read->data = data;
+    read->room = room;
     read->err = err;
     if (!data)
         io->staged -= what.bytes;
@@ -91,6 +153,17 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     pthread_cond_broadcast(&io->ended_one);
 }
 
+static void release(struct spl_io *io)
+{
+    drop_spares(io);
+    for (size_t i = 0; i < SPL_IO_READS; i++)
+        free(io->reads[i].data);
+    pthread_cond_destroy(&io->ended_one);
+    pthread_cond_destroy(&io->work);
+    pthread_mutex_destroy(&io->mutex);
+    free(io);
+}
+
 static void *run(void *argument)
 {
     struct spl_io *io = argument;
@@ -102,12 +175,16 @@ static void *run(void *argument)
             continue;
         }
         perform(io, next);
+        if (!io->wake || io->closing)
+            continue;
         pthread_mutex_unlock(&io->mutex);
-        if (io->wake)
-            io->wake(io->wake_context);
+        io->wake(io->wake_context); // destroy() waits for this, as nothing is being read
         pthread_mutex_lock(&io->mutex);
     }
+    bool left_behind = io->left_behind;
     pthread_mutex_unlock(&io->mutex);
+    if (left_behind)
+        release(io);
     return NULL;
 }
 
@@ -147,16 +224,22 @@ void spl_io_destroy(struct spl_io *io)
         return;
     pthread_mutex_lock(&io->mutex);
     io->closing = true;
+    io->left_behind = io->current != NULL;
+    drop_spares(io);
+    bool left_behind = io->left_behind;
+    for (size_t i = 0; i < SPL_IO_READS; i++) {
+        free(io->reads[i].data);
+        io->reads[i].data = NULL;
+    }
+    if (left_behind)
+        pthread_detach(io->thread);
     pthread_cond_signal(&io->work);
     pthread_mutex_unlock(&io->mutex);
+    if (left_behind)
+        return;
     if (io->started)
         pthread_join(io->thread, NULL);
-    for (size_t i = 0; i < SPL_IO_READS; i++)
-        free(io->reads[i].data);
-    pthread_cond_destroy(&io->ended_one);
-    pthread_cond_destroy(&io->work);
-    pthread_mutex_destroy(&io->mutex);
-    free(io);
+    release(io);
 }
 
 struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what *what, struct spl_io_rank rank)
@@ -168,7 +251,8 @@ struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what
         TAILQ_REMOVE(&io->free, read, link);
         *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .state = WAITS};
         TAILQ_INSERT_TAIL(&io->waiting, read, link);
-        io->under_way++;
+        if (!io->under_way++)
+            io->moved_ns = spl_now_ns();
         pthread_cond_signal(&io->work);
     }
     pthread_mutex_unlock(&io->mutex);
@@ -197,6 +281,17 @@ struct spl_io_read *spl_io_take(struct spl_io *io)
     }
     pthread_mutex_unlock(&io->mutex);
     return read;
+}
+
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read)
+{
+    pthread_mutex_lock(&io->mutex);
+    void *data = read->data;
+    spl_assert(read->state == TAKEN && data);
+    io->staged -= read->what.bytes;
+    read->data = NULL;
+    pthread_mutex_unlock(&io->mutex);
+    return data;
 }
 
 void spl_io_end(struct spl_io *io, struct spl_io_read *read)
@@ -241,15 +336,12 @@ bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns)
     return ended;
 }
 
-bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns)
+uint64_t spl_io_get_moved_ns(struct spl_io *io)
 {
     pthread_mutex_lock(&io->mutex);
-    while (io->current && io->current->what.source == source)
-        if (!wait_until(io, deadline_ns))
-            break;
-    bool none = !io->current || io->current->what.source != source;
+    uint64_t moved_ns = io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
-    return none;
+    return moved_ns;
 }
 
 size_t spl_io_count(struct spl_io *io)

@@ -2,9 +2,10 @@
  * memory that is counted before it is taken.
  *
  * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that waits
- * is forgotten, the bytes of one that is being read are dropped when they have come.
+ * is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that does not
+ * end: it holds what it reads from, and the thread goes with it where the rest has gone by then.
  *
- * Threads: every function is called by the one that owns the renderer; `read` and `wake` are called by the io thread. */
+ * Threads: every function is called by the one that owns the renderer; those of spl_io_what, and `wake`, by the io thread. */
 #ifndef SPL_RENDER_IO_H
 #define SPL_RENDER_IO_H
 
@@ -20,7 +21,8 @@ enum { SPL_IO_READS = 256 };       /* that may be under way, ended ones that wer
 
 struct spl_io_what {
     int (*read)(const void *source, uint32_t index, void *out, struct spl_error *err); /* may block */
-    const void *source; /* borrowed until spl_io_wait_for() */
+    void (*hold)(const void *source), (*let_go)(const void *source); // may be NULL; around `read`, and never block
+    const void *source; /* borrowed until the read is ended, and from hold() to let_go() */
     uint32_t index;
     size_t bytes; /* that `read` writes, at least 1 */
     void *owner;  /* of the read; not looked at */
@@ -40,6 +42,7 @@ struct spl_io_read {
     int state;       /* enum state of io.c */
     bool unwanted;   /* ended by its owner while it was being read */
     void *data;      /* once taken: what.bytes; NULL: `err` says why not */
+    size_t room;     /* that `data` has */
     struct spl_error err;
 };
 
@@ -48,7 +51,8 @@ struct spl_io;
 /* `wake` (may be NULL) is called after each read has ended. */
 int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io **out, struct spl_error *err);
 
-/* Forgets all reads; blocks until the one under way has ended. NULL-safe. */
+/* Forgets all reads; `wake` is not called any more. Does not wait for the one under way, whose thread ends behind it.
+ * NULL-safe. */
 void spl_io_destroy(struct spl_io *io);
 
 /* NULL when as many as may be are under way. */
@@ -60,14 +64,17 @@ void spl_io_raise(struct spl_io *io, struct spl_io_read *read, struct spl_io_ran
 /* A read that has ended, well or not, in the order that they did; NULL: none. Never blocks. */
 struct spl_io_read *spl_io_take(struct spl_io *io);
 
+/* The data of a read that was taken, which is the caller's from here on. */
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read);
+
 /* Gives back a read, with its data; whatever its state. NULL-safe. */
 void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* Blocks until no read of `source` is being read: true; false at `deadline_ns` (0 = never blocks). */
-bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns);
+/* When a read was last begun, has ended or was given back, of whoever: what tells a disk that is slow from one that hangs. */
+uint64_t spl_io_get_moved_ns(struct spl_io *io);
 
 /* Reads that wait, are being read, or were not taken yet. */
 size_t spl_io_count(struct spl_io *io);

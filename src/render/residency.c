@@ -12,7 +12,10 @@
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
 
-enum { failures_max = 16 }; // that are remembered where nobody waits: each takes a read's place
+enum {
+    failures_max = 16, // that are remembered where nobody waits: each takes a read's place
+    uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
+};
 
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err)
@@ -37,8 +40,11 @@ void spl_residency_drop_slot(struct spl_residency *residency, struct spl_residen
 {
     spl_io_end(residency->io, page->read);
     spl_gpu_buffer_destroy(residency->gpu, page->buffer);
+    free(page->tables);
     page->read = NULL;
     page->buffer = NULL;
+    page->tables = NULL;
+    page->host_bytes = 0;
     residency->failures -= page->failed;
     page->filled = page->failed = false;
 }
@@ -93,7 +99,8 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     }
     struct spl_resident_dataset resident = {.dataset = dataset,
                                             .page_count = spl_dataset_get_info(dataset)->pages,
-                                            .slot_count = spl_slot_count(dataset)};
+                                            .slot_count = spl_slot_count(dataset),
+                                            .device_slots = spl_slot_count_resident(dataset)};
     int rc = reserve_asked(residency, resident.slot_count, err);
     resident.pages = rc ? NULL : spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
@@ -102,17 +109,14 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     return SPL_OK;
 }
 
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns)
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset)
 {
     struct spl_resident_dataset *resident = spl_residency_get(residency, dataset);
     if (!resident)
-        return true;
+        return;
     drop_dataset(residency, resident);
-    if (!spl_io_wait_for(residency->io, dataset, deadline_ns))
-        return false;
     free(resident->pages);
     *resident = residency->datasets[--residency->dataset_count];
-    return true;
 }
 
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset)
@@ -131,21 +135,15 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->pending = residency->crowded = false;
 }
 
-/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
-static bool gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
-{
-    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
-}
-
 static bool evict_one(struct spl_residency *residency, bool held)
 {
     struct spl_resident_page *first = NULL;
     for (size_t i = 0; i < residency->dataset_count; i++) {
         struct spl_resident_dataset *resident = &residency->datasets[i];
-        for (uint32_t p = 0; p < resident->slot_count; p++) {
+        for (uint32_t p = 0; p < resident->device_slots; p++) {
             struct spl_resident_page *page = &resident->pages[p];
             if (page->buffer && page->last_frame < residency->frame && (held || !page->holds) &&
-                (!first || gives_way_before(page, first)))
+                (!first || spl_resident_gives_way_before(page, first)))
                 first = page;
         }
     }
@@ -237,6 +235,8 @@ static int take_room(struct spl_residency *residency, struct spl_resident_datase
     bool software = is_software(residency), alone = residency->asker && residency->asker->alone;
     if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
         return SPL_SLOT_CROWDED;
+    if (slot >= resident->device_slots)
+        return spl_residency_take_host_room(residency, resident, slot, alone, err);
     struct spl_error why = {0};
     size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
     struct spl_gpu_buffer *buffer = NULL;
@@ -257,6 +257,8 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank)
 {
     struct spl_io_what what = {.read = spl_slot_read,
+                               .hold = spl_slot_hold,
+                               .let_go = spl_slot_let_go,
                                .source = dataset,
                                .index = slot,
                                .bytes = spl_slot_get_bytes(dataset, slot),
@@ -291,7 +293,7 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
         return tell_failure(residency, resident, page, err);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
-    int rc = page->buffer ? SPL_OK : take_room(residency, resident, slot, err);
+    int rc = spl_resident_has_room(page) ? SPL_OK : take_room(residency, resident, slot, err);
     if (rc) {
         residency->crowded |= awaited && rc == SPL_SLOT_CROWDED;
         return rc;
@@ -313,6 +315,10 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
 {
     size_t bytes = read->what.bytes;
     uint64_t ticket;
+    if (page->host_bytes) {
+        page->tables = spl_io_take_data(residency->io, page->read);
+        return SPL_OK;
+    }
     if (is_software(residency)) {
         memcpy(spl_gpu_buffer_map(page->buffer), read->data, bytes);
         return SPL_OK;
@@ -333,8 +339,11 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
 {
     int rc = SPL_OK;
-    for (struct spl_io_read *read; !rc && (read = spl_io_take(residency->io));) {
+    uint64_t bytes = 0;
+    struct spl_io_read *read;
+    for (int i = 0; !rc && i < uploads_max && bytes < SPL_IO_BYTES && (read = spl_io_take(residency->io)); i++) {
         struct spl_resident_page *page = read->what.owner;
+        bytes += read->what.bytes;
         if (!read->data) {
             page->failed = true;
             if (residency->failures++ > failures_max && !page->holds)
@@ -352,7 +361,7 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
         spl_io_end(residency->io, read);
         page->read = NULL;
         page->filled = true;
-        residency->pages_loaded++;
+        residency->pages_loaded += page->buffer != NULL;
     }
     return rc;
 }

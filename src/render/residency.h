@@ -1,4 +1,4 @@
-/* Which slots of which datasets are on the device. They are read when a view asks for them, on the io thread (io.h), and
+/* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
  * evicted, least recently drawn first, when the device's memory limit refuses another.
  *
  * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
@@ -19,18 +19,33 @@
 struct spl_hold;
 
 struct spl_resident_page {
-    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way */
+    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way, or tables */
+    size_t host_bytes;             /* of tables that are there or on their way; else 0 */
+    struct spl_tables *tables;     // that have come; may be NULL
     struct spl_io_read *read;      /* that is to fill it, or has failed; may be NULL */
     uint64_t last_frame;           /* when it was last asked for */
     uint32_t holds;                /* frames that wait with it */
     bool filled, failed;
 };
 
+/* Is it there, or on its way? */
+static inline bool spl_resident_has_room(const struct spl_resident_page *page)
+{
+    return page->buffer || page->host_bytes;
+}
+
+/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
+static inline bool spl_resident_gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
+{
+    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
+}
+
 /* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
     uint32_t page_count, slot_count;
+    uint32_t device_slots;              /* those before tables */
 };
 
 static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)
@@ -66,14 +81,13 @@ struct spl_residency {
 /* `wake` as spl_io_create(). */
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err);
-/* Blocks until the read under way has ended. Holds are let go of. */
+/* Holds are let go of; the read under way is left to end by itself. */
 void spl_residency_finish(struct spl_residency *residency);
 
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* Lets go of the dataset: true once nothing of it is being read, which is waited for until `deadline_ns` (0 = never
- * blocks). False: it is as if it had just been added. */
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns);
+/* Lets go of the dataset. A page of it that is being read holds it until it has come, and is dropped. */
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset);
 
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
@@ -114,10 +128,16 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
 
+/* host_room.c: counts a slot of tables in, evicting others of the dataset, those of frames that wait where `evict_held`.
+ * SPL_SLOT_CROWDED, SPL_E_LIMIT. */
+int spl_residency_take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                 bool evict_held, struct spl_error *err);
+
 /* Gives up what has room and did not come. */
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
 
-/* Puts on the device what has been read since. Device errors only: a read that failed is told to who asks for it. */
+/* Puts on the device what has been read since, as much as holds up nobody; spl_io_wait() says whether that was all. Device
+ * errors only: a read that failed is told to who asks for it. */
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err);
 
 #endif

@@ -237,8 +237,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct spl_dataset_source source = spl_dataset_source_of_memory(file, length);
     struct spl_dataset *dataset;
     struct spl_error err = {0};
-    uint64_t tables_bytes = data[0] & flag_by_page ? 0 : SPL_TABLES_BYTES;
-    int rc = spl_dataset_open_within(&source, "container", data[0] & flag_verify, tables_bytes, NULL, &dataset, &err);
+    const struct spl_dataset_opening how = {.verify = data[0] & flag_verify,
+                                            .tables_bytes = data[0] & flag_by_page ? 0 : SPL_TABLES_BYTES};
+    int rc = spl_dataset_open_source_as(&source, "container", &how, &dataset, &err);
     spl_assert((rc == SPL_OK) == (dataset != NULL) && (rc == SPL_OK) == (err.message[0] == 0));
     spl_assert(rc == SPL_OK || rc == SPL_E_CORRUPT || rc == SPL_E_UNSUPPORTED || rc == SPL_E_INPUT);
     if (dataset)

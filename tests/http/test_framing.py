@@ -262,4 +262,22 @@ def test_a_nul_in_the_first_line_is_refused():
                 assert (status == 200 or b"'a'" in text or b"parameter" in text) and b"NUL" not in text, (plain, status, text)
 
 
+def test_a_last_reply_arrives_whole_whatever_is_sent_behind_it():
+    """Closing a socket with bytes unread resets it, and what it still had to send is lost."""
+    with Daemon(FAKE) as d:
+        expected = d.ask("/v1/openapi.json").body
+        assert len(expected) > 50000
+        for _ in range(3):
+            s = socket.socket()
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that much of the reply has still to be sent
+            s.settimeout(30)
+            s.connect(("127.0.0.1", d.port))
+            s.sendall(b"GET /v1/openapi.json HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" + b"x" * 40000)
+            received = b""
+            while got := s.recv(512):
+                received += got
+            s.close()
+            assert received.endswith(expected), len(received)
+
+
 run(globals())
