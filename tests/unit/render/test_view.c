@@ -45,6 +45,18 @@ static void test_ids_have_32_bits(void **state)
     }
 }
 
+/* What the camera's own functions leave out, the view has. */
+static void test_a_camera_is_whole_with_a_lens_and_a_pose(void **state)
+{
+    (void)state;
+    struct spl_view view;
+    spl_view_init(&view);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 60, 64, 36, NULL), SPL_OK);
+    assert_int_equal(spl_camera_look_at(&view.camera, (double[3]){1, 2, 3}, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, NULL),
+                     SPL_OK);
+    assert_int_equal(spl_view_check(&view, NULL), SPL_OK);
+}
+
 /* From other languages an enum is any number, and a name may be NULL. */
 static void test_what_is_no_method_is_answered(void **state)
 {
@@ -74,6 +86,7 @@ int main(void)
         cmocka_unit_test(test_normals_need_a_surface),
         cmocka_unit_test(test_ids_have_32_bits),
         cmocka_unit_test(test_what_is_no_method_is_answered),
+        cmocka_unit_test(test_a_camera_is_whole_with_a_lens_and_a_pose),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
