@@ -122,7 +122,7 @@ SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dat
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 
-SPL_API const char *spl_attribute_name(enum spl_attribute attribute);
+SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */
 
 SPL_END_DECLARATIONS
 
