@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Faults of one line that a test must notice: tests/mutants/ROOM.toml lists them, each with the file, the text that
 stands there once, the text of the fault, and the tests that fail with it. A fault that lives is a test that is missing.
 
