@@ -22,7 +22,7 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
-    bool awaited = !job->view->partial || slot == SPL_FIRST_SLOT;
+    bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);

@@ -11,6 +11,7 @@
 #include "base/memory.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
+enum { fruitless_max = 8 };
 
 static void begin_reads(struct spl_hold *hold)
 {
@@ -45,6 +46,22 @@ static void leave_line(struct spl_residency *residency, const struct spl_hold *h
     residency->releases++;
 }
 
+/* A walk asks in the same order for as long as what it asks for is there. */
+static void note_progress(struct spl_hold *hold, const struct spl_residency *residency,
+                          const struct spl_resident_dataset *resident)
+{
+    size_t ready = 0;
+    while (ready < residency->asked_count && resident->pages[residency->asked[ready]].filled)
+        ready++;
+    hold->fruitless = ready + 1 > hold->ready ? 0 : hold->fruitless + 1;
+    hold->ready = ready + 1 > hold->ready ? ready + 1 : hold->ready;
+}
+
+bool spl_hold_gives_up(const struct spl_hold *hold)
+{
+    return hold->fruitless >= fruitless_max;
+}
+
 int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_dataset *resident, struct spl_hold *hold,
                       uint64_t *awaited, struct spl_error *err)
 {
@@ -59,8 +76,11 @@ int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_datas
         return SPL_SLOT_PENDING;
     }
     leave_line(residency, hold);
-    if (!residency->pending)
+    if (!residency->pending) {
+        hold->ready = hold->fruitless = 0;
         return SPL_OK;
+    }
+    note_progress(hold, residency, resident);
     uint32_t *slots = spl_realloc(hold->slots, residency->asked_count, sizeof *slots, err);
     if (!slots)
         return SPL_E_NOMEM;

@@ -1,9 +1,10 @@
 /* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
  * evicted, least recently drawn first, when the device's memory limit refuses another.
  *
- * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
- * has no room depends on what the walk asks for, and not on what has come by then. A frame that waits holds what it
- * asked for (hold.h). Bookkeeping of the renderer's thread. */
+ * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read; for one
+ * that has no room nothing is evicted. So what has no room depends on what the walk asks for, and not on what has come by
+ * then, and a walk that is made again finds what it has waited for. A frame that waits holds what it asked for (hold.h).
+ * Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
@@ -128,8 +129,15 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
 
-/* host_room.c: counts a slot of tables in, evicting others of the dataset, those of frames that wait where `evict_held`.
- * SPL_SLOT_CROWDED, SPL_E_LIMIT. */
+/* device_room.c: makes a slot's buffer, evicting others, those of frames that wait where `evict_held`; none where that would
+ * not do. SPL_SLOT_CROWDED, SPL_E_LIMIT, SPL_E_NOMEM. */
+int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                   bool evict_held, struct spl_error *err);
+
+/* The same of what uploads go through; what it takes is never given back. */
+int spl_residency_grow_staging(struct spl_residency *residency, size_t bytes, struct spl_error *err);
+
+/* host_room.c: the same for a slot of tables, which is counted in, among those of the dataset. */
 int spl_residency_take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
                                  bool evict_held, struct spl_error *err);
 
