@@ -28,13 +28,16 @@ static uint64_t taken_by(const struct spl_gpu_buffer *buffer)
 static bool evict_one(struct spl_residency *residency, bool evict_held)
 {
     struct spl_resident_page *first = NULL;
+    const struct spl_resident_dataset *of_first = NULL;
     for (size_t i = 0; i < residency->dataset_count; i++) {
         struct spl_resident_dataset *resident = &residency->datasets[i];
         for (uint32_t p = 0; p < resident->device_slots; p++) {
             struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->last_frame < residency->frame && (evict_held || !page->holds) &&
-                (!first || spl_resident_gives_way_before(page, first)))
+            if (page->buffer && page->last_frame < residency->frame && (evict_held || !spl_resident_is_kept(resident, page)) &&
+                (!first || spl_resident_gives_way_before(resident, page, of_first, first))) {
                 first = page;
+                of_first = resident;
+            }
         }
     }
     if (!first)
@@ -56,7 +59,7 @@ static int make_room(struct spl_residency *residency, bool evict_held, uint64_t 
         for (uint32_t p = 0; p < resident->device_slots; p++) {
             const struct spl_resident_page *page = &resident->pages[p];
             if (page->last_frame < residency->frame)
-                *(evict_held || !page->holds ? &gives_way : &held) += taken_by(page->buffer);
+                *(evict_held || !spl_resident_is_kept(resident, page) ? &gives_way : &held) += taken_by(page->buffer);
         }
     }
     if (bytes > limit - used + gives_way && bytes <= limit - used + gives_way + held)

@@ -68,10 +68,14 @@ int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_datas
     spl_assert(!hold->waits);
     hold->crowded = residency->crowded;
     hold->count = 0;
+    hold->stalled = residency->stalled;
     if (residency->crowded) {
-        if (!residency->first_in_line)
+        if (hold->stalled)
+            leave_line(residency, hold); // nobody stands behind a disk that hangs
+        else if (!residency->first_in_line)
             residency->first_in_line = hold;
         hold->releases = residency->releases;
+        hold->hanging = spl_io_count_hanging(residency->io);
         start_wait(hold, residency, resident);
         return SPL_SLOT_PENDING;
     }
@@ -123,10 +127,12 @@ int spl_hold_poll(struct spl_hold *hold, struct spl_error *err)
         if (rc)
             return rc < 0 ? rc : SPL_OK;
         begin_reads(hold);
-    } else if (hold->residency->releases != hold->releases) {
+    } else if (hold->stalled ? !spl_io_hangs(hold->residency->io, hold->dataset)
+                             : hold->residency->releases != hold->releases ||
+                                   spl_io_count_hanging(hold->residency->io) != hold->hanging) {
         return SPL_OK;
     }
-    uint64_t moved_ns = spl_io_get_moved_ns(hold->residency->io); // its own, and those of others that go before
+    uint64_t moved_ns = spl_io_get_moved_ns(hold->residency->io, hold->dataset);
     if (spl_now_ns() - (moved_ns > hold->since_ns ? moved_ns : hold->since_ns) < patience_ns)
         return SPL_SLOT_PENDING;
     return spl_fail(err, SPL_E_TIMEOUT, "no page has come for %d s", (int)(patience_ns / SPL_NS_PER_S));

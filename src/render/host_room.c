@@ -11,8 +11,8 @@ static uint64_t evict_one(struct spl_residency *residency, struct spl_resident_d
     struct spl_resident_page *first = NULL;
     for (uint32_t s = resident->device_slots; s < resident->slot_count; s++) {
         struct spl_resident_page *page = &resident->pages[s];
-        if (page->host_bytes && page->last_frame < residency->frame && (evict_held || !page->holds) &&
-            (!first || spl_resident_gives_way_before(page, first)))
+        if (page->host_bytes && page->last_frame < residency->frame && (evict_held || !spl_resident_is_kept(resident, page)) &&
+            (!first || spl_resident_gives_way_before(resident, page, resident, first)))
             first = page;
     }
     spl_assert(first);
@@ -31,7 +31,7 @@ int spl_residency_take_host_room(struct spl_residency *residency, struct spl_res
         const struct spl_resident_page *page = &resident->pages[s];
         used += page->host_bytes;
         if (page->last_frame < residency->frame)
-            *(evict_held || !page->holds ? &gives_way : &held) += page->host_bytes;
+            *(evict_held || !spl_resident_is_kept(resident, page) ? &gives_way : &held) += page->host_bytes;
     }
     if (used - gives_way + bytes > limit && used - gives_way - held + bytes <= limit)
         return SPL_SLOT_CROWDED;

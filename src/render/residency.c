@@ -12,6 +12,7 @@
 #include "render/slot.h"
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
+static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
 enum {
     failures_max = 16, // that are remembered where nobody waits: each takes a read's place
@@ -122,7 +123,10 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->frame++;
     residency->asker = asker;
     residency->asked_count = 0;
-    residency->pending = residency->crowded = false;
+    residency->pending = residency->crowded = residency->stalled = false;
+    bool any = spl_io_count_hanging(residency->io);
+    for (size_t i = 0; i < residency->dataset_count; i++)
+        residency->datasets[i].hangs = any && spl_io_hangs(residency->io, residency->datasets[i].dataset);
 }
 
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
@@ -160,6 +164,13 @@ static int take_room(struct spl_residency *residency, struct spl_resident_datase
                                           : spl_residency_take_device_room(residency, resident, slot, alone, err);
 }
 
+/* Is an error the latest word on a slot? It is for who waits with it already, and for a while for who takes what is there and
+ * would never hear of it; whoever comes to wait has it read anew. */
+static bool is_told(const struct spl_resident_page *page, bool awaited)
+{
+    return page->holds || (!awaited && spl_now_ns() - page->read->ended_ns < errors_last_ns);
+}
+
 /* Why its read failed. It is forgotten with the last frame that waits for it; where none does, once for all that failed of
  * the dataset. */
 static int tell_failure(struct spl_residency *residency, struct spl_resident_dataset *resident,
@@ -179,10 +190,17 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     struct spl_resident_page *page = &resident->pages[slot];
     bool first = page->last_frame < residency->frame;
     page->last_frame = residency->frame;
-    if (page->failed)
+    if (page->failed && is_told(page, awaited))
         return tell_failure(residency, resident, page, err);
+    if (page->failed)
+        spl_residency_drop_slot(residency, page);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
+    if (resident->hangs && !spl_resident_has_room(page)) {
+        residency->crowded |= awaited;
+        residency->stalled |= awaited;
+        return awaited ? SPL_SLOT_CROWDED : SPL_SLOT_PENDING;
+    }
     int rc = spl_resident_has_room(page) ? SPL_OK : take_room(residency, resident, slot, err);
     if (rc) {
         residency->crowded |= awaited && rc == SPL_SLOT_CROWDED;

@@ -104,14 +104,15 @@ static void every_wait_ends_with_what_fits(void **state)
 {
     (void)state;
     static uint32_t first[slots_max], again[slots_max];
-    int limited = 0;
+    int limited = 0, paged = 0;
     for (int round = 0; round < rounds; round++) {
         if (round % 30 == 0) {
             random_state = (uint64_t)round;
             make_tree_file(path, points, 3000u << round / 30);
         }
         random_state = (uint64_t)round * 77 + 1;
-        const struct spl_dataset_opening how = {.tables_bytes = round % 2 ? UINT64_MAX : (uint64_t)(400000 * uniform())};
+        const struct spl_dataset_opening how = {
+            .tables_bytes = round % 2 ? UINT64_MAX : (uint64_t)(60000 * uniform() * uniform())};
         struct spl_dataset *dataset;
         struct spl_error err = {0};
         if (spl_dataset_open_as(path, &how, &dataset, &err))
@@ -122,6 +123,7 @@ static void every_wait_ends_with_what_fits(void **state)
             all += spl_dataset_get_page_bytes(dataset, page);
         assert_in_range(pages, 10, slots_max / 2);
         bool software = round % 3, has_room;
+        paged += !spl_dataset_keeps_all(dataset);
         uint64_t limit = (uint64_t)((double)all * uniform() * uniform()) + 20000;
         struct spl_view view = looking(), other = looking();
         struct spl_renderer renderer;
@@ -137,6 +139,7 @@ static void every_wait_ends_with_what_fits(void **state)
         spl_dataset_close(dataset);
     }
     assert_in_range(limited, rounds / 4, rounds);
+    assert_in_range(paged, rounds / 4, rounds / 2);
 }
 
 int main(void)
