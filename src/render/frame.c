@@ -100,6 +100,7 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
     if (waits)
         return waits;
     job->frame->stats.complete &= complete;
+    job->frame->stats.pending |= job->renderer->residency.later;
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
@@ -255,6 +256,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     stats->chunks_drawn += r->list.chunk_count;
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;
+    stats->pending |= r->residency.later;
     stats->tiles++;
     return SPL_OK;
 }

@@ -123,7 +123,7 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->frame++;
     residency->asker = asker;
     residency->asked_count = 0;
-    residency->pending = residency->crowded = residency->stalled = false;
+    residency->pending = residency->crowded = residency->stalled = residency->later = false;
     bool any = spl_io_count_hanging(residency->io);
     for (size_t i = 0; i < residency->dataset_count; i++)
         residency->datasets[i].hangs = any && spl_io_hangs(residency->io, residency->datasets[i].dataset);
@@ -184,8 +184,8 @@ static int tell_failure(struct spl_residency *residency, struct spl_resident_dat
     return rc;
 }
 
-int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                      bool awaited, struct spl_error *err)
+static int ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot, bool awaited,
+               struct spl_error *err)
 {
     struct spl_resident_page *page = &resident->pages[slot];
     bool first = page->last_frame < residency->frame;
@@ -215,6 +215,14 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     if (!spl_residency_begin_read(residency, resident->dataset, page, slot, rank) && !awaited && !page->holds)
         spl_residency_drop_slot(residency, page); // its room is for those who wait
     return SPL_SLOT_PENDING;
+}
+
+int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                      bool awaited, struct spl_error *err)
+{
+    int answer = ask(residency, resident, slot, awaited, err);
+    residency->later |= !awaited && (answer == SPL_SLOT_PENDING || answer == SPL_SLOT_CROWDED);
+    return answer;
 }
 
 /* Copies what was read to where kernels see it. */

@@ -92,6 +92,7 @@ struct spl_residency {
     size_t asked_count, asked_capacity;
     bool pending, crowded;   /* some of them are on their way; have no room before another frame lets go */
     bool stalled;            /* crowded, since their disk hangs */
+    bool later;              /* some that it does without are on their way, or will have room */
 };
 
 /* `wake` as spl_io_create(). */

@@ -215,16 +215,16 @@ static void a_partial_frame_draws_what_is_there(void **state)
     view.partial = true;
     atomic_store(&may_pass, 1); // the first page, which is waited for
     render(renderer, large, &view, &frame);
-    assert_true(!frame.stats.complete && frame.stats.splats_drawn > 0);
+    assert_true(!frame.stats.complete && frame.stats.pending && frame.stats.splats_drawn > 0);
     assert_true(look(renderer, NULL).pages_pending >= 2);
     render(renderer, large, &view, &again);
-    assert_false(again.stats.complete);
+    assert_true(!again.stats.complete && again.stats.pending);
     assert_same(&again, &frame);
     spl_frame_finish(&frame);
     atomic_store(&may_pass, open_gate);
     settle(renderer); // what it asked for is read on
     render(renderer, large, &view, &frame);
-    assert_true(frame.stats.complete);
+    assert_true(frame.stats.complete && !frame.stats.pending);
     assert_same(&frame, &expected);
     spl_frame_finish(&expected);
     spl_renderer_destroy(renderer);
@@ -638,9 +638,22 @@ static void what_has_no_room_depends_on_the_view_alone(void **state)
             atomic_store(&may_pass, open_gate);
         }
         render(renderer, large, &view, &frame); // takes what the one that waits has, if it must
-        assert_false(frame.stats.complete);
+        assert_true(!frame.stats.complete && !frame.stats.pending);
         assert_int_equal(frame.stats.splats_drawn, first.stats.splats_drawn);
         assert_same(&frame, &first);
+        if (way == 1) { // who asks until nothing is pending gets the same, and comes to an end
+            render(renderer, large, &aside, &frame);
+            view.partial = true;
+            for (int asked = 0; !asked || frame.stats.pending; asked++) {
+                spl_frame_finish(&frame);
+                settle(renderer);
+                render(renderer, large, &view, &frame);
+                assert_in_range(asked, 0, 4);
+            }
+            view.partial = false;
+            assert_false(frame.stats.complete);
+            assert_same(&frame, &first);
+        }
         assert_true(look(renderer, NULL).taken_bytes <= limit);
         if (way == 3) {
             finish_steps(renderer, steps, &frame);
