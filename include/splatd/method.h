@@ -95,7 +95,7 @@ struct spl_method_param_info {
     const char *(*choice_name)(int choice); /* CHOICE, as the next; choices are 0 … most */
     int (*choice_from_name)(const char *name);
 };
-SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static */
+SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static; NULL for none */
 SPL_API int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
 /* Is `value` within the parameter's range? SPL_E_USAGE names it. */
 SPL_API int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);
@@ -110,8 +110,9 @@ struct spl_method_info {
     enum spl_method stand_in;
     bool finds_normals;           /* also where a dataset has none */
 };
-SPL_API const struct spl_method_info *spl_method_get(enum spl_method method);
+SPL_API const struct spl_method_info *spl_method_get(enum spl_method method); /* NULL for none */
 
+/* What is no method has no textures, normals and parameters, and nothing stands in for it. */
 SPL_API const char *spl_method_name(enum spl_method method); /* "unknown" for none */
 SPL_API int spl_method_from_name(const char *name);          /* -1 for an unknown name */
 SPL_API const char *spl_method_names(void);                  /* "splat, points, …"; static */

@@ -34,7 +34,7 @@ struct spl_view {
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
-/* Fills everything but the camera with defaults: the first method, color, lod 1, supersample 1, opaque black, and each
+/* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1, supersample 1, opaque black, and each
  * method's parameters as their table says. */
 SPL_API void spl_view_init_sized(struct spl_view *view, size_t size);
 static inline void spl_view_init(struct spl_view *view)

@@ -78,7 +78,9 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     }
     for (uint32_t s = 0; s < r->stream_count; s++) {
         total += r->streams[s].bits;
-        fprintf(stderr, " %s %.2f,", r->streams[s].name, (double)r->streams[s].bits / 8 / splats);
+        fputc(' ', stderr);
+        spl_cmd_put_text(stderr, r->streams[s].name, 0);
+        fprintf(stderr, " %.2f,", (double)r->streams[s].bits / 8 / splats);
     }
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
@@ -106,7 +108,9 @@ static void say_trained(void *context, uint32_t epoch, double seconds, double ps
 static void say_warning(void *context, const char *text)
 {
     spl_cmd_progress_finish(context);
-    fprintf(stderr, "splatd: warning: %s\n", text);
+    fprintf(stderr, "splatd: warning: ");
+    spl_cmd_put_text(stderr, text, 0);
+    fputc('\n', stderr);
 }
 
 static void name_refused(void *context, const struct spl_error *why)

@@ -1,5 +1,5 @@
-/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
- * on the opener's thread, the rest on any. */
+/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not
+ * know keeps its place among the others and has no values. Opening on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
 #include <math.h>
@@ -9,10 +9,13 @@
 #include "dataset/chunk.h"
 #include "dataset/open.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *what)
+/* `index` and `member` say which stream is at fault, and what of it; `value` may be NULL. */
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, size_t index, const char *member,
+                 const char *value, const char *what)
 {
-    return spl_fail_field(err, SPL_E_CORRUPT, "streams", "%s: section META: \"streams\" %s; pack the dataset again",
-                          dataset->name, what);
+    return spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                          "%s: section META: \"streams[%zu]%s\" %s%.60s%s %s; pack the dataset again", dataset->name, index,
+                          member, value ? "is \"" : "is", value ? value : "", value ? "\", and" : "", what);
 }
 
 /* A text of META for a stream; false where it is none, or too long. NULL or null: optional, and "". */
@@ -27,28 +30,48 @@ static bool take_text(const json_t *json, bool optional, char out[SPL_STREAM_TEX
     return length > 0 || optional;
 }
 
+static int read_stream(struct spl_dataset *dataset, size_t s, const json_t *row, struct spl_error *err)
+{
+    struct spl_stream_info *all = dataset->info.streams, *stream = &all[s];
+    const struct {
+        const char *key, *member;
+        bool optional;
+        char *out;
+    } texts[] = {{"name", ".name", false, stream->name},
+                 {"type", ".type", false, stream->type},
+                 {"unit", ".unit", true, stream->unit}};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        const json_t *text = json_object_get(row, texts[i].key);
+        if (!take_text(text, texts[i].optional, texts[i].out))
+            return wrong(dataset, err, s, texts[i].member, json_string_value(text),
+                         texts[i].optional ? "must be a text of at most 31 bytes, or null"
+                                           : "must be a text of 1 to 31 bytes");
+    }
+    if (spl_stream_name_is_taken(stream->name))
+        return wrong(dataset, err, s, ".name", stream->name, "must be another: this is what every dataset has");
+    for (size_t other = 0; other < s; other++)
+        if (!strcmp(all[other].name, stream->name))
+            return wrong(dataset, err, s, ".name", stream->name, "must be another: a stream before it has this name");
+    dataset->streams[s] = (struct spl_stream){.name = stream->name, .type = stream->type, .unit = stream->unit};
+    dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
+    return SPL_OK;
+}
+
 int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     const json_t *streams = json_object_get(dataset->meta, "streams");
-    if (streams && !json_is_array(streams))
-        return wrong(dataset, err, "must be an array");
-    if (json_array_size(streams) > SPL_STREAMS_MAX)
-        return wrong(dataset, err, "are more than 16");
-    for (size_t s = 0; s < json_array_size(streams); s++) {
-        const json_t *row = json_array_get(streams, s);
-        struct spl_stream_info *stream = &info->streams[s];
-        if (!take_text(json_object_get(row, "name"), false, stream->name) ||
-            !take_text(json_object_get(row, "type"), false, stream->type) ||
-            !take_text(json_object_get(row, "unit"), true, stream->unit))
-            return wrong(dataset, err, "must say \"name\", \"type\" and \"unit\" of each, in at most 31 bytes");
-        for (size_t other = 0; other < s; other++)
-            if (!strcmp(info->streams[other].name, stream->name))
-                return wrong(dataset, err, "has two of one name");
-        dataset->streams[s] = (struct spl_stream){.name = stream->name, .type = stream->type, .unit = stream->unit};
-        dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
+    size_t count = json_array_size(streams);
+    if ((streams && !json_is_array(streams)) || count > SPL_STREAMS_MAX)
+        return spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                              "%s: section META: \"streams\" must be an array of at most %d; pack the dataset again",
+                              dataset->name, SPL_STREAMS_MAX);
+    for (size_t s = 0; s < count; s++) {
+        int rc = read_stream(dataset, s, json_array_get(streams, s), err);
+        if (rc)
+            return rc;
     }
-    info->stream_count = (uint32_t)json_array_size(streams);
+    info->stream_count = (uint32_t)count;
     info->has_class = spl_dataset_find_stream(dataset, "class") >= 0;
     info->has_uncertainty = spl_dataset_find_stream(dataset, "uncertainty") >= 0;
     return SPL_OK;
@@ -100,7 +123,7 @@ bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint6
     if (stream < 0)
         return false;
     struct spl_place place = spl_dataset_find_place(dataset, id);
-    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices of lines have no attributes
+    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices have no attributes
                  read_value(dataset, &place, (uint32_t)stream, id, value);
     spl_place_finish(&place);
     return found;

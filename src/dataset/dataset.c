@@ -39,9 +39,17 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+static int check_path(const char *path, struct spl_error *err)
+{
+    return path ? SPL_OK
+                : spl_fail_field(err, SPL_E_USAGE, "path", "a dataset needs a path, or with a reader a name");
+}
+
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    return spl_dataset_open_until(path, verify, NULL, out, err);
+    *out = NULL;
+    int rc = check_path(path, err);
+    return rc ? rc : spl_dataset_open_until(path, verify, NULL, out, err);
 }
 
 int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
@@ -49,12 +57,17 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
 {
     struct spl_open_options known = {0};
     *out = NULL;
-    int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    int rc = check_path(path, err);
     if (rc)
         return rc;
-    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    if (rc)
+        return rc;
+    const struct spl_dataset_opening how = {.verify = known.verify,
+                                            .tables_bytes = known.tables_bytes ? known.tables_bytes : SPL_TABLES_BYTES,
+                                            .cancelled = spl_cancel_get_flag(known.cancel)};
     if (!known.reader)
-        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+        return spl_dataset_open_as(path, &how, out, err);
     struct spl_reader reader = {0};
     if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
         return rc;
@@ -62,7 +75,7 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
         return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
     const struct spl_dataset_source source = {
         .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
-    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
+    return spl_dataset_open_source_as(&source, path, &how, out, err);
 }
 
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
@@ -296,5 +309,5 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_CHUNK] = "chunk",
         [SPL_ATTRIBUTE_TEXTURE] = "texture",   [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
-    return names[attribute];
+    return (unsigned)attribute < SPL_ATTRIBUTE_COUNT ? names[attribute] : "unknown";
 }

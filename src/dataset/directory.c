@@ -13,8 +13,8 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, uint3
                     what);
 }
 
-/* What is wrong with the row of a page, whose head has `bytes` bytes, against the next one; NULL = nothing. Every product
- * is of numbers that such a head bounds. */
+/* What is wrong with the row of a page, whose head has `bytes` bytes, against the next one; NULL = nothing. Every
+ * product is of numbers that such a head bounds. */
 static const char *judge_row(const struct spl_dataset *dataset, const struct spl_page_row *row, uint64_t bytes)
 {
     const struct spl_page_row *next = row + 1;
@@ -24,10 +24,10 @@ static const char *judge_row(const struct spl_dataset *dataset, const struct spl
     if (nodes > bytes / SPL_NODE_BYTES || chunks > bytes / SPL_CHUNK_BYTES ||
         bytes != spl_head_bytes(nodes, chunks, dataset->info.stream_count, dataset->textures))
         return "has another number of nodes or chunks than its head has room for";
-    if (next->first_id < row->first_id || next->first_id - row->first_id < chunks ||
-        next->first_id - row->first_id > chunks * SPL_CHUNK_SPLATS)
+    uint64_t ids = next->first_id - row->first_id, children = next->first_child - row->first_child;
+    if (ids < chunks || ids > chunks * SPL_CHUNK_SPLATS) /* which a row that falls has by far */
         return "has more or fewer splats than its chunks can have";
-    if (next->first_child < row->first_child || next->first_child - row->first_child > 8 * nodes)
+    if (children > 8 * nodes)
         return "has more or fewer children than its nodes can have";
     return NULL;
 }
@@ -47,6 +47,11 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
     }
     if (last->first_child != last->first_node)
         return wrong(dataset, err, info->pages, "closes it with nodes that are no node's child, or with too few nodes");
+    if (info->splats > last->first_id || info->pieces > last->first_id)
+        return spl_fail_field(err, SPL_E_CORRUPT, "counts",
+                              "%s: section META: \"counts\" has more splats or pieces than PDIR has ids; pack the dataset "
+                              "again",
+                              dataset->name);
     dataset->rows = rows;
     info->nodes = last->first_node;
     info->chunks = last->first_chunk;

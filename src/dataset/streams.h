@@ -4,6 +4,7 @@
 #ifndef SPL_DATASET_STREAMS_H
 #define SPL_DATASET_STREAMS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -40,6 +41,10 @@ enum { SPL_STREAM_CHUNK_BYTES = 5 };
 /* The attributes that we know. */
 enum { SPL_STREAM_CLASS, SPL_STREAM_UNCERTAINTY, SPL_STREAM_KNOWN_COUNT };
 extern const struct spl_stream spl_streams_known[SPL_STREAM_KNOWN_COUNT];
+
+/* Is it the name of what every dataset has, or of what is said beside the streams (their total, the parts that widths are
+ * counted of)? No stream may have it: the figures of both stand in one object of 'splatd info --json'. */
+bool spl_stream_name_is_taken(const char *name);
 
 /* Largest number of words of one stream of a chunk. */
 enum { SPL_STREAM_WORDS_MAX = SPL_CHUNK_SPLATS };

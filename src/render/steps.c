@@ -51,10 +51,11 @@ static int check_image(const struct spl_image *image, const struct spl_view *vie
         return spl_fail_field(err, SPL_E_USAGE, "images", "the image of layer %s has another type or size than the view",
                               spl_layer_name(image->layer));
     if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
-        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type))
+        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type) ||
+        image->row_bytes > SIZE_MAX / 2 / image->height)
         return spl_fail_field(err, SPL_E_USAGE, "images",
                               "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, or "
-                              "rows that overlap",
+                              "rows that overlap or do not fit into memory",
                               spl_layer_name(image->layer), unit);
     return SPL_OK;
 }
@@ -62,6 +63,9 @@ static int check_image(const struct spl_image *image, const struct spl_view *vie
 static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
                          struct spl_error *err)
 {
+    if (options->image_count && !options->images)
+        return spl_fail_field(err, SPL_E_USAGE, "images", "there are %zu images, but images is NULL",
+                              options->image_count);
     for (size_t i = 0; i < options->image_count; i++) {
         const struct spl_image *image = &options->images[i];
         int rc = check_image(image, &steps->wanted, err);

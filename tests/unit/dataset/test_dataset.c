@@ -411,6 +411,23 @@ static void test_splats_by_id(void **state)
     free(splats);
 }
 
+static void test_no_path(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0}, other = {0};
+    struct spl_open_options options;
+    struct spl_reader reader;
+    spl_reader_init(&reader);
+    spl_open_options_init(&options);
+    options.reader = &reader;
+    assert_int_equal(spl_dataset_open(NULL, true, &dataset, &err), SPL_E_USAGE);
+    assert_int_equal(spl_dataset_open_with(NULL, &options, &dataset, &other), SPL_E_USAGE);
+    assert_string_equal(err.field, "path");
+    assert_string_equal(other.field, "path");
+    assert_null(dataset);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -419,6 +436,7 @@ int main(void)
         cmocka_unit_test(test_every_truncation),
         cmocka_unit_test(test_other_files),
         cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_no_path),
         cmocka_unit_test(test_splats_by_id),
         cmocka_unit_test(test_version_follows_content),
         cmocka_unit_test(test_refused_memory),

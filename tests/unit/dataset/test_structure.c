@@ -153,6 +153,8 @@ FORGE(two_of_a_name, add_stream(p, "class", "uint", ""))
 FORGE(empty_name, add_stream(p, "", "uint", ""))
 FORGE(long_name, add_stream(p, "a-name-of-thirty-two-characters-", "uint", ""))
 FORGE(long_unit, add_stream(p, "a", "uint", "a-unit-of-thirty-two-characters-"))
+FORGE(taken_name, add_stream(p, "position", "uint", ""))
+FORGE(total_name, add_stream(p, "total", "uint", ""))
 FORGE(uncertainty_negative, p->bases[1][0] = 0xbf800000)
 FORGE(uncertainty_wide, p->widths[1][0] = 6)
 FORGE(unit_text, json_object_set_new(p->meta, "unit", json_string("km")))
@@ -181,6 +183,7 @@ FORGE(bounds_short, json_array_remove(json_object_get(json_object_get(p->meta, "
 FORGE(fov, json_object_set_new(json_object_get(p->meta, "default_view"), "fov", json_real(180)))
 FORGE(eye, json_object_set(json_object_get(p->meta, "default_view"), "eye",
                            json_object_get(json_object_get(p->meta, "default_view"), "target")))
+FORGE(up, json_array_set_new(json_object_get(json_object_get(p->meta, "default_view"), "up"), 1, json_string("north")))
 FORGE(flags, json_object_del(json_object_get(p->meta, "attributes"), "color"))
 FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
 FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
@@ -230,16 +233,18 @@ static const struct {
     {wide_class, "section HEAD 0: attribute class of chunk 0 has codes of more than 32 bits"},
     {class_past_page, "reaches beyond the end of its page"},
     {no_streams, NULL},
-    {two_of_a_name, "section META: \"streams\" has two of one name"},
-    {empty_name, "section META: \"streams\" must say \"name\""},
-    {long_name, "section META: \"streams\" must say \"name\""},
-    {long_unit, "section META: \"streams\" must say \"name\""},
+    {two_of_a_name, "section META: \"streams[2].name\" is \"class\", and must be another: a stream"},
+    {empty_name, "section META: \"streams[2].name\" is \"\", and must be a text of 1"},
+    {long_name, "section META: \"streams[2].name\" is \"a-name-of"},
+    {long_unit, "section META: \"streams[2].unit\" is \"a-unit-of-thirty-two-characters-\", and must be a text of at most"},
+    {taken_name, "section META: \"streams[2].name\" is \"position\", and must be another: this is what every"},
+    {total_name, "section META: \"streams[2].name\" is \"total\", and"},
     {uncertainty_negative, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative"},
     {uncertainty_wide, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative or not finite, or codes"},
-    {unit_text, "section META: \"unit\" must be m, ft"},
-    {unit_number, "section META: \"unit\" must be m, ft"},
+    {unit_text, "section META: \"unit\" is \"km\", and must be m, ft"},
+    {unit_number, "section META: \"unit\" is 1, and must be m, ft"},
     {unit_gone, NULL},
-    {crs_number, "section META: \"crs\" must be a text"},
+    {crs_number, "section META: \"crs\" is 2056, and must be a text"},
     {crs_null, NULL},
     {many_lines, "section HEAD 0: chunk 0 has more clip lines than splats"},
     {lines_past_page, "reaches beyond the end of its page"},
@@ -250,23 +255,24 @@ static const struct {
     {word_wraps, "section HEAD 0: chunk 0 reaches beyond"},
     {levels, "section META: \"levels\" is not what the nodes"},
     {levels_few, "section HEAD 0: node 1 lies deeper than META's"},
-    {levels_many, "section META: \"levels\" is absurd"},
+    {levels_many, "section META: \"levels\" is 257, and must be a whole number from 1 to 256"},
     {leaf_splats, "section META: \"leaf_splats\" is not what the nodes"},
-    {points_few, "section META: \"leaf_splats\" is larger"},
-    {points_text, "section META: \"points\" must be"},
-    {points_gone, "section META: \"points\" must be"},
-    {radius_gone, "section META: \"splat_radius\" must be"},
-    {bounds_turned, "section META: \"bounds\" has a minimum"},
-    {bounds_short, "section META: \"bounds\" must hold"},
-    {fov, "section META: \"default_view\" has no \"fov\""},
-    {eye, "section META: \"default_view\" is no view"},
-    {flags, "section META: \"attributes\" must say"},
-    {sources, "section META: \"sources\" must be"},
-    {stations, "section META: \"stations\" must hold"},
+    {points_few, "section META: \"leaf_splats\" is 400, and must be at most \"points\""},
+    {points_text, "section META: \"points\" is \"400\", and must be a whole number"},
+    {points_gone, "section META: \"points\" is missing, and must be"},
+    {radius_gone, "section META: \"splat_radius\" is missing, and must be"},
+    {bounds_turned, "section META: \"bounds.min[0]\" is 1000000000.0, and must be at most that of"},
+    {bounds_short, "section META: \"bounds.max\" is an array of 2, and must be an array of three"},
+    {fov, "section META: \"default_view.fov\" is 180.0, and must be"},
+    {up, "section META: \"default_view.up[1]\" is \"north\", and must be a coordinate"},
+    {eye, "section META: \"default_view\" is no view: "},
+    {flags, "section META: \"attributes.color\" is missing, and must be true"},
+    {sources, "section META: \"sources[0]\" is 1, and must be a name"},
+    {stations, "section META: \"stations[0]\" is an array of 1, and must be a matrix"},
     {color, NULL},
-    {color_text, "section META: \"color\" must be an array"},
-    {color_few, "section META: \"color\" must say of each \"source\""},
-    {color_what, "section META: \"color\" is \"from\" rgb"},
+    {color_text, "section META: \"color\" is \"rgb\", and must be an array"},
+    {color_few, "section META: \"color[0].points\" is -1, and must be"},
+    {color_what, "section META: \"color[0].from\" is \"xyz\", and must be rgb"},
 };
 
 static void test_forged_content(void **state)
@@ -407,7 +413,8 @@ FORGE_RAW(raw_chunks_many, set_chunks(r, 4, 4097))
 FORGE_RAW(raw_unknown_kind, (r->data[r->table[HEAD].offset + 5 * SPL_NODE_BYTES + SPL_CHUNK_BYTES - 1] = SPL_CHUNK_KINDS,
                              rehash(r, HEAD)))
 FORGE_RAW(raw_head_damaged, r->data[r->table[HEAD].offset] ^= 1)
-FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
+FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 449"))
+FORGE_RAW(raw_splats_many, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
 FORGE_RAW(raw_splats_few, set_meta(r, "\"splats\": 450", "\"splats\": 399"))
 FORGE_RAW(raw_splats_negative, set_meta(r, "\"splats\": 450", "\"splats\": -1"))
 FORGE_RAW(raw_pieces, set_meta(r, "\"pieces\": 0", "\"pieces\": 1"))
@@ -479,13 +486,14 @@ static const struct {
     {raw_unknown_kind, SPL_E_CORRUPT, "section HEAD 0: chunk 0 is of a kind"},
     {raw_head_damaged, SPL_E_CORRUPT, "section HEAD 0 fails its checksum; copy"},
     {raw_splats, SPL_E_CORRUPT, "section META: \"counts\" is not what the nodes and chunks hold"},
-    {raw_splats_few, SPL_E_CORRUPT, "section META: \"counts\" has fewer \"splats\""},
-    {raw_splats_negative, SPL_E_CORRUPT, "section META: \"counts\" must say"},
+    {raw_splats_many, SPL_E_CORRUPT, "section META: \"counts\" has more splats or pieces than PDIR"},
+    {raw_splats_few, SPL_E_CORRUPT, "section META: \"counts.splats\" is "},
+    {raw_splats_negative, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_pieces, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
     {raw_linear, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
-    {raw_no_bits, SPL_E_CORRUPT, "section META: \"counts\" must say"},
-    {raw_stream_bits, SPL_E_CORRUPT, "section META: \"counts\" must say"},
-    {raw_fewer_streams, SPL_E_CORRUPT, "section META: \"counts\" must say"},
+    {raw_no_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_stream_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_fewer_streams, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_meta_array, SPL_E_CORRUPT, "section META is no JSON object; pack"},
     {raw_meta_cut, SPL_E_CORRUPT, "section META is no JSON object: "},
     {raw_no_page, SPL_E_CORRUPT, "section table lists no section PAGE"},

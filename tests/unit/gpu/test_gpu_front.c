@@ -42,6 +42,8 @@ static void memory_is_accounted_before_it_is_taken(void **state)
     assert_null(c);
     assert_non_null(strstr(err.message, "64 bytes"));
     assert_non_null(strstr(err.message, "4048 of 4096"));
+    assert_non_null(strstr(err.message, "a readback buffer"));
+    assert_non_null(strstr(err.message, "at least 4112, say 1M"));
     assert_int_equal(fake.buffers, 2);
     spl_gpu_buffer_destroy(&gpu, a);
     assert_int_equal(spl_gpu_get_memory(&gpu), 2000);
