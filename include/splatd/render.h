@@ -68,6 +68,8 @@ struct spl_frame_stats {
                                    spl_view.partial demanded */
     double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
                                    the device has timestamps, else host times */
+    bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the memory
+                                   limit has no room for it */
 };
 
 struct spl_frame {

@@ -22,7 +22,7 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
-    bool awaited = !job->view->partial || slot == SPL_FIRST_SLOT;
+    bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
@@ -100,6 +100,7 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
     if (waits)
         return waits;
     job->frame->stats.complete &= complete;
+    job->frame->stats.pending |= job->renderer->residency.later;
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
@@ -255,6 +256,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     stats->chunks_drawn += r->list.chunk_count;
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;
+    stats->pending |= r->residency.later;
     stats->tiles++;
     return SPL_OK;
 }

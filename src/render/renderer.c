@@ -122,7 +122,7 @@ static int preload_patiently(struct spl_renderer *renderer, const struct spl_dat
     uint32_t before = *page;
     struct spl_io *io = renderer->residency.io;
     int rc = preload(renderer, dataset, asker, page, more, err);
-    uint64_t moved_ns = spl_io_get_moved_ns(io);
+    uint64_t moved_ns = spl_io_get_moved_ns(io, dataset);
     if (rc || !*more || *page != before || !spl_io_count(io) || spl_now_ns() - moved_ns < patience_ns)
         return rc;
     *more = false;

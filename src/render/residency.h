@@ -1,9 +1,13 @@
 /* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
  * evicted, least recently drawn first, when the device's memory limit refuses another.
  *
- * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
- * has no room depends on what the walk asks for, and not on what has come by then. A frame that waits holds what it
- * asked for (hold.h). Bookkeeping of the renderer's thread. */
+ * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read; for one
+ * that has no room nothing is evicted. So what has no room depends on what the walk asks for, and not on what has come by
+ * then, and a walk that is made again finds what it has waited for. A frame that waits holds what it asked for (hold.h).
+ *
+ * A disk that has not answered for a second (io.h) costs its own dataset's views only: what it is to bring gives way before all
+ * else, held or not, and whatever else is asked of it takes no room until it answers; the read goes on, unwanted.
+ * Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
@@ -34,19 +38,30 @@ static inline bool spl_resident_has_room(const struct spl_resident_page *page)
     return page->buffer || page->host_bytes;
 }
 
-/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
-static inline bool spl_resident_gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
-{
-    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
-}
-
 /* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
     uint32_t page_count, slot_count;
     uint32_t device_slots;              /* those before tables */
+    bool hangs;                         /* its disk does, as the walk under way began */
 };
+
+/* Does a frame that waits keep it? Not what a disk that hangs is to bring. */
+static inline bool spl_resident_is_kept(const struct spl_resident_dataset *resident, const struct spl_resident_page *page)
+{
+    return page->holds && (page->filled || !resident->hangs);
+}
+
+/* What gives way first: the least of what a disk that hangs is to bring, what nobody keeps, the rest; then the one that was
+ * asked for longest ago. */
+static inline bool spl_resident_gives_way_before(const struct spl_resident_dataset *of_a, const struct spl_resident_page *a,
+                                                 const struct spl_resident_dataset *of_b, const struct spl_resident_page *b)
+{
+    int worth_a = (a->filled || !of_a->hangs) + spl_resident_is_kept(of_a, a);
+    int worth_b = (b->filled || !of_b->hangs) + spl_resident_is_kept(of_b, b);
+    return worth_a != worth_b ? worth_a < worth_b : a->last_frame < b->last_frame;
+}
 
 static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)
 {
@@ -76,6 +91,8 @@ struct spl_residency {
     uint32_t *asked;         /* slots that it waits for or draws, in its order; room for those of any dataset */
     size_t asked_count, asked_capacity;
     bool pending, crowded;   /* some of them are on their way; have no room before another frame lets go */
+    bool stalled;            /* crowded, since their disk hangs */
+    bool later;              /* some that it does without are on their way, or will have room */
 };
 
 /* `wake` as spl_io_create(). */
@@ -115,7 +132,7 @@ uint64_t spl_residency_get_reserve(const struct spl_residency *residency);
 enum spl_slot_answer {
     SPL_SLOT_READY,   /* it is there */
     SPL_SLOT_PENDING, /* it has its room and is on its way */
-    SPL_SLOT_CROWDED, /* its room is held by frames that wait; later */
+    SPL_SLOT_CROWDED, /* its room is held by frames that wait, or its disk hangs; later */
 };
 
 /* Asks for a slot of `resident` in the walk under way; `awaited`: the walk is good for nothing without it, its frame
@@ -128,8 +145,15 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
 
-/* host_room.c: counts a slot of tables in, evicting others of the dataset, those of frames that wait where `evict_held`.
- * SPL_SLOT_CROWDED, SPL_E_LIMIT. */
+/* device_room.c: makes a slot's buffer, evicting others, those of frames that wait where `evict_held`; none where that would
+ * not do. SPL_SLOT_CROWDED, SPL_E_LIMIT, SPL_E_NOMEM. */
+int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                   bool evict_held, struct spl_error *err);
+
+/* The same of what uploads go through; what it takes is never given back. */
+int spl_residency_grow_staging(struct spl_residency *residency, size_t bytes, struct spl_error *err);
+
+/* host_room.c: the same for a slot of tables, which is counted in, among those of the dataset. */
 int spl_residency_take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
                                  bool evict_held, struct spl_error *err);
 

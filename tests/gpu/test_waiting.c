@@ -25,14 +25,15 @@ enum { few = 6000, many = 4000000, width = 96, height = 64, open_gate = 1 << 30 
 
 static const char *device;
 static atomic_int may_pass = open_gate, fault; /* reads that go through; what one of those to come answers: errno, -1 = 0 bytes */
-static atomic_int reads, wakes, jumped_s;
+static atomic_int reads, wakes, jumped_s, last_fd = -1, hanging_fd = -1; /* of reads: the last; that hang until it is another */
 static struct spl_dataset *large, *one, *other;
 
 /* In place of the C library's. */
 __attribute__((visibility("default"))) ssize_t pread(int fd, void *out, size_t bytes, off_t offset)
 {
+    atomic_store(&last_fd, fd);
     atomic_fetch_add(&reads, 1);
-    while (atomic_load(&may_pass) <= 0)
+    while (atomic_load(&may_pass) <= 0 || atomic_load(&hanging_fd) == fd)
         usleep(500);
     if (atomic_load(&may_pass) < open_gate)
         atomic_fetch_sub(&may_pass, 1);
@@ -214,16 +215,16 @@ static void a_partial_frame_draws_what_is_there(void **state)
     view.partial = true;
     atomic_store(&may_pass, 1); // the first page, which is waited for
     render(renderer, large, &view, &frame);
-    assert_true(!frame.stats.complete && frame.stats.splats_drawn > 0);
+    assert_true(!frame.stats.complete && frame.stats.pending && frame.stats.splats_drawn > 0);
     assert_true(look(renderer, NULL).pages_pending >= 2);
     render(renderer, large, &view, &again);
-    assert_false(again.stats.complete);
+    assert_true(!again.stats.complete && again.stats.pending);
     assert_same(&again, &frame);
     spl_frame_finish(&frame);
     atomic_store(&may_pass, open_gate);
     settle(renderer); // what it asked for is read on
     render(renderer, large, &view, &frame);
-    assert_true(frame.stats.complete);
+    assert_true(frame.stats.complete && !frame.stats.pending);
     assert_same(&frame, &expected);
     spl_frame_finish(&expected);
     spl_renderer_destroy(renderer);
@@ -292,20 +293,21 @@ static void a_read_that_hangs_costs_its_frame_only(void **state)
     spl_renderer_destroy(renderer);
 }
 
-/* Ten seconds without any page end a wait; those that come for others do not count against it. */
+/* Ten seconds without any page of its dataset end a wait, whoever they came for. */
 static void a_slow_disk_is_no_dead_one(void **state)
 {
     (void)state;
-    struct spl_view view = looking();
+    struct spl_view view = looking(), aside = view;
     struct spl_renderer *renderer = open_with(0, large, one);
     struct spl_frame_steps *first, *second;
+    aside.lod = 0.01;
     struct spl_error err = {0};
     bool more;
     assert_true(spl_dataset_get_info(large)->pages >= 3);
     atomic_store(&may_pass, 0);
     assert_int_equal(spl_frame_begin(renderer, large, &view, &first, NULL), SPL_OK);
     assert_int_equal(spl_frame_step(first, SPL_NEVER, &more, NULL), SPL_OK);
-    assert_int_equal(spl_frame_begin(renderer, one, &view, &second, NULL), SPL_OK);
+    assert_int_equal(spl_frame_begin(renderer, large, &aside, &second, NULL), SPL_OK);
     assert_int_equal(spl_frame_step(second, SPL_NEVER, &more, NULL), SPL_OK);
     for (int i = 0; i < 2; i++) { // pages of the first frame go before
         int before = atomic_load(&wakes);
@@ -322,12 +324,99 @@ static void a_slow_disk_is_no_dead_one(void **state)
     assert_int_equal(spl_frame_step(second, SPL_NEVER, &more, &err), SPL_E_TIMEOUT);
     assert_int_equal(spl_frame_step(first, SPL_NEVER, &more, NULL), SPL_E_TIMEOUT);
     uint32_t page = 0;
+    assert_int_equal(spl_renderer_preload_page(renderer, one, &page, &more, NULL), SPL_OK); // has just begun
+    atomic_fetch_add(&jumped_s, 11);
     assert_int_equal(spl_renderer_preload_page(renderer, one, &page, &more, NULL), SPL_E_TIMEOUT);
     assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_E_TIMEOUT);
     spl_frame_end(first, NULL);
     spl_frame_end(second, NULL);
     atomic_store(&may_pass, open_gate);
     spl_renderer_destroy(renderer);
+}
+
+/* A disk that does not answer for a second costs its own views only: others have the room back that it was to fill. */
+static void a_disk_that_hangs_costs_its_own_views_only(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_frame expected[2] = {alone(one, &view), alone(other, &view)}, frame;
+    struct spl_renderer *renderer = open_with(0, one, other);
+    uint64_t bare = look(renderer, NULL).taken_bytes;
+    assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
+    uint64_t needed = look(renderer, NULL).taken_bytes - bare;
+    spl_renderer_destroy(renderer);
+    for (int partial = 0; partial < 2; partial++) {
+        struct spl_frame_steps *hanging, *steps;
+        bool more;
+        renderer = open_with(bare + needed + needed / 4, one, other);
+        assert_int_equal(spl_renderer_preload(renderer, one, NULL), SPL_OK);
+        int before = atomic_load(&reads);
+        atomic_store(&may_pass, 0);
+        assert_int_equal(spl_frame_begin(renderer, other, &view, &hanging, NULL), SPL_OK);
+        assert_int_equal(spl_frame_step(hanging, SPL_NEVER, &more, NULL), SPL_OK);
+        while (atomic_load(&reads) == before)
+            usleep(500);
+        atomic_store(&hanging_fd, atomic_load(&last_fd));
+        atomic_store(&may_pass, open_gate);
+        view.partial = partial;
+        assert_int_equal(spl_frame_begin(renderer, one, &view, &steps, NULL), SPL_OK);
+        view.partial = false;
+        assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+        assert_true(spl_frame_is_waiting(hanging) && spl_frame_is_waiting(steps)); // the page may still come
+        atomic_fetch_add(&jumped_s, 2);
+        finish_steps(renderer, steps, &frame);
+        assert_true(frame.stats.complete);
+        assert_same(&frame, &expected[0]);
+        assert_int_equal(look(renderer, other).bytes, 0);
+        for (int i = 0; i < 3; i++) { // takes no room from others meanwhile
+            assert_int_equal(spl_frame_step(hanging, SPL_NEVER, &more, NULL), SPL_OK);
+            assert_true(more && spl_frame_is_waiting(hanging));
+            assert_int_not_equal(look(renderer, one).bytes, 0);
+        }
+        assert_true(look(renderer, NULL).pages_evicted <= 1);
+        atomic_store(&hanging_fd, -1);
+        finish_steps(renderer, hanging, &frame);
+        assert_true(frame.stats.complete);
+        assert_same(&frame, &expected[1]);
+        spl_renderer_destroy(renderer);
+    }
+    for (int i = 0; i < 2; i++)
+        spl_frame_finish(&expected[i]);
+}
+
+/* An error is told to those who asked while it was the latest word. */
+static void an_error_that_has_passed_is_not_told(void **state)
+{
+    (void)state;
+    struct spl_view view = looking();
+    struct spl_frame expected = alone(large, &view), frame;
+    for (int way = 0; way < 3; way++) { // who waits; who takes what is there, at once, and later
+        struct spl_renderer *renderer = open_with(0, large, NULL);
+        struct spl_error err = {0};
+        view.partial = true;
+        atomic_store(&may_pass, 1);
+        render(renderer, large, &view, &frame);
+        spl_frame_finish(&frame);
+        atomic_store(&fault, EIO);
+        atomic_store(&may_pass, open_gate);
+        settle(renderer);
+        atomic_store(&fault, 0);
+        if (way == 0) {
+            view.partial = false;
+            render(renderer, large, &view, &frame);
+            assert_same(&frame, &expected);
+        } else if (way == 1) {
+            assert_int_equal(spl_renderer_render(renderer, large, &view, &frame, &err), SPL_E_IO);
+        } else {
+            atomic_fetch_add(&jumped_s, 2);
+            render(renderer, large, &view, &frame);
+            assert_false(frame.stats.complete);
+            spl_frame_finish(&frame);
+        }
+        settle(renderer);
+        spl_renderer_destroy(renderer);
+    }
+    spl_frame_finish(&expected);
 }
 
 /* However many pages have been read meanwhile, a tile of somebody else's waits for some of them only. */
@@ -549,9 +638,22 @@ static void what_has_no_room_depends_on_the_view_alone(void **state)
             atomic_store(&may_pass, open_gate);
         }
         render(renderer, large, &view, &frame); // takes what the one that waits has, if it must
-        assert_false(frame.stats.complete);
+        assert_true(!frame.stats.complete && !frame.stats.pending);
         assert_int_equal(frame.stats.splats_drawn, first.stats.splats_drawn);
         assert_same(&frame, &first);
+        if (way == 1) { // who asks until nothing is pending gets the same, and comes to an end
+            render(renderer, large, &aside, &frame);
+            view.partial = true;
+            for (int asked = 0; !asked || frame.stats.pending; asked++) {
+                spl_frame_finish(&frame);
+                settle(renderer);
+                render(renderer, large, &view, &frame);
+                assert_in_range(asked, 0, 4);
+            }
+            view.partial = false;
+            assert_false(frame.stats.complete);
+            assert_same(&frame, &first);
+        }
         assert_true(look(renderer, NULL).taken_bytes <= limit);
         if (way == 3) {
             finish_steps(renderer, steps, &frame);
@@ -593,6 +695,7 @@ static int reset(void **state)
     (void)state;
     atomic_store(&fault, 0);
     atomic_store(&may_pass, open_gate);
+    atomic_store(&hanging_fd, -1);
     return 0;
 }
 
@@ -612,6 +715,8 @@ int main(void)
         cmocka_unit_test_setup(a_read_that_fails_fails_its_frames_until_it_is_well_again, reset),
         cmocka_unit_test_setup(a_read_that_hangs_costs_its_frame_only, reset),
         cmocka_unit_test_setup(a_slow_disk_is_no_dead_one, reset),
+        cmocka_unit_test_setup(a_disk_that_hangs_costs_its_own_views_only, reset),
+        cmocka_unit_test_setup(an_error_that_has_passed_is_not_told, reset),
         cmocka_unit_test_setup(pages_are_put_on_the_device_some_at_a_time, reset),
         cmocka_unit_test_setup(frames_that_wait_hold_no_images, reset),
         cmocka_unit_test_setup(what_cannot_be_drawn_is_refused_at_once, reset),

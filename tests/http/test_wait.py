@@ -99,12 +99,13 @@ def test_what_is_there_now():
         replies = [d.ask(f"{view}&wait=0"), d.ask(f"{view}&wait=0"), d.post(body, "/v1/datasets/a/view")]
         for reply in replies:
             assert reply.status == 200 and reply.headers["Splatd-Complete"] == "false", reply.headers
+            assert reply.headers["Splatd-Pending"] == "true"
             assert reply.headers["Splatd-Cache"] == "miss"
             assert reply.headers["Cache-Control"] == "no-store" and "ETag" not in reply.headers
         late = d.ask(view)
         assert late.status == 503 and late.json()["type"].endswith(":timeout"), late.body
         reads.allow_all()
-        eventually(lambda: d.ask(f"{view}&wait=0").headers["Splatd-Complete"] == "true")
+        eventually(lambda: d.ask(f"{view}&wait=0").headers["Splatd-Pending"] == "false")
         whole = d.ask(f"{view}&wait=0")
         waited = d.ask(view)
         assert waited.headers["Splatd-Cache"] == whole.headers["Splatd-Cache"] == "hit"

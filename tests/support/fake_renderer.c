@@ -165,6 +165,7 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
             fill(&steps->frame.images[layer], (enum spl_layer)layer, &steps->view, err))
             return SPL_E_NOMEM;
     steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
+    steps->frame.stats.pending = !steps->frame.stats.complete;
     return 0;
 }
 

@@ -1,4 +1,4 @@
-/* The io thread: order, bounds, reads that nobody wants any more, failures, and an end while a read hangs. */
+/* The io threads: order, bounds, reads that nobody wants any more, failures, and an end while a read hangs. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -324,14 +324,69 @@ static void it_says_when_anything_moved(void **state)
     uint64_t before = spl_now_ns();
     begin(io, files, 0, 8, true, 1);
     await_asked(files, 1);
-    uint64_t begun = spl_io_get_moved_ns(io);
+    uint64_t begun = spl_io_get_moved_ns(io, files);
     assert_in_range(begun, before, spl_now_ns());
     usleep(2000);
-    assert_int_equal(spl_io_get_moved_ns(io), begun); // it hangs
+    assert_int_equal(spl_io_get_moved_ns(io, files), begun); // it hangs
     let_pass(files, 1, false);
     spl_io_end(io, take(io));
-    assert_in_range(spl_io_get_moved_ns(io), begun + 2000000, spl_now_ns());
+    assert_in_range(spl_io_get_moved_ns(io, files), begun + 2000000, spl_now_ns());
     spl_io_destroy(io);
+}
+
+/* As many files at once as there are threads, each read by one of them. */
+static void a_file_that_hangs_holds_up_no_other(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    for (uint32_t i = 0; i < SPL_IO_READS; i++)
+        assert_non_null(begin(io, &files[0], i, 8, true, 1));
+    assert_null(begin(io, &files[0], 0, 8, true, 1)); // it has all the places of one file
+    await_asked(&files[0], 1);
+    let_pass(&files[1], 0, true);
+    for (uint32_t i = 0; i < 10; i++) {
+        assert_non_null(begin(io, &files[1], i, 8, false, 1));
+        struct spl_io_read *read = take(io);
+        assert_ptr_equal(read->what.owner, &files[1]);
+        assert_int_equal(read->what.index, i);
+        spl_io_end(io, read);
+    }
+    assert_int_equal(get_asked(&files[0]), 1);
+    assert_false(spl_io_hangs(io, &files[1]));
+    while (!spl_io_hangs(io, &files[0]))
+        usleep(10000);
+    assert_int_equal(spl_io_count_hanging(io), 1);
+    let_pass(&files[0], 0, true);
+    for (uint32_t i = 0; i < SPL_IO_READS; i++) {
+        struct spl_io_read *read = take(io);
+        assert_int_equal(read->what.index, i);
+        spl_io_end(io, read);
+    }
+    assert_int_equal(spl_io_count_hanging(io), 0);
+    spl_io_destroy(io);
+}
+
+/* Each is left with its thread, in any order. */
+static void reads_that_hang_are_left_behind_together(void **state)
+{
+    (void)state;
+    for (int first = 0; first < 2; first++) {
+        struct spl_io *io = start();
+        for (int i = 0; i < 2; i++) {
+            begin(io, &files[i], 0, 8, true, 1);
+            begin(io, &files[i], 1, 8, true, 1);
+            await_asked(&files[i], 1);
+        }
+        spl_io_destroy(io);
+        for (int i = 0; i < 2; i++) {
+            struct file *file = &files[first ? !i : i];
+            assert_int_equal(get_holds(file), 1);
+            let_pass(file, 0, true);
+            await_let_go(file);
+            assert_int_equal(get_asked(file), 1);
+        }
+        assert_int_equal(atomic_load(&wakes), 0);
+    }
 }
 
 int main(void)
@@ -345,6 +400,8 @@ int main(void)
         cmocka_unit_test(a_read_that_hangs_is_left_behind),
         cmocka_unit_test(memory_serves_the_next_read),
         cmocka_unit_test(it_says_when_anything_moved),
+        cmocka_unit_test(a_file_that_hangs_holds_up_no_other),
+        cmocka_unit_test(reads_that_hang_are_left_behind_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

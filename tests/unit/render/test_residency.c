@@ -91,6 +91,7 @@ static void who_does_not_wait_leaves_what_others_hold(void **state)
 {
     (void)state;
     for (int held = 0; held < 2; held++) {
+        char sources[4];
         struct spl_io_what what = {.read = read_gated, .bytes = 8};
         struct spl_resident_page none = {0};
         struct spl_hold hold = {0};
@@ -98,8 +99,10 @@ static void who_does_not_wait_leaves_what_others_hold(void **state)
         start();
         atomic_store(&open_gate, false);
         what.owner = &none;
-        for (int i = 0; i < SPL_IO_READS; i++)
+        for (int i = 0; i < 4 * SPL_IO_READS; i++) {
+            what.source = &sources[i / SPL_IO_READS];
             assert_non_null(spl_io_try_begin(residency.io, &what, (struct spl_io_rank){.awaited = true}));
+        }
         if (held) {
             spl_residency_begin_walk(&residency, &hold);
             assert_int_equal(spl_residency_ask(&residency, get(small), 0, true, NULL), SPL_SLOT_PENDING);
