@@ -70,7 +70,8 @@ struct spl_dataset_info {
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
- * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
+ * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the
+ * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the caller owns *out. Blocks on disk. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 
 /* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
@@ -96,6 +97,7 @@ struct spl_open_options {
     bool verify;                     /* as of spl_dataset_open() */
     const struct spl_cancel *cancel; // may be NULL; borrowed until close: ends whatever takes long with the dataset
     const struct spl_reader *reader; // NULL = the file at `path`; the struct itself is read while opening only
+    uint64_t tables_bytes;           /* what tables may take; 0 = 64 MiB */
 };
 
 static inline void spl_open_options_init(struct spl_open_options *options)

@@ -63,9 +63,11 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
     if (rc)
         return rc;
-    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    const struct spl_dataset_opening how = {.verify = known.verify,
+                                            .tables_bytes = known.tables_bytes ? known.tables_bytes : SPL_TABLES_BYTES,
+                                            .cancelled = spl_cancel_get_flag(known.cancel)};
     if (!known.reader)
-        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+        return spl_dataset_open_as(path, &how, out, err);
     struct spl_reader reader = {0};
     if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
         return rc;
@@ -73,7 +75,7 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
         return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
     const struct spl_dataset_source source = {
         .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
-    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
+    return spl_dataset_open_source_as(&source, path, &how, out, err);
 }
 
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,

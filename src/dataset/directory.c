@@ -24,10 +24,10 @@ static const char *judge_row(const struct spl_dataset *dataset, const struct spl
     if (nodes > bytes / SPL_NODE_BYTES || chunks > bytes / SPL_CHUNK_BYTES ||
         bytes != spl_head_bytes(nodes, chunks, dataset->info.stream_count, dataset->textures))
         return "has another number of nodes or chunks than its head has room for";
-    if (next->first_id < row->first_id || next->first_id - row->first_id < chunks ||
-        next->first_id - row->first_id > chunks * SPL_CHUNK_SPLATS)
+    uint64_t ids = next->first_id - row->first_id, children = next->first_child - row->first_child;
+    if (ids < chunks || ids > chunks * SPL_CHUNK_SPLATS) /* which a row that falls has by far */
         return "has more or fewer splats than its chunks can have";
-    if (next->first_child < row->first_child || next->first_child - row->first_child > 8 * nodes)
+    if (children > 8 * nodes)
         return "has more or fewer children than its nodes can have";
     return NULL;
 }

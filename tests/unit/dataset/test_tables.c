@@ -95,6 +95,14 @@ static void all_are_kept_where_they_fit(void **state)
         assert_true(spl_dataset_get_tables_limit(dataset) == bytes - (uint64_t)less);
         spl_dataset_close(dataset);
     }
+    struct spl_open_options options;
+    spl_open_options_init(&options);
+    for (uint64_t most = 0; most < 2; most++) { // 0 = as many as usual
+        options.tables_bytes = most;
+        assert_int_equal(spl_dataset_open_with(path, &options, &dataset, NULL), SPL_OK);
+        assert_int_equal(spl_dataset_keeps_all(dataset), !most);
+        spl_dataset_close(dataset);
+    }
 }
 
 static void splats_are_found_by_id(void **state)
