@@ -146,6 +146,9 @@ static void test_texts_of_files_are_shown_not_carried_out(void **state)
     assert_null(strstr(output, "\302\233"));
     assert_int_equal(run("\"$(printf 'none\\033[2J\\nforged.spld')\" 2>&1", output, sizeof output), 2);
     assert_non_null(strstr(output, "none?[2J?forged.spld"));
+    assert_int_equal(run(">/dev/null 2>&1; seq 300 | sed 's/.*/& & 1/' >a.xyz; \"$SPLATD_BINARY\" pack a.xyz -o gone/a.spld 2>&1; "
+                         "rm a.xyz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "cannot create gone/a.spld: there is no folder 'gone/'"));
 }
 
 static void test_exit_codes(void **state)
