@@ -1,5 +1,5 @@
-/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
- * on the opener's thread, the rest on any. */
+/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not
+ * know keeps its place among the others and has no values. Opening on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
 #include <math.h>
@@ -123,7 +123,7 @@ bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint6
     if (stream < 0)
         return false;
     struct spl_place place = spl_dataset_find_place(dataset, id);
-    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices of lines have no attributes
+    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices have no attributes
                  read_value(dataset, &place, (uint32_t)stream, id, value);
     spl_place_finish(&place);
     return found;

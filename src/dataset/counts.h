@@ -1,5 +1,5 @@
-/* What a dataset has altogether, added up page by page: the writer puts it into META, so that opening need not read every
- * page's tables to know it; whoever does read them all holds it against them. Pure functions; any thread. */
+/* What a dataset has altogether, added up page by page: the writer puts it into META, so that opening need not read
+ * every page's tables to know it; whoever does read them all holds it against them. Pure functions; any thread. */
 #ifndef SPL_DATASET_COUNTS_H
 #define SPL_DATASET_COUNTS_H
 

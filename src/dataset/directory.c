@@ -13,8 +13,8 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, uint3
                     what);
 }
 
-/* What is wrong with the row of a page, whose head has `bytes` bytes, against the next one; NULL = nothing. Every product
- * is of numbers that such a head bounds. */
+/* What is wrong with the row of a page, whose head has `bytes` bytes, against the next one; NULL = nothing. Every
+ * product is of numbers that such a head bounds. */
 static const char *judge_row(const struct spl_dataset *dataset, const struct spl_page_row *row, uint64_t bytes)
 {
     const struct spl_page_row *next = row + 1;
@@ -47,6 +47,11 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
     }
     if (last->first_child != last->first_node)
         return wrong(dataset, err, info->pages, "closes it with nodes that are no node's child, or with too few nodes");
+    if (info->splats > last->first_id || info->pieces > last->first_id)
+        return spl_fail_field(err, SPL_E_CORRUPT, "counts",
+                              "%s: section META: \"counts\" has more splats or pieces than PDIR has ids; pack the dataset "
+                              "again",
+                              dataset->name);
     dataset->rows = rows;
     info->nodes = last->first_node;
     info->chunks = last->first_chunk;

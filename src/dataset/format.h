@@ -30,10 +30,10 @@ struct spl_file_header { /* at offset 0 */
 };
 
 #define SPL_FOURCC(a, b, c, d) ((uint32_t)(a) | (uint32_t)(b) << 8 | (uint32_t)(c) << 16 | (uint32_t)(d) << 24)
-#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')   /* JSON: sources, counts, statistics, default view */
+#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')      /* JSON: sources, counts, statistics, default view */
 #define SPL_SECTION_DIRECTORY SPL_FOURCC('P', 'D', 'I', 'R') /* struct spl_page_row[pages + 1] */
-#define SPL_SECTION_HEAD SPL_FOURCC('H', 'E', 'A', 'D')   /* what a page holds, see below; `index` is the page's number */
-#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
+#define SPL_SECTION_HEAD SPL_FOURCC('H', 'E', 'A', 'D')      /* what a page holds, see below; `index` is the page's */
+#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')      /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
 #define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')    /* struct spl_atoms_header, cosine coefficients */
 #define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's */
@@ -45,12 +45,12 @@ struct spl_section {
     uint64_t hash; /* XXH3-64 of the section's bytes */
 };
 
-/* Where a page's share of nodes (which lie breadth first, node 0 is the root), chunks and splats begins; the row behind
- * the last page's closes it. A page has those from its row's on to the next one's.
+/* Where a page's share of nodes (which lie breadth first, node 0 is the root), chunks and splats begins; the row
+ * behind the last page's closes it. A page has those from its row's on to the next one's.
  *
- * HEAD has, back to back: the first SPL_NODE_BYTES of each struct spl_node of the page; the first SPL_CHUNK_BYTES of each
- * struct spl_chunk; with textures a uint32_t of each chunk (SPL_CHUNK_TEXTURE_*, 0 = none); of each optional attribute a
- * uint32_t of each chunk, its base; of each attribute a uint8_t of each chunk, its width. */
+ * HEAD has, back to back: the first SPL_NODE_BYTES of each struct spl_node of the page; the first SPL_CHUNK_BYTES of
+ * each struct spl_chunk; with textures a uint32_t of each chunk (SPL_CHUNK_TEXTURE_*, 0 = none); of each optional
+ * attribute a uint32_t of each chunk, its base; of each attribute a uint8_t of each chunk, its width. */
 struct spl_page_row {
     uint64_t first_node, first_chunk;
     uint64_t first_id;    /* of splats and vertices of lines */

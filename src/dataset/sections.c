@@ -2,7 +2,8 @@
  * kind of section how many there may be, how large they are, whether they are kept in memory and what checks their
  * content. Every size and offset is compared with the source's real length before it is used; sums cannot wrap because
  * each term is bounded by it. Checksums of what is kept are always checked, the pages' when asked for, on all cores;
- * those of heads by who reads them (tables.c). What is checked is the copy in memory that is used afterwards; pages are read in passing. The opener's thread. */
+ * those of heads by who reads them (tables.c). What is checked is the copy in memory that is used afterwards; pages
+ * are read in passing. The opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -76,7 +76,8 @@ struct reader {
     char *block; /* room for some nodes or chunks, which are longer in memory */
 };
 
-enum { block_items = 4096, block_bytes = block_items * (SPL_NODE_BYTES > SPL_CHUNK_BYTES ? SPL_NODE_BYTES : SPL_CHUNK_BYTES) };
+enum { block_items = 4096, block_bytes = block_items * SPL_CHUNK_BYTES };
+_Static_assert(SPL_NODE_BYTES <= SPL_CHUNK_BYTES, "nodes fit the block, too");
 
 static int take(struct reader *reader, void *out, size_t bytes, struct spl_error *err)
 {

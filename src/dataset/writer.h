@@ -20,8 +20,8 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
 void spl_dataset_writer_set_page_bytes(struct spl_dataset_writer *writer, size_t bytes);
 
 /* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new
- * page when the node, or what describes it, does not fit the current one; sets *page, and adds the node's place in the page to each
- * chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
+ * page when the node, or what describes it, does not fit the current one; sets *page, and adds the node's place in the
+ * page to each chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
 int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
                                 struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err);
 

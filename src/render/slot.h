@@ -1,5 +1,6 @@
-/* What a dataset has to be read, in slots: its pages; where it has textures, as many of their codes by page, and one of
- * the dictionary; where it does not keep all tables, those by page, which stay on the host. Pure but for reading; any thread. */
+/* What of a dataset is read for frames, in slots: its pages; where it has textures, as many of their codes by page, and one of
+ * the dictionary; where it does not keep all tables, those by page, which stay on the host. Pure but for reading;
+ * any thread. */
 #ifndef SPL_RENDER_SLOT_H
 #define SPL_RENDER_SLOT_H
 

@@ -413,7 +413,8 @@ FORGE_RAW(raw_chunks_many, set_chunks(r, 4, 4097))
 FORGE_RAW(raw_unknown_kind, (r->data[r->table[HEAD].offset + 5 * SPL_NODE_BYTES + SPL_CHUNK_BYTES - 1] = SPL_CHUNK_KINDS,
                              rehash(r, HEAD)))
 FORGE_RAW(raw_head_damaged, r->data[r->table[HEAD].offset] ^= 1)
-FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
+FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 449"))
+FORGE_RAW(raw_splats_many, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
 FORGE_RAW(raw_splats_few, set_meta(r, "\"splats\": 450", "\"splats\": 399"))
 FORGE_RAW(raw_splats_negative, set_meta(r, "\"splats\": 450", "\"splats\": -1"))
 FORGE_RAW(raw_pieces, set_meta(r, "\"pieces\": 0", "\"pieces\": 1"))
@@ -485,6 +486,7 @@ static const struct {
     {raw_unknown_kind, SPL_E_CORRUPT, "section HEAD 0: chunk 0 is of a kind"},
     {raw_head_damaged, SPL_E_CORRUPT, "section HEAD 0 fails its checksum; copy"},
     {raw_splats, SPL_E_CORRUPT, "section META: \"counts\" is not what the nodes and chunks hold"},
+    {raw_splats_many, SPL_E_CORRUPT, "section META: \"counts\" has more splats or pieces than PDIR"},
     {raw_splats_few, SPL_E_CORRUPT, "section META: \"counts.splats\" is "},
     {raw_splats_negative, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_pieces, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
