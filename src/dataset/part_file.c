@@ -53,8 +53,8 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
         if (file->fd < 0) {
             const char *slash = strrchr(path, '/');
             if (errno == ENOENT && slash)
-                rc = spl_fail(err, SPL_E_IO, "cannot create %s: there is no folder '%.*s'", path, (int)(slash - path) + 1,
-                              path);
+                rc = spl_fail(err, SPL_E_IO, "cannot create %s: there is no folder '%.*s'", path,
+                              (int)(slash - path) + 1, path);
             else
                 rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
             goto failed;
