@@ -83,15 +83,16 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
     const struct text *text = cloud->state;
     const char *lacks = spl_column_name(spl_layout_lacks(&text->layout));
     enum { shown = 100 };
-    return spl_source_fail_line(&cloud->source, cloud->source.line, lacks, err,
-                                "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
-                                "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
-                                "with --columns%s",
-                                length < shown ? (int)length : shown, line, length < shown ? "" : "…",
-                                spl_text_names_degrees(line, length)
-                                    ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
-                                      "first"
-                                    : "");
+    return spl_source_fail_line(
+        &cloud->source, cloud->source.line, lacks, err,
+        "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
+        "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
+        "with --columns%s",
+        length < shown ? (int)length : shown, line, length < shown ? "" : "…",
+        spl_text_names_degrees(line, length)
+            ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
+              "first"
+            : "");
 }
 
 /* Everything before the numbers: comments, names, a count. On success `line` is the first line of numbers. */

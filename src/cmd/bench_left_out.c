@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/text.h"
 #include "cmd/bench.h"
 #include "cmd/cmd.h"
 #include "cmd/output.h"
@@ -52,7 +53,9 @@ static void print_width(const char *name, const char *width, const struct spl_le
         all += sums->pixels[i];
     if (!sums->pixels[w])
         return;
-    printf("%-12.12s %-9s %6.1f", name, width, 100 * (double)sums->pixels[w] / (double)all);
+    char shown[13];
+    printf("%-12s %-9s %6.1f", spl_text_show(name, shown, sizeof shown), width,
+           100 * (double)sums->pixels[w] / (double)all);
     for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++) {
         double colored = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_COLORED, step);
         double textured = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_TEXTURED, step);

@@ -24,7 +24,9 @@ static void show_epoch(void *context, const char *what, const struct spl_train_p
 static void show_photograph(void *context, const char *photograph)
 {
     (void)context;
-    fprintf(stderr, "photograph %s onto the splats\n", photograph);
+    fprintf(stderr, "photograph ");
+    spl_cmd_put_text(stderr, photograph, 0); // as a list of poses names it
+    fprintf(stderr, " onto the splats\n");
 }
 
 static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)

@@ -201,7 +201,8 @@ static void print_table(const struct spl_info_report *report)
     printf("\n  bits that the scene needed (share of the splats)\n");
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
         printf("  ");
-        spl_cmd_put_text(stdout, k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name, 22);
+        spl_cmd_put_text(stdout, k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name,
+                         22);
         for (int width = 0; width <= SPL_INFO_WIDTH_MAX; width++)
             if (report->widths[k][width] > 0)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);

@@ -14,8 +14,9 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, size_
                  const char *value, const char *what)
 {
     return spl_fail_field(err, SPL_E_CORRUPT, "streams",
-                          "%s: section META: \"streams[%zu]%s\" %s%.60s%s %s; pack the dataset again", dataset->name, index,
-                          member, value ? "is \"" : "is", value ? value : "", value ? "\", and" : "", what);
+                          "%s: section META: \"streams[%zu]%s\" %s%.60s%s %s; pack the dataset again", dataset->name,
+                          index, member, value ? "is \"" : "is no text", value ? value : "",
+                          value ? "\", and" : ", and", what);
 }
 
 /* A text of META for a stream; false where it is none, or too long. NULL or null: optional, and "". */

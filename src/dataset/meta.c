@@ -22,7 +22,8 @@ static const char *show_shape(const json_t *value, char text[40])
     return text;
 }
 
-/* `what` is what is allowed: "FILE: section META: "KEY" is VALUE, and must be WHAT". `path` is the key's, from the top. */
+/* `what` is what is allowed: "FILE: section META: "KEY" is VALUE, and must be WHAT". `path` is the key's, from the top.
+ */
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *path, const json_t *value,
                  const char *what)
 {
@@ -30,8 +31,9 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const
     const char *shown = show_shape(value, shape);
     if (json_is_string(value) || json_is_number(value))
         shown = text = json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(17));
-    int rc = spl_fail_field(err, SPL_E_CORRUPT, path, "%s: section META: \"%s\" is %.60s, and must be %s; pack the dataset again",
-                            dataset->name, path, shown ? shown : shape, what);
+    int rc = spl_fail_field(err, SPL_E_CORRUPT, path,
+                            "%s: section META: \"%s\" is %.60s, and must be %s; pack the dataset again", dataset->name,
+                            path, shown ? shown : shape, what);
     free(text);
     return rc;
 }
@@ -81,9 +83,10 @@ static int get_bounds(struct spl_dataset *dataset, struct spl_error *err)
         rc = get_vector(dataset, "bounds", "max", info->bounds_max, err);
     for (int a = 0; !rc && a < 3; a++)
         if (info->bounds_min[a] > info->bounds_max[a])
-            rc = wrong_entry(dataset, err, "bounds.min", (size_t)a, NULL,
-                             json_array_get(json_object_get(json_object_get(dataset->meta, "bounds"), "min"), (size_t)a),
-                             "at most that of \"bounds.max\"");
+            rc =
+                wrong_entry(dataset, err, "bounds.min", (size_t)a, NULL,
+                            json_array_get(json_object_get(json_object_get(dataset->meta, "bounds"), "min"), (size_t)a),
+                            "at most that of \"bounds.max\"");
     return rc;
 }
 
@@ -105,8 +108,9 @@ static int get_view(struct spl_dataset *dataset, struct spl_error *err)
     struct spl_camera camera = {0};
     struct spl_error why = {0};
     if (spl_camera_look_at(&camera, info->default_eye, info->default_target, info->default_up, &why))
-        return spl_fail_field(err, SPL_E_CORRUPT, key, "%s: section META: \"%s\" is no view: %s; pack the dataset again",
-                              dataset->name, key, why.message);
+        return spl_fail_field(err, SPL_E_CORRUPT, key,
+                              "%s: section META: \"%s\" is no view: %s; pack the dataset again", dataset->name, key,
+                              why.message);
     return SPL_OK;
 }
 
@@ -198,9 +202,10 @@ static int get_counts(struct spl_dataset *dataset, struct spl_error *err)
     struct spl_counts *counts = &dataset->counts;
     const json_t *json = json_object_get(dataset->meta, "counts");
     if (!spl_counts_from_json(json, info->stream_count, counts))
-        return wrong(dataset, err, "counts", json,
-                     "an object that says how many \"splats\", \"pieces\" and \"linear_chunks\" there are, and \"bits\" and "
-                     "\"stream_bits\" of each attribute");
+        return wrong(
+            dataset, err, "counts", json,
+            "an object that says how many \"splats\", \"pieces\" and \"linear_chunks\" there are, and \"bits\" and "
+            "\"stream_bits\" of each attribute");
     if (counts->splats < info->leaf_splats)
         return wrong(dataset, err, "counts.splats", json_object_get(json, "splats"), "at least \"leaf_splats\"");
     counts->leaf_splats = info->leaf_splats;

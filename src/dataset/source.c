@@ -107,7 +107,9 @@ int spl_dataset_source_read(const struct spl_dataset_source *source, const char 
                             "; put the dataset back under another name and rename it",
                             name, offset);
         if ((uint64_t)got > bytes)
-            return spl_fail(err, SPL_E_IO, "cannot read %s, %zu bytes from offset %" PRIu64 ": its reader returned more bytes than it was asked for",
+            return spl_fail(err, SPL_E_IO,
+                            "cannot read %s, %zu bytes from offset %" PRIu64
+                            ": its reader returned more bytes than it was asked for",
                             name, bytes, offset);
         to += got;
         offset += (uint64_t)got;

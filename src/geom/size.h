@@ -1,5 +1,5 @@
-/* Sizes of images: of which one side, or both, are left out, and of one that is made larger or smaller; and from where on
- * is drawn. */
+/* Sizes of images: of which one side, or both, are left out, and of one that is made larger or smaller; and from where
+ * on is drawn. */
 #ifndef SPL_GEOM_SIZE_H
 #define SPL_GEOM_SIZE_H
 

@@ -149,7 +149,9 @@ static void compare_kinds(const struct saying *s)
     if (blank.count && s->scans->count > 1)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", list(&blank));
     if (s->scans->intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
-        say(s, "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours are %s",
+        say(s,
+            "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours "
+            "are %s",
             text);
     else if (kinds > 1 && s->scans->intensity) {
         struct group lack = {0};

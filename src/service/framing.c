@@ -2,8 +2,8 @@
  * client's request becomes the beginning of another's (RFC 9112, 5.2, 6.3 and 11.2). libmicrohttpd takes the first of
  * several lengths and a coding before a length, takes a name with a space in it for one it has never heard of, makes
  * one name of a name and the line that is folded behind it, cuts a value and each part of the first line at a NUL, and
- * takes a line that begins with a colon for the end of the headers. Such a request is refused once its headers are there, and the connection ends, so
- * that nothing behind them is read.
+ * takes a line that begins with a colon for the end of the headers. Such a request is refused once its headers are
+ * there, and the connection ends, so that nothing behind them is read.
  *
  * What cannot be done here, since libmicrohttpd acts before it asks: a single length that is no number gets its own
  * 400, an HTML page after two heads, and then the connection ends; a bare LF ends a line, also one that is a colon
@@ -145,7 +145,8 @@ bool spl_check_framing(struct request *request, const char *line, const char *ve
     // behind the last value: its line's end and an empty line; with another character a name of none was there
     if (!framing.fault[0] && framing.at && (framing.end > framing.at + 4 || !is_blank(framing.at, framing.end, ""))) {
         framing.field = "headers";
-        snprintf(framing.fault, sizeof framing.fault, "a line of the headers has no name, or the first one holds a NUL");
+        snprintf(framing.fault, sizeof framing.fault,
+                 "a line of the headers has no name, or the first one holds a NUL");
     }
     if (!framing.fault[0])
         judge(&framing, version);

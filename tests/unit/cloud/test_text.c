@@ -124,7 +124,8 @@ static void surveyors_names_are_coordinates(void **state)
 static void decimal_commas_are_named(void **state)
 {
     (void)state;
-    static const char *const texts[] = {"1,5;2,5;3,5\n", "x;y;z\n1;2;3\n1,5;2,5;3,5\n", "1,5 2,5 3,5\n", "x y z\n1,5 2,5 3,5\n"};
+    static const char *const texts[] = {"1,5;2,5;3,5\n", "x;y;z\n1;2;3\n1,5;2,5;3,5\n", "1,5 2,5 3,5\n",
+                                        "x y z\n1,5 2,5 3,5\n"};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         refused_text(texts[i], SPL_E_INPUT, i < 2 ? "x" : "y", "decimal commas are not read");
 }

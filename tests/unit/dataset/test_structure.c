@@ -422,6 +422,7 @@ FORGE_RAW(raw_linear, set_meta(r, "\"linear_chunks\": 0", "\"linear_chunks\": 1"
 FORGE_RAW(raw_no_bits, set_meta(r, "\"bits\"", "\"bots\""))
 FORGE_RAW(raw_stream_bits, set_meta(r, "\"stream_bits\"", "\"strom_bits\""))
 FORGE_RAW(raw_fewer_streams, set_meta(r, "\"streams\"", "\"strooms\""))
+FORGE_RAW(raw_stream_type, set_meta(r, "\"type\": \"uint\"", "\"type\": 7"))
 FORGE_RAW(raw_meta_array, (memcpy(r->data + r->table[1].offset, "[]", 2), r->table[1].bytes = 2,
                            r->table[1].hash = XXH3_64bits("[]", 2)))
 FORGE_RAW(raw_meta_cut, (r->table[1].bytes -= 1,
@@ -494,6 +495,7 @@ static const struct {
     {raw_no_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_stream_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_fewer_streams, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_stream_type, SPL_E_CORRUPT, "section META: \"streams[0].type\" is no text, and must be a text of 1 to 31"},
     {raw_meta_array, SPL_E_CORRUPT, "section META is no JSON object; pack"},
     {raw_meta_cut, SPL_E_CORRUPT, "section META is no JSON object: "},
     {raw_no_page, SPL_E_CORRUPT, "section table lists no section PAGE"},

@@ -52,8 +52,9 @@ static void test_a_camera_is_whole_with_a_lens_and_a_pose(void **state)
     struct spl_view view;
     spl_view_init(&view);
     assert_int_equal(spl_camera_set_fov(&view.camera, 60, 64, 36, NULL), SPL_OK);
-    assert_int_equal(spl_camera_look_at(&view.camera, (double[3]){1, 2, 3}, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, NULL),
-                     SPL_OK);
+    assert_int_equal(
+        spl_camera_look_at(&view.camera, (double[3]){1, 2, 3}, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, NULL),
+        SPL_OK);
     assert_int_equal(spl_view_check(&view, NULL), SPL_OK);
 }
 
