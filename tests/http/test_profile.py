@@ -81,20 +81,6 @@ def test_profile_is_served():
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
 
 
-def test_a_profile_that_is_made_meanwhile_is_found_where_it_is_asked_for():
-    """Nobody has planned a view: whoever asks for the profile, or the dataset, is told of it all the same."""
-    with serving(None) as (d, path):
-        assert d.ask(PROFILE).status == 404 and d.ask("/v1/datasets/wall").json()["profile"] is None
-        path.write_text(json.dumps(profile(VERSION)))
-        assert d.ask("/v1/datasets/wall").json()["profile"] == PROFILE and len(d.ask(PROFILE).json()["points"]) == 6
-        assert ask(d, psnr=28)[0] == ("splat", 2, 1)  # the planner is over it, though it was read by another
-        path.write_text("no profile")
-        reply = d.ask(PROFILE)
-        assert reply.status == 404 and str(path.parent) not in reply.json()["detail"], reply.body
-        path.unlink()
-        assert "has no profile" in d.ask(PROFILE).json()["detail"]
-
-
 def test_without_a_profile_the_choice_is_cautious():
     with serving(None) as (d, path):
         reply = d.ask(PROFILE)

@@ -1,8 +1,8 @@
 /* One dataset's plan.
  *
- * Invariant: a view is planned over the profile that copy_profile() gives out, or over the planner's own table where
- * there is none. The file is looked at whenever a view is planned or somebody asks for it, one stat() each, so that
- * 'splatd bench' need not restart the service; a file that was refused is not read again until it changes. What follows the frame is learned here as well,
+ * Invariant: the planner is over the profile that copy_profile() gives out, or over its own table where there is none.
+ * The file is looked at whenever a view is planned, one stat() each, so that 'splatd bench' need not restart the
+ * service; a file that was refused is not read again until it changes. What follows the frame is learned here as well,
  * since a budget ends with the reply: encoding and its queues, as milliseconds a megapixel by layer and format, and a
  * margin for their spread. */
 #include "service/view/plan.h"
@@ -28,12 +28,10 @@ static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
 struct spl_plan {
     char *path; /* of the profile */
     const struct spl_dataset_info *info;
-    struct spl_planner planner; // owned by: gpu
+    struct spl_device_info device; // owned by: gpu
+    struct spl_planner planner;    // owned by: gpu
+    struct stat seen;              // owned by: gpu; of the file that was read last, zero when there was none
     pthread_mutex_t mutex;
-    struct spl_device_info device;                      // guarded by: mutex; what renders
-    bool placed;                                        // guarded by: mutex; the device is known
-    bool unplanned;                                     // guarded by: mutex; the planner is not yet over the profile
-    struct stat seen;                                   // guarded by: mutex; of the file that was read last, zero: none
     struct spl_profile profile;                         // guarded by: mutex; count 0 = none
     struct spl_error refused;                           // guarded by: mutex; why not
     double encoding[SPL_LAYER_COUNT][SPL_FORMAT_COUNT]; // guarded by: mutex; ms a megapixel
@@ -98,25 +96,31 @@ static void hide_place(const struct spl_plan *plan, struct spl_error *err)
     memcpy(err->message, own.message, sizeof err->message);
 }
 
-/* Held: mutex. */
 static void read_profile(struct spl_plan *plan)
 {
     struct spl_profile profile;
+    struct spl_planner planner;
     struct spl_error err = {0};
     int rc = spl_profile_load(plan->path, plan->info, &plan->device, &profile, &err);
     if (rc && rc != SPL_E_NOT_FOUND)
         spl_log_warn("profile ignored: %s", err.message);
     if (rc)
         hide_place(plan, &err);
-    else
+    if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
+        spl_planner_finish(&plan->planner);
+        plan->planner = planner;
+    } else {
+        spl_profile_finish(&profile); // goes on with the planner that there is
+    }
+    if (profile.count)
         spl_log_info("dataset %s: profile of %zu settings", plan->info->id, profile.count);
+    pthread_mutex_lock(&plan->mutex);
     spl_profile_finish(&plan->profile);
     plan->profile = profile;
     plan->refused = err;
-    plan->unplanned = true;
+    pthread_mutex_unlock(&plan->mutex);
 }
 
-/* Held: mutex. */
 static bool has_changed(struct spl_plan *plan)
 {
     struct stat now = {0}, *seen = &plan->seen;
@@ -128,26 +132,11 @@ static bool has_changed(struct spl_plan *plan)
     return !same;
 }
 
-/* gpu thread. Held: mutex. Where memory is refused it goes on with the planner that there is, and tries again. */
-static void plan_anew(struct spl_plan *plan)
-{
-    struct spl_planner planner;
-    if (!plan->unplanned || spl_planner_init(&planner, plan->profile.count ? &plan->profile : NULL, is_usable, NULL))
-        return;
-    spl_planner_finish(&plan->planner);
-    plan->planner = planner;
-    plan->unplanned = false;
-}
-
 void spl_plan_set_device(struct spl_plan *plan, const struct spl_device_info *device)
 {
-    pthread_mutex_lock(&plan->mutex);
     plan->device = *device;
-    plan->placed = true;
     has_changed(plan);
     read_profile(plan);
-    plan_anew(plan);
-    pthread_mutex_unlock(&plan->mutex);
 }
 
 static double *encoding_of(struct spl_plan *plan, const struct spl_view_request *request)
@@ -163,6 +152,8 @@ static double megapixels(const struct spl_view_request *request)
 int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, double left_ms, struct spl_choice *choice,
                    double *promised_ms, struct spl_error *err)
 {
+    if (has_changed(plan))
+        read_profile(plan);
     struct spl_demand demand = request->demand;
     demand.keep_atoms &= plan->info->atoms > 0;
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
@@ -170,9 +161,6 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         demand.kept.method = SPL_METHOD_DEFAULT;
     }
     pthread_mutex_lock(&plan->mutex);
-    if (has_changed(plan))
-        read_profile(plan);
-    plan_anew(plan);
     demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
     pthread_mutex_unlock(&plan->mutex);
     if (!isnan(demand.budget_ms))
@@ -215,8 +203,6 @@ int spl_plan_copy_profile(struct spl_plan *plan, struct spl_profile *out, struct
 {
     int rc = 0;
     pthread_mutex_lock(&plan->mutex);
-    if (plan->placed && has_changed(plan))
-        read_profile(plan);
     *out = plan->profile;
     if (!out->count)
         rc = spl_fail(err, SPL_E_NOT_FOUND, "%s", plan->refused.message);

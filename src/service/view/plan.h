@@ -1,7 +1,7 @@
 /* Planning of one dataset's views: its profile, the planner over it, and what encoding costs.
  *
- * Threads: the gpu thread owns the planner; the profile is read and copied out, and the times of replies are reported,
- * under a mutex. */
+ * Threads: the gpu thread owns the planner; the profile is copied out and the times of replies are reported under a
+ * mutex. */
 #ifndef SPL_SERVICE_PLAN_H
 #define SPL_SERVICE_PLAN_H
 
@@ -31,7 +31,7 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
 /* Any thread: `ms` went by between the frame and its reply: the encoding, and the way to it and from it. */
 void spl_plan_learn_reply(struct spl_plan *plan, const struct spl_view_request *request, double ms);
 
-/* Any thread: a copy of the profile, read anew when its file has changed, for the caller to finish; SPL_E_NOT_FOUND with the reason when none is. */
+/* Any thread: a copy of the profile in use, for the caller to finish; SPL_E_NOT_FOUND with the reason when none is. */
 int spl_plan_copy_profile(struct spl_plan *plan, struct spl_profile *out, struct spl_error *err);
 
 #endif
