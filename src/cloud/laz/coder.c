@@ -7,39 +7,61 @@
 
 enum { bit_count_max = 1 << SPL_LAZ_BIT_BITS, bit_cycle_max = 64, count_max = 1 << SPL_LAZ_MODEL_BITS };
 
+enum { few_symbols = 64, few_shift = 9, many_shift = 8, no_shift = 31 };
+
 static unsigned lanes_for(unsigned symbols)
 {
-    return (symbols + SPL_LAZ_LANES) / SPL_LAZ_LANES * SPL_LAZ_LANES; /* one more than symbols, at least */
+    return symbols + SPL_LAZ_LANES; /* so that 16 can be looked at from any one */
 }
 
-static unsigned groups_for(unsigned symbols)
+static unsigned shift_for(unsigned symbols)
 {
-    return symbols < SPL_LAZ_LANES ? 0 : lanes_for((symbols - 1) / SPL_LAZ_LANES);
+    return symbols <= SPL_LAZ_LANES ? no_shift : symbols <= few_symbols ? few_shift : many_shift;
+}
+
+/* Entries of `first`: one for each place, and one for those a little above 2^15. */
+static unsigned firsts_for(unsigned symbols)
+{
+    unsigned shift = shift_for(symbols);
+    return (shift == no_shift ? 0 : 1u << (SPL_LAZ_MODEL_BITS - shift)) + 1;
 }
 
 size_t spl_laz_model_bytes(unsigned symbols)
 {
-    size_t bytes =
-        sizeof(struct spl_laz_model) + (groups_for(symbols) + 2 * (size_t)lanes_for(symbols)) * sizeof(int16_t);
+    size_t bytes = sizeof(struct spl_laz_model) + (firsts_for(symbols) + lanes_for(symbols) + symbols) * sizeof(uint16_t);
     return (bytes + 15) / 16 * 16;
 }
 
 struct spl_laz_model *spl_laz_model_create(struct spl_laz_arena *arena, struct spl_laz_model **slot, unsigned symbols)
 {
     struct spl_laz_model *m = (struct spl_laz_model *)(void *)(arena->bytes + arena->used);
-    unsigned lanes = lanes_for(symbols), groups = groups_for(symbols);
     spl_assert(arena->capacity - arena->used >= spl_laz_model_bytes(symbols));
     arena->used += spl_laz_model_bytes(symbols);
-    *m = (struct spl_laz_model){.symbols = (uint16_t)symbols, .groups = (uint16_t)groups, .cycle = symbols};
-    m->start = m->group + groups;
-    m->count = (uint16_t *)m->start + lanes;
-    for (unsigned i = 0; i < groups + lanes; i++)
-        m->group[i] = SPL_LAZ_ABOVE;
+    *m = (struct spl_laz_model){.symbols = (uint16_t)symbols, .shift = (uint8_t)shift_for(symbols), .cycle = symbols};
+    m->start = (int16_t *)m->first + firsts_for(symbols);
+    m->count = (uint16_t *)m->start + lanes_for(symbols);
+    m->first[0] = 0;
+    for (unsigned i = 0; i < SPL_LAZ_LANES; i++)
+        m->start[symbols + i] = SPL_LAZ_ABOVE;
     for (unsigned i = 0; i < symbols; i++)
         m->count[i] = 1;
     spl_laz_model_update(m);
     m->left = m->cycle = (symbols + 6) >> 1;
     return *slot = m;
+}
+
+/* The symbol of each entry's least place. */
+static void fill_firsts(struct spl_laz_model *m)
+{
+    unsigned entries = firsts_for(m->symbols), next = 0;
+    for (unsigned i = 0; i < m->symbols; i++) {
+        /* the first entry whose least place is not below the symbol's */
+        unsigned from = (unsigned)(m->start[i] + 32768 + (1 << m->shift) - 1) >> m->shift;
+        for (; next < from; next++)
+            m->first[next] = (uint16_t)(i - 1);
+    }
+    for (; next < entries; next++)
+        m->first[next] = (uint16_t)(m->symbols - 1);
 }
 
 void spl_laz_model_update(struct spl_laz_model *m)
@@ -54,8 +76,8 @@ void spl_laz_model_update(struct spl_laz_model *m)
         m->start[i] = (int16_t)((int)((scale * sum) >> (31 - SPL_LAZ_MODEL_BITS)) - 32768);
         sum += m->count[i];
     }
-    for (unsigned g = 0; m->groups && g * SPL_LAZ_LANES < m->symbols; g++)
-        m->group[g] = m->start[g * SPL_LAZ_LANES];
+    if (m->shift != no_shift)
+        fill_firsts(m);
     uint32_t longest = (m->symbols + 6u) << 3, cycle = 5 * m->cycle >> 2;
     m->left = m->cycle = cycle < longest ? cycle : longest;
 }
@@ -82,6 +104,7 @@ void spl_laz_coder_begin(struct spl_laz_coder *coder, const uint8_t *bytes, size
 {
     *coder = (struct spl_laz_coder){.p = bytes, .end = bytes + length, .length = UINT32_MAX};
     coder->value = spl_laz_coder_tail(coder, 4);
+    coder->value -= coder->value == UINT32_MAX; /* which no writer begins with */
 }
 
 uint32_t spl_laz_coder_tail(struct spl_laz_coder *coder, unsigned bytes)

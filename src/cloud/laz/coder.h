@@ -21,18 +21,19 @@ enum { SPL_LAZ_LANES = 16, SPL_LAZ_MODEL_BITS = 15, SPL_LAZ_BIT_BITS = 13 };
 
 struct spl_laz_coder {
     const uint8_t *p, *end; // borrowed
-    uint32_t value, length; /* value < length in a sound stream */
+    uint32_t value, length; /* value < length, whatever the bytes are */
     uint32_t over;          /* bytes that were wanted behind the end */
 };
 
-/* Probabilities of `symbols` symbols. Cumulative ones are kept less 32768, so that signed lanes compare; behind the
- * last lies SPL_LAZ_ABOVE. `start` is cut into groups of 16 lanes; `group` has each group's first. */
+/* Probabilities of `symbols` symbols. Cumulative ones are kept less 32768, so that signed lanes compare; behind the last
+ * lies SPL_LAZ_ABOVE for 16 lanes. A symbol is found among the 16 from first[place >> shift] on, or behind them. */
 struct spl_laz_model {
     uint32_t total, cycle, left; /* of counts; between updates; until the next one */
-    uint16_t symbols, groups;    /* groups: 0 where one is all */
-    int16_t *start;              /* in the same allocation, as all of them */
+    uint16_t symbols;
+    uint8_t shift;
+    int16_t *start; /* in the same allocation, as all of them */
     uint16_t *count;
-    int16_t group[];
+    uint16_t first[];
 };
 
 #define SPL_LAZ_ABOVE INT16_MAX
@@ -108,18 +109,18 @@ static inline unsigned spl_laz_lanes_below(const int16_t *lanes, int at)
 #endif
 }
 
-static inline unsigned spl_laz_symbol(struct spl_laz_coder *coder, struct spl_laz_model *model)
+/* A symbol; `small`, which is constant where it is known: the model has at most 16. */
+static inline __attribute__((always_inline)) unsigned spl_laz_find(struct spl_laz_coder *coder,
+                                                                   struct spl_laz_model *model, bool small)
 {
-    uint32_t unit = coder->length >> SPL_LAZ_MODEL_BITS, at = coder->value / unit;
-    int place = (int)(at < 32767 ? at : 32767) - 32768;
-    unsigned first = 0;
-    for (unsigned i = 0; i < model->groups; i += SPL_LAZ_LANES) {
-        unsigned below = spl_laz_lanes_below(model->group + i, place);
-        first = below ? (i + below - 1) * SPL_LAZ_LANES : first;
-        if (below < SPL_LAZ_LANES)
-            break;
+    uint32_t unit = coder->length >> SPL_LAZ_MODEL_BITS, place = coder->value / unit; /* a little above 2^15 at most */
+    unsigned first = small ? 0 : model->first[place >> model->shift];
+    unsigned below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
+    while (__builtin_expect(below == SPL_LAZ_LANES && !small, 0)) {
+        first += SPL_LAZ_LANES;
+        below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
     }
-    unsigned symbol = first + spl_laz_lanes_below(model->start + first, place) - 1;
+    unsigned symbol = first + below - 1;
     uint32_t low = (uint32_t)(model->start[symbol] + 32768) * unit;
     uint32_t high = (uint32_t)(model->start[symbol + 1] + 32768) * unit;
     high = symbol + 1u < model->symbols ? high : coder->length;
@@ -130,6 +131,11 @@ static inline unsigned spl_laz_symbol(struct spl_laz_coder *coder, struct spl_la
     if (__builtin_expect(--model->left == 0, 0))
         spl_laz_model_update(model);
     return symbol;
+}
+
+static inline unsigned spl_laz_symbol(struct spl_laz_coder *coder, struct spl_laz_model *model)
+{
+    return spl_laz_find(coder, model, false);
 }
 
 static inline unsigned spl_laz_bit(struct spl_laz_coder *coder, struct spl_laz_bit_model *model)

@@ -63,6 +63,11 @@ static int fail(const struct spl_laz_stream *s, int code, uint64_t offset, size_
     return spl_fail(err, code, "%s: chunk %zu cannot be decoded", s->source->path, chunk + 1);
 }
 
+static bool fits_round(const struct spl_laz_stream *s, uint64_t points)
+{
+    return points <= round_bytes / s->format.record_bytes;
+}
+
 static int make_room(uint8_t **room, size_t *bytes, size_t wanted, struct spl_error *err)
 {
     if (wanted <= *bytes)
@@ -164,7 +169,7 @@ void spl_laz_stream_destroy(struct spl_laz_stream *s)
 void spl_laz_stream_seek(struct spl_laz_stream *s, uint64_t point, bool few)
 {
     s->next = point;
-    s->few = few;
+    s->few = few && !fits_round(s, s->points);
 }
 
 static size_t find_chunk(const struct spl_laz_stream *s, uint64_t point)
@@ -203,11 +208,6 @@ static void decode_chunks(void *context, size_t begin, size_t end, unsigned work
             round->code[i] = decode_chunk(
                 s->decoders[worker], &chunks[i], s->input + (chunks[i].at - chunks[0].at), s->wanted,
                 s->records + (chunks[i].first - chunks[0].first) * s->format.record_bytes, &round->fault[i]);
-}
-
-static bool fits_round(const struct spl_laz_stream *s, size_t points)
-{
-    return points <= round_bytes / s->format.record_bytes;
 }
 
 static int decode_round(struct spl_laz_stream *s, size_t chunk, struct spl_error *err)

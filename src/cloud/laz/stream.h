@@ -23,7 +23,8 @@ void spl_laz_stream_destroy(struct spl_laz_stream *stream);
 int spl_laz_stream_read(struct spl_laz_stream *stream, uint32_t wanted, const uint8_t **records, size_t most,
                         size_t *count, struct spl_error *err);
 
-/* Goes to a point. Where only `few` are wanted from there, no whole chunks are decoded. */
+/* Goes to a point. Where only `few` are wanted from there, no whole chunks of a large file are
+ * decoded. */
 void spl_laz_stream_seek(struct spl_laz_stream *stream, uint64_t point, bool few);
 
 #endif
