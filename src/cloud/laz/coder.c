@@ -28,7 +28,8 @@ static unsigned firsts_for(unsigned symbols)
 
 size_t spl_laz_model_bytes(unsigned symbols)
 {
-    size_t bytes = sizeof(struct spl_laz_model) + (firsts_for(symbols) + lanes_for(symbols) + symbols) * sizeof(uint16_t);
+    size_t bytes =
+        sizeof(struct spl_laz_model) + (firsts_for(symbols) + lanes_for(symbols) + symbols) * sizeof(uint16_t);
     return (bytes + 15) / 16 * 16;
 }
 

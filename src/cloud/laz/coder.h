@@ -25,8 +25,9 @@ struct spl_laz_coder {
     uint32_t over;          /* bytes that were wanted behind the end */
 };
 
-/* Probabilities of `symbols` symbols. Cumulative ones are kept less 32768, so that signed lanes compare; behind the last
- * lies SPL_LAZ_ABOVE for 16 lanes. A symbol is found among the 16 from first[place >> shift] on, or behind them. */
+/* Probabilities of `symbols` symbols. Cumulative ones are kept less 32768, so that signed lanes compare; behind the
+ * last lies SPL_LAZ_ABOVE for 16 lanes. A symbol is found among the 16 from first[place >> shift] on, or behind them.
+ */
 struct spl_laz_model {
     uint32_t total, cycle, left; /* of counts; between updates; until the next one */
     uint16_t symbols;

@@ -1,5 +1,5 @@
-/* The inside of a layered chunk, for layers*.c alone. Layers are decoded one after the other over a slice of records:
- * the first, of returns and x, y, leaves a note for each record with all that the others take their contexts from.
+/* The inside of a layered chunk, for layers*.c alone. The first layer, of returns and x, y, leaves a note for each
+ * record with all that the others take their contexts from.
  *
  * Each of four scanner channels has models and last values of its own; one that is used for the first time begins with
  * the values of the record before, whichever channel that had. One thread. */
@@ -13,7 +13,7 @@
 #include "cloud/laz/median.h"
 #include "cloud/laz/wavepacket.h"
 
-enum { SPL_LAZ_CHANNELS = 4, SPL_LAZ_SLICE = 512 };
+enum { SPL_LAZ_CHANNELS = 4 };
 
 /* In the order in which a chunk has them; SPL_LAZ_LAYER_BYTES is the first of as many as there are extra bytes. */
 enum spl_laz_layer {
@@ -94,7 +94,6 @@ struct spl_laz_layers {
     bool begun;
     unsigned now;  /* channel */
     uint8_t *last; /* record; owned */
-    uint32_t notes[SPL_LAZ_SLICE];
     struct spl_laz_channel channels[SPL_LAZ_CHANNELS];
     struct spl_laz_contexts color_contexts, infrared_contexts, wavepacket_contexts, *byte_contexts; // owned
     struct spl_laz_color color[SPL_LAZ_CHANNELS];
@@ -108,12 +107,6 @@ struct spl_laz_layers {
     bool *active;                       /* by layer: it is wanted and not constant; owned */
 };
 
-/* The record before number `i` of a slice. */
-static inline const uint8_t *spl_laz_record_before(const struct spl_laz_layers *l, const uint8_t *records, size_t i)
-{
-    return i ? records + (i - 1) * l->format.record_bytes : l->last;
-}
-
 /* Begin all channels with the chunk's first record. */
 void spl_laz_returns_begin(struct spl_laz_layers *l, const uint8_t *first);
 void spl_laz_others_begin(struct spl_laz_layers *l, const uint8_t *first);
@@ -121,11 +114,12 @@ void spl_laz_others_begin(struct spl_laz_layers *l, const uint8_t *first);
 /* Last values of a channel, but for x, y and returns, from a record. */
 void spl_laz_fields_begin(struct spl_laz_channel *channel, const uint8_t *record);
 
-/* Writes whole records, the fields of inactive layers from the first record, and the notes. */
-void spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count);
+/* Writes a whole record, the fields of inactive layers from the chunk's first one. Returns its note. */
+uint32_t spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record);
 
-/* Overwrite their fields, where their layers are active. */
-void spl_laz_read_fields(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count);
-void spl_laz_read_others(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count);
+/* Overwrite their fields of a record, where their layers are active. `before` is the record before it, whole. */
+void spl_laz_read_fields(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, const uint8_t *before,
+                         uint8_t *record);
+void spl_laz_read_others(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record);
 
 #endif

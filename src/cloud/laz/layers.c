@@ -9,6 +9,8 @@
 #include "base/memory.h"
 #include "cloud/laz/layer_state.h"
 
+enum { slice_records = 4096 }; /* after which streams that are over are noticed */
+
 static const struct {
     const char *name;
     uint32_t wanted; // enum spl_laz_want; 0: always
@@ -152,6 +154,22 @@ static int check_layers(const struct spl_laz_layers *l, struct spl_laz_fault *fa
     return SPL_OK;
 }
 
+/* The other layers follow one record behind the first: streams that do not wait for each other are what a processor
+ * works on at once. */
+static void read_slice(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count)
+{
+    const size_t bytes = l->format.record_bytes;
+    const uint8_t *before = l->last;
+    uint32_t note = spl_laz_read_returns(l, arena, records);
+    for (size_t i = 0; i < count; i++, before = records, records += bytes) {
+        uint32_t next = i + 1 < count ? spl_laz_read_returns(l, arena, records + bytes) : 0;
+        spl_laz_read_fields(l, arena, note, before, records);
+        spl_laz_read_others(l, arena, note, records);
+        note = next;
+    }
+    memcpy(l->last, before, bytes);
+}
+
 int spl_laz_layers_read(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count,
                         struct spl_laz_fault *fault)
 {
@@ -167,11 +185,8 @@ int spl_laz_layers_read(struct spl_laz_layers *l, struct spl_laz_arena *arena, u
         count--;
     }
     while (count > 0) {
-        size_t slice = count < SPL_LAZ_SLICE ? count : SPL_LAZ_SLICE;
-        spl_laz_read_returns(l, arena, records, slice);
-        spl_laz_read_fields(l, arena, records, slice);
-        spl_laz_read_others(l, arena, records, slice);
-        memcpy(l->last, records + (slice - 1) * record, record);
+        size_t slice = count < slice_records ? count : slice_records;
+        read_slice(l, arena, records, slice);
         records += slice * record;
         count -= slice;
         int code = check_layers(l, fault);

@@ -78,60 +78,47 @@ void spl_laz_others_begin(struct spl_laz_layers *l, const uint8_t *first)
     }
 }
 
-static void read_colors(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record, size_t count)
+static void read_color(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record)
 {
-    struct spl_laz_coder coder = l->coders[SPL_LAZ_LAYER_COLOR];
-    for (size_t i = 0; i < count; i++, record += l->format.record_bytes) {
-        uint16_t *rgb = l->rgb[enter(&l->color_contexts, l->notes[i], l, copy_color, 0)];
-        spl_laz_color_read(&l->color[l->color_contexts.now], &coder, arena, rgb);
-        for (unsigned k = 0; k < 3; k++)
-            spl_laz_put16(record + l->color_at + 2 * k, rgb[k]);
-    }
-    l->coders[SPL_LAZ_LAYER_COLOR] = coder;
+    uint16_t *rgb = l->rgb[enter(&l->color_contexts, note, l, copy_color, 0)];
+    spl_laz_color_read(&l->color[l->color_contexts.now], &l->coders[SPL_LAZ_LAYER_COLOR], arena, rgb);
+    for (unsigned k = 0; k < 3; k++)
+        spl_laz_put16(record + l->color_at + 2 * k, rgb[k]);
 }
 
-static void read_infrared(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record, size_t count)
+static void read_infrared(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record)
 {
-    struct spl_laz_coder coder = l->coders[SPL_LAZ_LAYER_INFRARED];
-    for (size_t i = 0; i < count; i++, record += l->format.record_bytes) {
-        uint16_t *nir = &l->nir[enter(&l->infrared_contexts, l->notes[i], l, copy_infrared, 0)];
-        spl_laz_infrared_read(&l->infrared[l->infrared_contexts.now], &coder, arena, nir);
-        spl_laz_put16(record + l->infrared_at, *nir);
-    }
-    l->coders[SPL_LAZ_LAYER_INFRARED] = coder;
+    uint16_t *nir = &l->nir[enter(&l->infrared_contexts, note, l, copy_infrared, 0)];
+    spl_laz_infrared_read(&l->infrared[l->infrared_contexts.now], &l->coders[SPL_LAZ_LAYER_INFRARED], arena, nir);
+    spl_laz_put16(record + l->infrared_at, *nir);
 }
 
-static void read_wavepackets(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record, size_t count)
+static void read_wavepacket(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record)
 {
-    struct spl_laz_coder *coder = &l->coders[SPL_LAZ_LAYER_WAVEPACKET];
-    for (size_t i = 0; i < count; i++, record += l->format.record_bytes) {
-        uint8_t *packet = l->packet[enter(&l->wavepacket_contexts, l->notes[i], l, copy_wavepacket, 0)];
-        spl_laz_wavepacket_read(&l->wavepacket[l->wavepacket_contexts.now], coder, arena, packet);
-        memcpy(record + l->wavepacket_at, packet, SPL_LAZ_WAVEPACKET_BYTES);
-    }
+    uint8_t *packet = l->packet[enter(&l->wavepacket_contexts, note, l, copy_wavepacket, 0)];
+    spl_laz_wavepacket_read(&l->wavepacket[l->wavepacket_contexts.now], &l->coders[SPL_LAZ_LAYER_WAVEPACKET], arena,
+                            packet);
+    memcpy(record + l->wavepacket_at, packet, SPL_LAZ_WAVEPACKET_BYTES);
 }
 
-static void read_byte(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record, size_t count, unsigned b)
+static void read_byte(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record, unsigned b)
 {
-    struct spl_laz_coder coder = l->coders[SPL_LAZ_LAYER_BYTES + b];
-    for (size_t i = 0; i < count; i++, record += l->format.record_bytes) {
-        uint8_t *byte = &l->byte[b * SPL_LAZ_CHANNELS + enter(&l->byte_contexts[b], l->notes[i], l, copy_byte, b)];
-        struct spl_laz_model **model = &l->byte_models[b * SPL_LAZ_CHANNELS + l->byte_contexts[b].now];
-        *byte = (uint8_t)(*byte + spl_laz_symbol(&coder, spl_laz_model_get(arena, model, 256)));
-        record[l->bytes_at + b] = *byte;
-    }
-    l->coders[SPL_LAZ_LAYER_BYTES + b] = coder;
+    uint8_t *byte = &l->byte[b * SPL_LAZ_CHANNELS + enter(&l->byte_contexts[b], note, l, copy_byte, b)];
+    struct spl_laz_model **model = &l->byte_models[b * SPL_LAZ_CHANNELS + l->byte_contexts[b].now];
+    *byte =
+        (uint8_t)(*byte + spl_laz_symbol(&l->coders[SPL_LAZ_LAYER_BYTES + b], spl_laz_model_get(arena, model, 256)));
+    record[l->bytes_at + b] = *byte;
 }
 
-void spl_laz_read_others(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count)
+void spl_laz_read_others(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint32_t note, uint8_t *record)
 {
     if (l->active[SPL_LAZ_LAYER_COLOR])
-        read_colors(l, arena, records, count);
+        read_color(l, arena, note, record);
     if (l->active[SPL_LAZ_LAYER_INFRARED])
-        read_infrared(l, arena, records, count);
+        read_infrared(l, arena, note, record);
     if (l->active[SPL_LAZ_LAYER_WAVEPACKET])
-        read_wavepackets(l, arena, records, count);
+        read_wavepacket(l, arena, note, record);
     for (unsigned b = 0; b < l->extra_bytes; b++)
         if (l->active[SPL_LAZ_LAYER_BYTES + b])
-            read_byte(l, arena, records, count, b);
+            read_byte(l, arena, note, record, b);
 }

@@ -75,44 +75,38 @@ static void read_number(struct spl_laz_channel *c, unsigned changed, struct spl_
     c->number = (c->number + step) & 15;
 }
 
-void spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *records, size_t count)
+uint32_t spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record)
 {
-    const unsigned record_bytes = l->format.record_bytes;
-    const uint8_t *pattern = l->begin;
-    struct spl_laz_coder coder = l->coders[SPL_LAZ_LAYER_XY];
-    for (size_t i = 0; i < count; i++, records += record_bytes) {
-        struct spl_laz_channel *c = &l->channels[l->now];
-        unsigned set = place_of(c->number, c->count) | (unsigned)c->time_changed << 2;
-        unsigned changed = spl_laz_symbol(&coder, spl_laz_model_get(arena, &c->changed[set], 128));
-        uint32_t note = l->tells_channel ? l->now << SPL_LAZ_NOTE_CONTEXT : 0;
-        if (changed & changed_channel) {
-            note = change_channel(l, &coder, arena) ? SPL_LAZ_NOTE_FRESH : 0;
-            note |= l->now << SPL_LAZ_NOTE_CONTEXT;
-            c = &l->channels[l->now];
-        }
-        read_number(c, changed, &coder, arena);
-        c->time_changed = changed & changed_time;
-        unsigned kind = spl_laz_returns6(c->count, c->number) << 1 | c->time_changed, single = c->count == 1;
-        int32_t dx = (int32_t)spl_laz_integer_read(&c->dx, &coder, arena, (uint32_t)c->median_x[kind].value[2], single);
-        spl_laz_median_add(&c->median_x[kind], dx);
-        unsigned k = c->dx.k;
-        int32_t dy = (int32_t)spl_laz_integer_read(&c->dy, &coder, arena, (uint32_t)c->median_y[kind].value[2],
-                                                   single + (k < 20 ? k & ~1u : 20));
-        spl_laz_median_add(&c->median_y[kind], dy);
-        k = (k + c->dy.k) / 2;
-        c->x += (uint32_t)dx;
-        c->y += (uint32_t)dy;
-        memcpy(records, pattern, record_bytes);
-        spl_laz_put32(records + SPL_LAZ_AT_X, c->x);
-        spl_laz_put32(records + SPL_LAZ_AT_Y, c->y);
-        records[SPL_LAZ_AT_RETURNS] = (uint8_t)(c->number | c->count << 4);
-        records[SPL_LAZ_AT_FLAGS] = (uint8_t)((pattern[SPL_LAZ_AT_FLAGS] & ~0x30) | l->now << 4);
-        note |= l->now | place_of(c->number, c->count) << SPL_LAZ_NOTE_PLACE |
-                spl_laz_return_level(c->count, c->number) << SPL_LAZ_NOTE_LEVEL |
-                (single + (k < 18 ? k & ~1u : 18)) << SPL_LAZ_NOTE_STEP;
-        note |= (changed & changed_time ? SPL_LAZ_NOTE_TIME : 0) | (changed & changed_angle ? SPL_LAZ_NOTE_ANGLE : 0) |
-                (changed & changed_source ? SPL_LAZ_NOTE_SOURCE : 0);
-        l->notes[i] = note;
+    struct spl_laz_coder *coder = &l->coders[SPL_LAZ_LAYER_XY];
+    struct spl_laz_channel *c = &l->channels[l->now];
+    unsigned set = place_of(c->number, c->count) | (unsigned)c->time_changed << 2;
+    unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &c->changed[set], 128));
+    uint32_t note = l->tells_channel ? l->now << SPL_LAZ_NOTE_CONTEXT : 0;
+    if (changed & changed_channel) {
+        note = change_channel(l, coder, arena) ? SPL_LAZ_NOTE_FRESH : 0;
+        note |= l->now << SPL_LAZ_NOTE_CONTEXT;
+        c = &l->channels[l->now];
     }
-    l->coders[SPL_LAZ_LAYER_XY] = coder;
+    read_number(c, changed, coder, arena);
+    c->time_changed = changed & changed_time;
+    unsigned kind = spl_laz_returns6(c->count, c->number) << 1 | c->time_changed, single = c->count == 1;
+    int32_t dx = (int32_t)spl_laz_integer_read(&c->dx, coder, arena, (uint32_t)c->median_x[kind].value[2], single);
+    spl_laz_median_add(&c->median_x[kind], dx);
+    unsigned k = c->dx.k;
+    int32_t dy = (int32_t)spl_laz_integer_read(&c->dy, coder, arena, (uint32_t)c->median_y[kind].value[2],
+                                               single + (k < 20 ? k & ~1u : 20));
+    spl_laz_median_add(&c->median_y[kind], dy);
+    k = (k + c->dy.k) / 2;
+    c->x += (uint32_t)dx;
+    c->y += (uint32_t)dy;
+    memcpy(record, l->begin, l->format.record_bytes);
+    spl_laz_put32(record + SPL_LAZ_AT_X, c->x);
+    spl_laz_put32(record + SPL_LAZ_AT_Y, c->y);
+    record[SPL_LAZ_AT_RETURNS] = (uint8_t)(c->number | c->count << 4);
+    record[SPL_LAZ_AT_FLAGS] = (uint8_t)((l->begin[SPL_LAZ_AT_FLAGS] & ~0x30) | l->now << 4);
+    note |= l->now | place_of(c->number, c->count) << SPL_LAZ_NOTE_PLACE |
+            spl_laz_return_level(c->count, c->number) << SPL_LAZ_NOTE_LEVEL |
+            (single + (k < 18 ? k & ~1u : 18)) << SPL_LAZ_NOTE_STEP;
+    return note | (changed & changed_time ? SPL_LAZ_NOTE_TIME : 0) |
+           (changed & changed_angle ? SPL_LAZ_NOTE_ANGLE : 0) | (changed & changed_source ? SPL_LAZ_NOTE_SOURCE : 0);
 }
