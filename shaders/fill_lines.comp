@@ -36,25 +36,26 @@ void draw_piece(vec3 from, vec3 to, float middle, uvec2 payloads)
     precise vec2 b = vec2(frame.fx * (to.x / to.z) + frame.cx, frame.fy * (to.y / to.z) + frame.cy);
     bool upright = abs(b.y - a.y) > abs(b.x - a.x);
     vec2 first = upright ? a.yx : a, last = upright ? b.yx : b;
-    ivec2 size = upright ? ivec2(frame.height, frame.width) : ivec2(frame.width, frame.height);
+    ivec2 corner = upright ? tile_corner().yx : tile_corner(), end = upright ? tile_end().yx : tile_end();
     precise float inverse = 1.0 / (last.x - first.x);
     precise float w0 = 1.0 / from.z, w1 = 1.0 / to.z;
     /* Clamped as a whole number too: ends of a forged chunk may be no numbers. */
-    int k = clamp(int(ceil(clamp(min(first.x, last.x) - 0.5, 0.0, float(size.x)))), 0, size.x);
-    int end = min(int(floor(clamp(max(first.x, last.x) - 0.5, -1.0, float(size.x - 1)))), k + SPL_FILL_LINE_MOST - 1);
+    float low = float(corner.x), high = float(end.x);
+    int k = clamp(int(ceil(clamp(min(first.x, last.x) - 0.5, low, high))), corner.x, end.x);
+    int to_k = min(int(floor(clamp(max(first.x, last.x) - 0.5, low - 1.0, high - 1.0))), k + SPL_FILL_LINE_MOST - 1);
     for (;;) {
         precise float t = (float(k) + 0.5 - first.x) * inverse;
         precise float across = first.y + t * (last.y - first.y);
         precise float w = w0 + t * (w1 - w0);
         precise float z = 1.0 / w;
-        if (k <= end && k < size.x && across >= 0.0 && across < float(size.y)) {
-            int row = clamp(int(floor(across)), 0, size.y - 1);
-            uint at = sample_index(upright ? ivec2(row, k) : ivec2(k, row));
+        if (k <= to_k && k < end.x && across >= float(corner.y) && across < float(end.y)) {
+            int row = clamp(int(floor(across)), corner.y, end.y - 1);
+            uint at = image_sample_index(upright ? ivec2(row, k) : ivec2(k, row));
             uint bits = (floatBitsToUint(z) & ~SPL_FILL_DEPTH_BITS) | SPL_FILL_LINEAR;
             if (wins(at, bits))
                 put(at, bits, t * w1 * z < middle ? payloads.x : payloads.y);
         }
-        if (++k > end)
+        if (++k > to_k)
             break;
     }
 }

@@ -41,7 +41,7 @@ void main()
     vec2 gradient = determinant > 0.5 ? vec2(slope.x * squares.y - slope.y * squares.z,
                                              slope.y * squares.x - slope.x * squares.z) / determinant
                                       : vec2(0.0);
-    vec2 place = vec2(at) + 0.5 - vec2(frame.cx, frame.cy);
+    vec2 place = vec2(at + tile_corner()) + 0.5 - vec2(frame.cx, frame.cy);
     vec3 n = vec3(gradient * vec2(frame.fx, frame.fy), w0 - dot(gradient, place));
     uint payload = own != SPL_NOTHING ? pack_normal(-normalize(n)) : 0u;
     if (WIDE != 0u)

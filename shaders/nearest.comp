@@ -30,7 +30,7 @@ void draw(splat_run run, splat s)
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             precise float bent = z + d.margin * distance;
-            uint at = sample_index(sample_at), bits = floatBitsToUint(bent);
+            uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
             if (wins(at, bits))
                 put(at, bits, GROUP == SPL_SUMS_DEPTH ? floatBitsToUint(z) : payload);
         }

@@ -28,12 +28,13 @@ void draw(spl_draw_chunk chunk, splat s)
     if (!(p.z >= frame.near && p.z <= frame.far))
         return;
     precise vec2 center = vec2(frame.fx * (p.x / p.z) + frame.cx, frame.fy * (p.y / p.z) + frame.cy);
-    if (!(center.x >= 0.0 && center.y >= 0.0 && center.x < float(frame.width) && center.y < float(frame.height)))
+    vec2 low = vec2(tile_corner()), end = vec2(tile_end());
+    if (!(center.x >= low.x && center.y >= low.y && center.x < end.x && center.y < end.y))
         return;
     uint bits = floatBitsToUint(p.z);
     if (FILL != 0u)
         bits = fill_word(bits, min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min), is_linear(chunk, s.index));
-    uint at = sample_index(ivec2(center));
+    uint at = image_sample_index(ivec2(center));
     if (wins(at, bits))
         put(at, bits, payload(chunk, s));
 }

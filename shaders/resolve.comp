@@ -191,7 +191,7 @@ void main()
         if (covered != 0u) {
             precise float z = sum / count;
             if (LAYER == SPL_RESOLVE_RANGE) {
-                precise vec2 center = vec2(corner) + 0.5 * float(side);
+                precise vec2 center = vec2(corner + tile_corner()) + 0.5 * float(side);
                 precise vec2 ray = vec2((center.x - frame.cx) / frame.fx, (center.y - frame.cy) / frame.fy);
                 precise float range = z * sqrt(1.0 + ray.x * ray.x + ray.y * ray.y);
                 z = range;

@@ -69,6 +69,7 @@ void put_frame()
     put(frame.inverse_fx), put(frame.inverse_fy), put(frame.inverse_low_pass_squared);
     put(frame.output_word);
     put(frame.texture_size);
+    put(frame.tile_x), put(frame.tile_y);
     put(frame.crop_x), put(frame.crop_y), put(frame.crop_width), put(frame.crop_height);
     put(frame.fill_radius), put(frame.fill_reach), put(frame.fill_kernel), put(frame.fill_margin);
     put(frame.fill_threshold);

@@ -187,7 +187,7 @@ struct spl_chunk_bounds {
 /* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
 struct spl_frame_params {
     SPL_F32 rotation[12];                 /* world -> camera, three rows of (x, y, z, 0) */
-    SPL_F32 fx, fy, cx, cy;               /* samples, of this tile */
+    SPL_F32 fx, fy, cx, cy;               /* samples; the same in every tile of an image */
     SPL_F32 near, far;
     SPL_F32 low_pass;                     /* radius in samples within which a splat always covers */
     SPL_F32 margin;                       /* blend margin as a multiple of the splat's radius */
@@ -200,6 +200,7 @@ struct spl_frame_params {
     SPL_F32 inverse_fx, inverse_fy, inverse_low_pass_squared;
     SPL_U32 output_word;                  /* resolve: where the layer's pixels start in the output buffer */
     SPL_U32 texture_size;                 /* texels of a side of the dataset's textures */
+    SPL_U32 tile_x, tile_y;               /* samples: where the tile begins in what is drawn of the image */
     SPL_U32 crop_x, crop_y;               /* samples: where the pixels that are resolved begin */
     SPL_U32 crop_width, crop_height;      /* pixels */
     SPL_F32 fill_radius;                  /* metres, of a splat whose spacing has code 0 */
@@ -219,7 +220,7 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(sizeof(struct spl_frame_params) == 188, "spl_frame_params is 188 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 196, "spl_frame_params is 196 bytes on both sides");
 #endif
 
 #endif

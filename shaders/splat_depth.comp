@@ -23,7 +23,7 @@ void draw(splat_run run, splat s)
         float distance = disc_sample(d, at, z, offset);
         if (clip(line, offset, distance) < 1.0 && at.y <= d.last.y) {
             precise float pushed = z + d.margin;
-            uint index = sample_index(at), bits = floatBitsToUint(pushed);
+            uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
             if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */
                 atomicMin(depth[index], bits);
         }

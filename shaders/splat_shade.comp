@@ -91,7 +91,7 @@ void draw(splat_run run, splat s)
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
-        uint at = sample_index(sample_at);
+        uint at = image_sample_index(sample_at);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
 #ifdef SPL_TEXTURED

@@ -8,7 +8,7 @@
 // label    what screen readers call the view
 // token    where the service wants one; whoever sees the page sees it, so let it allow no more than view
 // signed   in its place, what `splatd sign /embed/ID` puts behind '?': exp=…&sig=…, for this dataset until it expires
-// eye, target, up, fov, layer, method, visibility, kernel, threshold, pyramid, lod, supersample, atoms, budget
+// eye, target, up, fov, layer, lod, supersample, budget, method and whatever GET /v1/methods says that it takes
 //          as parameters of a view; changing one moves the view
 //
 // Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last
@@ -16,15 +16,15 @@
 // may be.
 
 const HOME = new URL(import.meta.url).origin;
-const CAMERA = ["eye", "target", "up", "fov"];
-const FILL = ["visibility", "kernel", "threshold", "pyramid"]; // of method fill
-const SETTINGS = [...CAMERA, "layer", "method", ...FILL, "lod", "supersample", "atoms", "budget"];
+// Every other attribute goes into the page's fragment, where the page takes those that it knows.
+const OWN = ["src", "dataset", "label", "token", "signed", "id", "class", "style", "hidden"];
 
 class SplatView extends HTMLElement {
-  static observedAttributes = ["src", "dataset", "label", "signed", ...SETTINGS];
   camera = null;
   #frame = document.createElement("iframe");
   #page = "";
+  #address = "";
+  #changes = new MutationObserver(() => this.#show());
   #heard = (event) => {
     const {splatd, ...camera} = event.data ?? {};
     if (event.source !== this.#frame.contentWindow) return;
@@ -46,29 +46,31 @@ class SplatView extends HTMLElement {
 
   connectedCallback() {
     addEventListener("message", this.#heard);
+    this.#changes.observe(this, {attributes: true});
     this.#show();
   }
 
   disconnectedCallback() {
     removeEventListener("message", this.#heard);
-    this.#page = "";
-  }
-
-  attributeChangedCallback() {
-    if (this.isConnected) this.#show();
+    this.#changes.disconnect();
+    this.#page = this.#address = "";
   }
 
   #show() {
     const dataset = this.getAttribute("dataset");
     if (!dataset) return;
-    const given = SETTINGS.filter((name) => this.hasAttribute(name));
-    const fragment = given.map((name) => `${name}=${encodeURIComponent(this.getAttribute(name))}`).join("&");
+    const given = [...this.attributes].filter(({name}) => !OWN.includes(name));
+    const fragment = given.map(({name, value}) => `${name}=${encodeURIComponent(value)}`).join("&");
     const signed = this.hasAttribute("signed") ? `?${this.getAttribute("signed")}` : "";
     const page = new URL(`/embed/${encodeURIComponent(dataset)}${signed}`, this.getAttribute("src") || HOME).href;
     this.#frame.title = this.getAttribute("label") || `View of ${dataset}`;
+    const address = `${page}#${fragment}`;
+    if (address === this.#address) return;
+    this.#address = address;
     // A frame that is there already is told by its fragment alone, without an entry in the history.
-    if (page === this.#page) this.#frame.contentWindow.location.replace(`${page}#${fragment}`);
-    else this.#frame.src = `${(this.#page = page)}#${fragment}`;
+    if (page === this.#page) this.#frame.contentWindow.location.replace(address);
+    else this.#frame.src = address;
+    this.#page = page;
   }
 }
 

@@ -1,6 +1,6 @@
 // The dataset's chart of accuracy against time, as the service draws it, with the frame on screen as a point on it.
 
-import {FILL} from "./link.js";
+import {table} from "./methods.js";
 import {ask, askJson} from "./service.js";
 
 export class Chart {
@@ -56,14 +56,13 @@ export class Chart {
   show(frame, setting) {
     this.last = [frame, setting];
     if (!this.axes || frame.stages.frame === undefined) return;
-    const used = frame.chosen ?? {method: "splat", lod: 1, supersample: 1, ...setting};
+    const used = frame.chosen ?? {method: table.default, lod: 1, supersample: 1, ...setting};
     const known = this.profile.points.find(
       (p) =>
         p.method === used.method &&
         p.lod === Number(used.lod) &&
         p.supersample === Number(used.supersample) &&
-        p.atoms === Number(used.atoms ?? 8) &&
-        !FILL.some((name) => name in used), // measured are their defaults
+        table.parameters.every(({name, default: usual}) => String(used[name] ?? usual) === String(p[name] ?? usual)),
     );
     const psnr = known?.psnr ?? null,
       ms = frame.stages.frame;

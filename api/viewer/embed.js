@@ -5,6 +5,7 @@
 
 import {attach} from "./input.js";
 import {parse} from "./link.js";
+import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
 import {askJson, setPass, setToken} from "./service.js";
 import {Stage} from "./stage.js";
@@ -20,10 +21,10 @@ if (signature) setPass(`${signature[1]}&embed=${signature[2]}`);
 let asked = false;
 
 async function open() {
-  const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = parse(location.hash);
-  const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
   try {
-    const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`);
+    const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
+    const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = parse(location.hash);
+    const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
     document.title = id;
     stage.element.ariaLabel = `View of ${id}`;
     stage.settings = budget ? {layer, budget} : {layer, ...setting};

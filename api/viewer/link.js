@@ -1,20 +1,23 @@
 // What is on screen as text: the URL's fragment, and a command that fetches the same picture.
 
+import {findParameter} from "./methods.js";
+
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "layer", "method", "budget", "visibility"];
-export const NUMBERS = ["fov", "lod", "supersample", "atoms", "kernel", "threshold", "pyramid"];
+  TEXTS = ["dataset", "layer", "method", "budget"],
+  NUMBERS = ["fov", "lod", "supersample"];
+const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 
-/** The parameters that method fill has for itself. */
-export const FILL = ["visibility", "kernel", "threshold", "pyramid"];
+/** Is it a number, as a parameter of a view? */
+export const isNumber = (name) => NUMBERS.includes(name) || (Boolean(findParameter(name)) && !isText(name));
 
-/** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. */
+/** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. Needs the table of methods. */
 export function parse(fragment) {
   const found = {};
   for (const [name, text] of new URLSearchParams(fragment.replace(/^#/, "").replaceAll("+", "%2B"))) {
     const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
     if (VECTORS.includes(name) && numbers.length === 3 && numbers.every(Number.isFinite)) found[name] = numbers;
-    else if (NUMBERS.includes(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
-    else if (TEXTS.includes(name)) found[name] = text;
+    else if (isNumber(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
+    else if (isText(name)) found[name] = text;
   }
   return found;
 }

@@ -2,7 +2,8 @@
 
 import {Chart} from "./chart.js";
 import {attach} from "./input.js";
-import {FILL, copy, curl, parse} from "./link.js";
+import {copy, curl, parse} from "./link.js";
+import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
 import {Points, coordinates, metres} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
@@ -12,7 +13,7 @@ import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
 
 const $ = (id) => document.getElementById(id);
-const SETTINGS = ["layer", "method", ...FILL, "lod", "supersample", "atoms", "budget"];
+const SETTINGS = ["layer", "method", "lod", "supersample", "budget"]; // and the parameters of methods
 
 const stage = new Stage($("stage"));
 const points = new Points(stage, document.querySelector(".marks"));
@@ -32,26 +33,24 @@ function choices(select, names, value) {
 
 const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
-/** Sets a select, to a value that it may not offer yet. */
-function choose(select, value) {
-  if (![...select.options].some((option) => option.value === String(value))) select.append(new Option(value));
-  select.value = value;
-}
-
-let textures = null; // of the dataset
+let dataset = null; // that the controls are set for
+let parameters = null; // their Controls, once there is a table of them
 
 /** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
  * refuses stands what `before` has. */
 function readSettings(before) {
-  const read = (name) => (before && !$(name).checkValidity() ? before[name] : $(name).value) ?? "";
-  const settings = Object.fromEntries(SETTINGS.map((name) => [name, read(name)]));
-  for (const name of SETTINGS) $(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
-  const offer = (name, offered) => {
-    $(name).hidden = $(name).labels[0].hidden = !offered;
-    if (!offered || settings[name] === "") delete settings[name]; // the service chooses
-  };
-  offer("atoms", Boolean(textures?.methods.includes(settings.method)));
-  for (const name of FILL) offer(name, settings.method === "fill");
+  const all = [...SETTINGS, ...parameters.names],
+    control = (name) => parameters.get(name) ?? $(name);
+  const read = (name) => (before && !control(name).checkValidity() ? before[name] : control(name).value) ?? "";
+  const settings = Object.fromEntries(all.map((name) => [name, read(name)]));
+  for (const name of all) control(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
+  for (const parameter of table.parameters) {
+    const {name} = parameter,
+      shown = counts(parameter, settings.method, dataset);
+    parameters.offer(name, shown);
+    if (!shown || settings[name] === "") delete settings[name]; // the service chooses
+  }
+  $("method-help").textContent = findMethod(settings.method).description;
   stage.coarse = $("moving").value;
   return settings;
 }
@@ -78,31 +77,31 @@ let opening = 0; // counts calls of open(): the last one wins
 
 /** Opens what the fragment names, else the first dataset that is ready. */
 async function open() {
-  const wanted = parse(location.hash),
-    turn = ++opening;
+  const turn = ++opening;
   try {
-    const [{datasets}, {limits, device, tours}] = await Promise.all([askJson("/v1/datasets"), askJson("/v1/status")]);
+    const [{datasets}, {limits, device, tours}] = await Promise.all([
+      askJson("/v1/datasets"),
+      askJson("/v1/status"),
+      loadTable(),
+    ]);
+    const wanted = parse(location.hash);
     const ids = datasets.map(({id}) => id);
     const id = wanted.dataset ?? (datasets.find(({state}) => state === "ready") ?? datasets[0])?.id;
     if (!id) throw new Problem("gone", "No dataset is served yet", 5);
-    const dataset = await askJson(`/v1/datasets/${encodeURIComponent(id)}`).catch((problem) => problem);
+    const found = await askJson(`/v1/datasets/${encodeURIComponent(id)}`).catch((problem) => problem);
     if (turn !== opening) return;
     choices($("dataset"), ids.includes(id) ? ids : [...ids, id], id);
-    if (dataset instanceof Error) throw dataset;
+    if (found instanceof Error) throw found;
+    dataset = found;
+    parameters ??= new Controls($("method-help"));
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
-    const method = wanted.method ?? "splat";
-    choices($("method"), dataset.methods, dataset.methods.includes(method) ? method : "fill"); // of bare points
+    choices($("method"), dataset.methods, offered(wanted.method, dataset));
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
-    choose($("atoms"), wanted.atoms ?? "");
-    choose($("visibility"), wanted.visibility === "adaptive" ? "" : (wanted.visibility ?? ""));
-    $("kernel").value = wanted.kernel || ""; // 0 is automatic, too
-    $("threshold").value = wanted.threshold ?? "";
-    $("pyramid").value = wanted.pyramid || "";
+    for (const parameter of table.parameters) parameters.set(parameter, wanted[parameter.name]);
     choose($("budget"), wanted.budget ?? "");
-    textures = dataset.textures;
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
@@ -138,7 +137,7 @@ function showFrame({detail: frame}) {
   const {chosen, promised, demand} = frame;
   $("chosen").textContent = chosen
     ? `Chosen: ${chosen.method}, level ${chosen.lod}, samples a side ${chosen.supersample}` +
-      (textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
+      (dataset.textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
       `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
     : "";
   writeLink();
@@ -197,11 +196,10 @@ stage.addEventListener("state", ({detail: problem}) => {
 editTour(tour, say);
 renderTours(tour, say);
 
-for (const name of [...SETTINGS, "moving"])
-  $(name).addEventListener("change", () => {
-    if (!$(name).checkValidity()) say($(name).validationMessage);
-    else if (stage.dataset) stage.set(readSettings(stage.settings));
-  });
+$("picture").addEventListener("change", ({target}) => {
+  if (!target.checkValidity()) say(target.validationMessage);
+  else if (stage.dataset) stage.set(readSettings(stage.settings));
+});
 for (const radio of document.querySelectorAll("[name=drag]"))
   radio.addEventListener("change", () => (stage.drag = radio.value));
 stage.drag = document.querySelector("[name=drag]:checked").value; // browsers keep it over a reload

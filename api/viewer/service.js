@@ -9,7 +9,7 @@ export class Problem extends Error {
   }
 }
 
-let pass = ""; // what a signed page adds to its requests
+let pass = ""; // what a signed page adds to its requests for its dataset
 export const setPass = (parameters) => (pass = parameters);
 
 const TOKEN = "splatd-token";
@@ -34,7 +34,8 @@ export async function ask(path, options = {}) {
   };
   let reply;
   try {
-    reply = await fetch(pass ? `${path}${path.includes("?") ? "&" : "?"}${pass}` : path, {...options, headers});
+    const signed = pass && path.startsWith("/v1/datasets/");
+    reply = await fetch(signed ? `${path}${path.includes("?") ? "&" : "?"}${pass}` : path, {...options, headers});
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Problem("offline", "The service cannot be reached");

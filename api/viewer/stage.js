@@ -26,7 +26,7 @@ function readHeaders(headers) {
     demand: headers.get("Splatd-Demand"),
     near: number("Splatd-Depth-Near"),
     far: number("Splatd-Depth-Far"),
-    complete: headers.get("Splatd-Complete") !== "false",
+    pending: headers.get("Splatd-Pending") === "true",
   };
 }
 
@@ -194,7 +194,7 @@ export class Stage extends EventTarget {
     this.canvas.hidden = false;
     this.bend();
     this.dispatchEvent(new CustomEvent("frame", {detail: {...shown, width: bitmap.width, height: bitmap.height}}));
-    if (shown.full && !shown.complete) {
+    if (shown.full && shown.pending) {
       shown.full = false;
       this.blocked = true;
       this.later(PARTIAL_MS);

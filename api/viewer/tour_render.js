@@ -1,6 +1,6 @@
 // Has the service make a tour: begins it, says how far it is, offers what came out.
 
-import {NUMBERS} from "./link.js";
+import {isNumber} from "./link.js";
 import {Problem, ask, askJson, download} from "./service.js";
 
 const POLL_MS = 700;
@@ -56,7 +56,7 @@ export function renderTours(tour, say) {
       ...Object.fromEntries(
         Object.entries(setting)
           .filter(([, value]) => value !== "")
-          .map(([name, value]) => [name, NUMBERS.includes(name) ? Number(value) : value]),
+          .map(([name, value]) => [name, isNumber(name) ? Number(value) : value]),
       ),
       format: "jpeg",
       width: Number(width.value),

@@ -24,7 +24,9 @@ struct spl_camera {
 };
 
 /* Full pinhole from a vertical field of view: fx = fy, principal point in the middle.
- * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height only. */
+ * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height only:
+ * near and far are those of spl_view_init(), 0.01 and INFINITY, or of spl_dataset_get_default_camera(), which fit the
+ * dataset. */
 SPL_API int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                                struct spl_error *err);
 

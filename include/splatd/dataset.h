@@ -70,7 +70,8 @@ struct spl_dataset_info {
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
- * trusted). Errors name the section. On success the caller owns *out. Blocks on disk. */
+ * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the
+ * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the caller owns *out. Blocks on disk. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 
 /* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
@@ -81,7 +82,8 @@ struct spl_reader {
      * many, at least one; 0 where there are no longer as many; -errno. Called by any thread that uses the dataset, by
      * several at once; may block. */
     int64_t (*read)(void *context, uint64_t offset, void *out, size_t count);
-    void (*close)(void *context); // may be NULL; called once, by spl_dataset_close(): not where opening fails
+    void (*close)(void *context); // may be NULL; called once, by spl_dataset_close() or behind the read that it could
+                                  // not wait for, on that thread: not where opening fails
     void *context;
 };
 
@@ -95,6 +97,7 @@ struct spl_open_options {
     bool verify;                     /* as of spl_dataset_open() */
     const struct spl_cancel *cancel; // may be NULL; borrowed until close: ends whatever takes long with the dataset
     const struct spl_reader *reader; // NULL = the file at `path`; the struct itself is read while opening only
+    uint64_t tables_bytes;           /* what tables may take; 0 = 64 MiB */
 };
 
 static inline void spl_open_options_init(struct spl_open_options *options)
@@ -107,7 +110,9 @@ static inline void spl_open_options_init(struct spl_open_options *options)
 SPL_API int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
                                   struct spl_error *err);
 
-/* NULL-safe. */
+/* NULL-safe. Where a renderer that has let go of the dataset is still in a read of it, a file is closed behind that read. A
+ * reader's is waited for, 10 s at most: one that hangs longer goes on using `context` until it returns, so what lies
+ * there is freed by the reader's close(). */
 SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 
 /* Borrowed until close. */
@@ -117,7 +122,7 @@ SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dat
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 
-SPL_API const char *spl_attribute_name(enum spl_attribute attribute);
+SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */
 
 SPL_END_DECLARATIONS
 

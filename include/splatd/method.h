@@ -53,21 +53,29 @@ struct spl_fill_params {
     uint32_t pyramid; /* levels of the pyramid that holes are filled from; 0 = from the kernel */
 };
 
+/* What a parameter changes. */
+enum spl_param_changes {
+    SPL_CHANGES_SHAPES,   /* what is seen where */
+    SPL_CHANGES_TEXTURES, /* colours alone, and those of datasets with textures */
+};
+
 /* Every parameter of a method, in the order of --help:
- *   REAL, COUNT(name, field of struct spl_view, least, most, default, shapes, help): a number, a whole number; the default may
- *   lie outside of what else is allowed
- *   CHOICE(name, field, prefix, default, shapes, help): one of the names of spl_PREFIX_name()
- * shapes: 1 = it changes what is seen where, 0 = colours alone. */
+ *   REAL, COUNT(name, field of struct spl_view, least, most, default, SPL_CHANGES_*, help): a number, a whole number;
+ *   the default may lie outside of what else is allowed
+ *   CHOICE(name, field, prefix, default, SPL_CHANGES_*, help): one of the names of spl_PREFIX_name() */
 #define SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)                                                                         \
-    REAL(margin, disc.margin, 0, 16, 1, 1, "depth behind the first surface that is blended, in splat radii")           \
-    COUNT(atoms, disc.atoms, 0, 8, 8, 0, "of a splat's texture at most; 0 = its mean colour")                          \
-    CHOICE(visibility, fill.visibility, visibility, SPL_VISIBILITY_ADAPTIVE, 1,                                        \
+    REAL(margin, disc.margin, 0, 16, 1, SPL_CHANGES_SHAPES,                                                            \
+         "depth behind the first surface that is blended, in splat radii")                                             \
+    COUNT(atoms, disc.atoms, 0, 8, 8, SPL_CHANGES_TEXTURES, "of a splat's texture at most; 0 = its mean colour")       \
+    CHOICE(visibility, fill.visibility, visibility, SPL_VISIBILITY_ADAPTIVE, SPL_CHANGES_SHAPES,                       \
            "which points are hidden; constant: the whole kernel everywhere, slow; none: removes none")                 \
-    REAL(kernel, fill.kernel, 3, 129, 0, 1,                                                                            \
+    REAL(kernel, fill.kernel, 3, 129, 0, SPL_CHANGES_SHAPES,                                                           \
          "side of the visibility kernel where it is largest, pixels; 0: six times the points' spacing where they are " \
          "sparsest")                                                                                                   \
-    REAL(threshold, fill.threshold, 0, 1, 0.38, 1, "share of the sectors that is open where a point is visible")       \
-    COUNT(pyramid, fill.pyramid, 0, 8, 0, 1, "levels that holes are filled from; 0: as the kernel needs")
+    REAL(threshold, fill.threshold, 0, 1, 0.38, SPL_CHANGES_SHAPES,                                                    \
+         "share of the sectors that is open where a point is visible")                                                 \
+    COUNT(pyramid, fill.pyramid, 0, 8, 0, SPL_CHANGES_SHAPES,                                                          \
+          "levels that holes are filled from; 0: as the kernel needs")
 
 enum spl_method_param {
 #define SPL_PARAM_VALUE(name, ...) SPL_PARAM_##name,
@@ -83,11 +91,11 @@ struct spl_method_param_info {
     const char *name, *help;
     enum spl_param_kind kind;
     double least, most, otherwise; /* otherwise: the default, which is always allowed */
-    bool shapes;
+    enum spl_param_changes changes;
     const char *(*choice_name)(int choice); /* CHOICE, as the next; choices are 0 … most */
     int (*choice_from_name)(const char *name);
 };
-SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static */
+SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static; NULL for none */
 SPL_API int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
 /* Is `value` within the parameter's range? SPL_E_USAGE names it. */
 SPL_API int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);
@@ -102,8 +110,9 @@ struct spl_method_info {
     enum spl_method stand_in;
     bool finds_normals;           /* also where a dataset has none */
 };
-SPL_API const struct spl_method_info *spl_method_get(enum spl_method method);
+SPL_API const struct spl_method_info *spl_method_get(enum spl_method method); /* NULL for none */
 
+/* What is no method has no textures, normals and parameters, and nothing stands in for it. */
 SPL_API const char *spl_method_name(enum spl_method method); /* "unknown" for none */
 SPL_API int spl_method_from_name(const char *name);          /* -1 for an unknown name */
 SPL_API const char *spl_method_names(void);                  /* "splat, points, …"; static */

@@ -34,7 +34,7 @@ struct spl_view {
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
-/* Fills everything but the camera with defaults: the first method, color, lod 1, supersample 1, opaque black, and each
+/* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1, supersample 1, opaque black, and each
  * method's parameters as their table says. */
 SPL_API void spl_view_init_sized(struct spl_view *view, size_t size);
 static inline void spl_view_init(struct spl_view *view)
@@ -68,6 +68,8 @@ struct spl_frame_stats {
                                    spl_view.partial demanded */
     double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
                                    the device has timestamps, else host times */
+    bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the memory
+                                   limit has no room for it */
 };
 
 struct spl_frame {
@@ -114,22 +116,22 @@ static inline void spl_renderer_options_init(struct spl_renderer_options *option
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
 SPL_API int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out,
                                 struct spl_error *err);
-/* NULL-safe; datasets that were not removed are let go. */
+/* NULL-safe; datasets that were not removed are let go. Waits for the device, and for no page: a read that does not end is
+ * left behind with its thread, which ends with it. */
 SPL_API void spl_renderer_destroy(struct spl_renderer *renderer);
 SPL_API const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
 
 /* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the
  * memory limit. Refuses with both sizes when not even one frame's worth fits. */
 SPL_API int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
-/* remove() blocks while a page of it is being read, try_remove() never: false, and the dataset stays added with nothing on
- * the device, to be removed after spl_renderer_options.wake was called. */
+/* Lets go of it, and of frames' waits for it; never blocks. A page that is being read is dropped when it has come: until
+ * then the dataset can be closed, and stays (spl_dataset_close()). */
 SPL_API void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
-SPL_API bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
 /* Pages are read on a thread of the renderer's own and put on the device between tiles: by every step of a frame, and by
- * upload(), for those who have no step to make. Errors as of spl_renderer_render(), the device's only. wait() blocks until
- * there is something to put there: false where nothing is being read, or nothing came within a second at most or until
- * `deadline_ns`. */
+ * upload(), for those who have no step to make: some at a time, so that nobody waits long for them. Errors as of
+ * spl_renderer_render(), the device's only. wait() blocks until there is something to put there: false where nothing is
+ * being read, or nothing came within a second at most or until `deadline_ns` (0 = it only looks whether some are left). */
 SPL_API int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err);
 SPL_API bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns);
 
@@ -140,7 +142,7 @@ SPL_API int spl_renderer_preload(struct spl_renderer *renderer, const struct spl
 
 /* The same in steps that never block, for a renderer that has frames to make in between: *page (0 at first; textures
  * follow) moves over those that are there, the next ones are asked for. *more: to be called again, where *page has not
- * moved once a page has been read. */
+ * moved once a page has been read. SPL_E_TIMEOUT when no page has come for 10 s, of this dataset or others. */
 SPL_API int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                                       bool *more, struct spl_error *err);
 
@@ -157,10 +159,10 @@ SPL_API void spl_renderer_get_residency(struct spl_renderer *renderer, const str
                                         struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs give
- * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page has come for 10 s. A dataset without surface
- * is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT (field "layer") refuses
- * them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed. SPL_E_DEVICE_LOST: the renderer is
- * dead, destroy it and make a new one. */
+ * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page, of whichever dataset, has come for 10 s. A
+ * dataset without surface is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT
+ * (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed.
+ * SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */
 SPL_API int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                                 const struct spl_view *view, struct spl_frame *frame, struct spl_error *err);
 

@@ -11,7 +11,7 @@
 #include "common/splat.glsl"
 
 struct disc {
-    ivec2 first, last; /* samples, inclusive; empty when last < first */
+    ivec2 first, last; /* samples of the image, inclusive; empty when last < first */
     vec2 center;       /* samples */
     float depth;       /* of the centre */
     float margin;      /* metres that the disc is pushed back for blending */
@@ -40,7 +40,7 @@ vec2 disc_extent(float p, float q, float n_p, float n_q, float n_other, float ra
     return result;
 }
 
-/* The part of the disc that lies on the samples window_low to window_high, inclusive. */
+/* The part of the disc that lies on the image's samples window_low to window_high, inclusive. */
 disc make_disc(splat s, vec2 window_low, vec2 window_high)
 {
     disc d;

@@ -25,4 +25,22 @@ uint sample_index(ivec2 at)
     return uint(at.y) * frame.width + uint(at.x);
 }
 
+/* Splats are laid on the samples of the image, whose first is the first that is drawn of it: floats that were rounded
+ * from a tile's own corner would put some on another sample than in the tile beside it. */
+ivec2 tile_corner()
+{
+    return ivec2(int(frame.tile_x), int(frame.tile_y));
+}
+
+ivec2 tile_end()
+{
+    return tile_corner() + ivec2(int(frame.width), int(frame.height));
+}
+
+/* Of sample `at` of the image. */
+uint image_sample_index(ivec2 at)
+{
+    return sample_index(at - tile_corner());
+}
+
 #endif

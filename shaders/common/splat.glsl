@@ -20,7 +20,7 @@ struct splat {
 struct splat_run {
     spl_draw_chunk chunk;
     uint first, end;
-    vec2 low, high; /* samples that it draws to, inclusive */
+    vec2 low, high; /* samples of the image that it draws to, inclusive */
 };
 
 /* A run of codes in registers: a load from memory costs more than the shifts that take a code off the low end. */
@@ -130,9 +130,9 @@ splat_run load_run_of(uint entry)
         r.end = min(first + SPL_RUN_SPLATS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
         uint column = bitfieldExtract(r.chunk.count, SPL_COUNT_BITS, SPL_WINDOW_BITS);
         uint row = r.chunk.count >> (SPL_COUNT_BITS + SPL_WINDOW_BITS);
-        vec2 size = vec2(float(frame.width), float(frame.height));
-        r.low = column == 0u ? vec2(0.0) : vec2(float(column - 1u), float(row)) * float(SPL_WINDOW);
-        r.high = (column == 0u ? size : min(r.low + float(SPL_WINDOW), size)) - 1.0;
+        vec2 corner = vec2(tile_corner()), end = vec2(tile_end());
+        r.low = corner + (column == 0u ? vec2(0.0) : vec2(float(column - 1u), float(row)) * float(SPL_WINDOW));
+        r.high = (column == 0u ? end : min(r.low + float(SPL_WINDOW), end)) - 1.0;
     }
     return r;
 }

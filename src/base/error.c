@@ -1,4 +1,5 @@
-/* The one table of errors, and the record that carries them. Reentrant; no global state. */
+/* The one table of errors, and the record that carries them. Messages quote files and requests, so they are made
+ * printable here, where all of them come by: one line of UTF-8. Reentrant; no global state. */
 #include "base/error.h"
 
 #include <stdarg.h>
@@ -7,6 +8,7 @@
 #include <string.h>
 
 #include "base/log.h"
+#include "base/text.h"
 
 static const struct spl_code_info table[] = {
     [-SPL_OK] = {"ok", false},
@@ -33,13 +35,28 @@ const struct spl_code_info *spl_code_get_info(int code)
     return &table[-code];
 }
 
+/* The last character of a text that filled its room, where only a part of its bytes is left. */
+static void drop_cut_character(char *text, size_t size)
+{
+    size_t used = strlen(text), back = 1;
+    if (used + 1 < size)
+        return;
+    while (back < 4 && back < used && (text[used - back] & 0xc0) == 0x80)
+        back++;
+    bool printable;
+    if ((unsigned char)text[used - back] >= 0xc0 && spl_text_next(text + used - back, &printable) != back)
+        text[used - back] = '\0';
+}
+
 static int fill(struct spl_error *err, int code, const char *field, const char *format, va_list args)
 {
     if (!err || err->code != SPL_OK)
         return code;
     err->code = code;
-    snprintf(err->field, sizeof err->field, "%s", field);
+    spl_text_show(field, err->field, sizeof err->field);
     vsnprintf(err->message, sizeof err->message, format, args);
+    drop_cut_character(err->message, sizeof err->message);
+    spl_text_clean(err->message);
     return code;
 }
 

@@ -74,6 +74,8 @@ int spl_file_replace(const char *path, const void *bytes, size_t length, struct 
 {
     char *beside;
     int fd = open_beside(path, &beside);
+    if (fd < 0 && errno == ENOENT && folder_length(path)) // of a file that is to be made only a folder can be missing
+        return spl_fail(err, SPL_E_IO, "cannot write '%s': there is no folder '%.*s'", path, folder_length(path), path);
     if (fd < 0)
         return spl_fail_errno(err, errno, "cannot make a file beside '%s'", path);
     bool failed = spl_write_all(fd, bytes, length) || fsync(fd);

@@ -15,6 +15,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/text.h"
+
 enum { line_max = 2048, end_room = 8 }; /* what closes a string, an object and the line always fits */
 
 static _Atomic(int) log_level = SPL_LOG_INFO, log_format = SPL_LOG_TEXT;
@@ -70,17 +72,20 @@ static void add_plain(struct line *line, const char *text)
         add_char(line, *text);
 }
 
-/* Text from anywhere: no control characters; in JSON ASCII only, since nobody has checked that it is UTF-8. */
+/* Text from anywhere: one line that a terminal shows and does not act on; in JSON ASCII only. */
 static void add_outside(struct line *line, const char *text, bool json)
 {
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        bool bad = c < 0x20 || c == 0x7f || (json && c > 0x7f), escape = json && (c == '"' || c == '\\');
-        if (line->used + escape + 1 >= line_max - end_room)
-            return; // an escape stays in one piece
+    size_t length;
+    bool printable;
+    for (; (length = spl_text_next(text, &printable)); text += length) {
+        bool plain = printable && (!json || length == 1), escape = json && (*text == '"' || *text == '\\');
+        size_t bytes = plain ? length : json ? length : 1;
+        if (line->used + escape + bytes >= line_max - end_room)
+            return; // an escape stays in one piece, and a character
         if (escape)
             add_char(line, '\\');
-        add_char(line, bad ? '?' : *text);
+        for (size_t i = 0; i < bytes; i++)
+            add_char(line, plain ? text[i] : '?');
     }
 }
 

@@ -75,6 +75,10 @@ static int find_reader(struct spl_source *source, const struct spl_reader **read
         *reader = &spl_ply_reader;
     else if (begins_with(bytes, available, "LASF"))
         *reader = &spl_las_reader;
+    else if (begins_with(bytes, available, "SPLD\r\n"))
+        return spl_source_fail(source, SPL_E_INPUT, "", err,
+                               "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
+                               "is; pack takes the scans that it was made of");
     else if (begins_with(bytes, available, "ASTM-E57"))
         return spl_source_fail(source, SPL_E_UNSUPPORTED, "", err,
                                "is E57, which is not supported yet: convert it first, with \"pdal translate IN.e57 "

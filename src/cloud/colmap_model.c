@@ -7,7 +7,7 @@
 
 #include "base/array.h"
 
-static const struct spl_colmap_camera *find(const struct spl_colmap *model, unsigned long id)
+static const struct spl_colmap_camera *find(const struct spl_colmap *model, uint64_t id)
 {
     for (size_t i = 0; i < model->count; i++)
         if (model->cameras[i].id == id)
@@ -22,7 +22,8 @@ int spl_colmap_add_camera(struct spl_colmap *model, const struct spl_colmap_came
         (rc = spl_value_check(&camera->height, SPL_KIND_COUNT, "HEIGHT", err)))
         return rc;
     if (find(model, camera->id))
-        return spl_fail_field(err, SPL_E_INPUT, "CAMERA_ID", "camera %lu is there twice", camera->id);
+        return spl_fail_field(err, SPL_E_INPUT, "CAMERA_ID", "camera %llu is there twice",
+                              (unsigned long long)camera->id);
     if (model->count == SPL_COLMAP_CAMERAS_MAX)
         return spl_fail(err, SPL_E_LIMIT, "more than %d cameras", SPL_COLMAP_CAMERAS_MAX);
     if (spl_array_reserve(model->cameras, model->capacity, model->count + 1, err))
@@ -40,10 +41,11 @@ int spl_colmap_add_image(struct spl_colmap *model, const char *path, const struc
     const struct spl_colmap_camera *found = find(model, image->camera);
     int rc;
     if (!found)
-        return spl_fail_field(err, SPL_E_INPUT, "CAMERA_ID", "the model has no camera %lu", image->camera);
+        return spl_fail_field(err, SPL_E_INPUT, "CAMERA_ID", "the model has no camera %llu",
+                              (unsigned long long)image->camera);
     if (found->refused)
-        return spl_fail_field(err, SPL_E_UNSUPPORTED, "CAMERA_ID", "'%.200s' was taken with camera %lu", image->name,
-                              image->camera);
+        return spl_fail_field(err, SPL_E_UNSUPPORTED, "CAMERA_ID", "'%.200s' was taken with camera %llu", image->name,
+                              (unsigned long long)image->camera);
     values[SPL_CAMERA_q] = image->q;
     values[SPL_CAMERA_t] = image->t;
     values[SPL_CAMERA_width] = found->width;

@@ -8,7 +8,7 @@
 enum { SPL_COLMAP_CAMERAS_MAX = 65536 };
 
 struct spl_colmap_camera {
-    unsigned long id;
+    uint64_t id;
     bool refused; /* its images are, too */
     struct spl_value width, height, model, params;
 };
@@ -25,7 +25,7 @@ struct spl_colmap {
 /* An image as both write it; world to camera. */
 struct spl_colmap_image {
     struct spl_value q, t;
-    unsigned long camera;
+    uint64_t camera;
     const char *name;
 };
 

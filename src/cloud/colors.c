@@ -20,18 +20,26 @@ struct ranges {
     uint64_t stride, rows; /* every stride-th row gives an intensity */
 };
 
+/* What was not hit has no place, and its colour and intensity mean nothing. */
+static bool is_point(const struct spl_rows *rows, size_t r)
+{
+    return isfinite(rows->value[SPL_COLUMN_X][r]) && isfinite(rows->value[SPL_COLUMN_Y][r]) &&
+           isfinite(rows->value[SPL_COLUMN_Z][r]);
+}
+
 static void look(struct ranges *ranges, const struct spl_rows *rows)
 {
     for (size_t r = 0; ranges->colors && r < rows->count; r++)
         for (int k = 0; k < 3; k++) {
             double v = rows->value[SPL_COLUMN_RED + k][r];
-            if (v > ranges->color_max)
+            if (v > ranges->color_max && is_point(rows, r))
                 ranges->color_max = v;
         }
     ranges->done = ranges->color_max > 255.5;
     for (size_t r = 0; ranges->intensities && r < rows->count; r++) {
         double v = rows->value[SPL_COLUMN_INTENSITY][r];
-        if (ranges->rows++ % ranges->stride == 0 && isfinite(v) && ranges->sample_count < ranges->sample_limit)
+        if (ranges->rows++ % ranges->stride == 0 && isfinite(v) && is_point(rows, r) &&
+            ranges->sample_count < ranges->sample_limit)
             ranges->sample[ranges->sample_count++] = v;
     }
 }

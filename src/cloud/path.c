@@ -97,7 +97,11 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
             return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; known are %s, closed, fps",
                                   name, reader->list);
         if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
-            return spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number above 0, up to 1000");
+            return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name,
+                                                          "fps must be a number above 0, up to 1000, not %g",
+                                                          json_number_value(value))
+                                         : spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number, not %s",
+                                                          spl_json_type_name(value));
         if (flag && !json_is_boolean(value))
             return spl_fail_field(err, SPL_E_INPUT, name, "closed must be true or false, not %s",
                                   spl_json_type_name(value));

@@ -165,6 +165,9 @@ static int take_ascii_row(struct spl_cloud *cloud, const struct spl_ply_element 
         enum spl_field got = spl_fields_number(&fields, &value);
         if (got == SPL_FIELD_OK && p->column >= 0)
             rows->value[p->column][row] = value;
+        if (got == SPL_FIELD_OK && p->count_type && !(value >= 0 && value == floor(value)))
+            return spl_source_fail_line(source, source->line, p->name, err, "\"%s\" is no number of items",
+                                        spl_fields_show(&fields, text));
         for (double k = 0; got == SPL_FIELD_OK && p->count_type && k < value; k++)
             got = spl_fields_number(&fields, &item);
         if (got == SPL_FIELD_END)

@@ -77,6 +77,24 @@ static bool names_in_comment(struct spl_layout *layout, const char *line, size_t
     return spl_layout_from_names(layout, line, (size_t)(end - line)) && spl_layout_lacks(layout) < 0;
 }
 
+/* A header that names no x, y or z. */
+static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t length, struct spl_error *err)
+{
+    const struct text *text = cloud->state;
+    const char *lacks = spl_column_name(spl_layout_lacks(&text->layout));
+    enum { shown = 100 };
+    return spl_source_fail_line(
+        &cloud->source, cloud->source.line, lacks, err,
+        "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
+        "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
+        "with --columns%s",
+        length < shown ? (int)length : shown, line, length < shown ? "" : "…",
+        spl_text_names_degrees(line, length)
+            ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
+              "first"
+            : "");
+}
+
 /* Everything before the numbers: comments, names, a count. On success `line` is the first line of numbers. */
 static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line, size_t *length, struct spl_error *err)
 {
@@ -123,8 +141,7 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
         if (!spl_layout_from_names(layout, *line, *length))
             return spl_source_fail_line(source, source->line, "", err, "more than %d columns", SPL_TEXT_FIELDS);
         if (spl_layout_lacks(layout) >= 0)
-            return spl_source_fail_line(source, source->line, spl_column_name(spl_layout_lacks(layout)), err,
-                                        "no column has this name; name the columns with --columns");
+            return refuse_names(cloud, *line, *length, err);
         *named = true;
     }
 }
@@ -189,6 +206,32 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+/* "1,5" between semicolons or blanks; "5 2" where blanks lie between and the commas were taken for separators. */
+static bool is_decimal_comma(const struct spl_fields *fields)
+{
+    static const char digits[] = "0123456789";
+    const char *p = fields->start, *end = fields->end;
+    while (p < end && *p && strchr(digits, *p))
+        p++;
+    bool parted = p > fields->start && p < end && strchr(fields->separator == ',' ? " \t" : ",", *p);
+    while (parted && p < end && strchr(fields->separator == ',' ? " \t-" : ",", *p))
+        p++;
+    return parted && p < end && *p && strchr(digits, *p);
+}
+
+static int refuse_number(const struct spl_source *source, const struct spl_layout *layout, unsigned column,
+                         const struct spl_fields *fields, struct spl_error *err)
+{
+    char shown[32];
+    const char *text = spl_fields_show(fields, shown);
+    return spl_source_fail_line(source, source->line, spl_column_name(layout->column[column]), err,
+                                "\"%s\" in column %u is not a number%s", text, column + 1,
+                                is_decimal_comma(fields)
+                                    ? "; decimal commas are not read: write 1.5 for 1,5 (sed 's/,/./g' where commas do "
+                                      "not separate the columns)"
+                                    : "");
+}
+
 static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char *line, size_t length,
                      struct spl_error *err)
 {
@@ -197,7 +240,6 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
     const struct spl_source *source = &cloud->source;
     struct spl_fields fields = spl_fields_begin(line, length, layout->separator);
     size_t row = rows->count, ignored;
-    char shown[32];
 
     for (unsigned i = 0; i < layout->fields; i++) {
         int column = layout->column[i];
@@ -207,8 +249,7 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
             return spl_source_fail_line(source, source->line, spl_column_name(column), err,
                                         "column %u of %u is missing", i + 1, layout->fields);
         if (got == SPL_FIELD_BAD)
-            return spl_source_fail_line(source, source->line, spl_column_name(column), err,
-                                        "\"%s\" in column %u is not a number", spl_fields_show(&fields, shown), i + 1);
+            return refuse_number(source, layout, i, &fields, err);
     }
     if (layout->exact && !spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
         return spl_source_fail_line(source, source->line, "", err, "has more than the %u columns of the lines before",

@@ -4,6 +4,7 @@
  * Pure functions. */
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
@@ -29,9 +30,47 @@ int spl_layout_lacks(const struct spl_layout *layout)
     return SPL_COLUMN_SKIP;
 }
 
+/* What surveyors call x, y and z; so only where no column has the name itself. Longitudes and latitudes are neither. */
+static int column_from_synonym(const char *name, size_t length)
+{
+    static const struct {
+        const char *name;
+        int column;
+    } synonyms[] = {{"easting", SPL_COLUMN_X},
+                    {"northing", SPL_COLUMN_Y},
+                    {"height", SPL_COLUMN_Z},
+                    {"elevation", SPL_COLUMN_Z}};
+    for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
+        if (strlen(synonyms[i].name) == length && !strncasecmp(synonyms[i].name, name, length))
+            return synonyms[i].column;
+    return SPL_COLUMN_SKIP;
+}
+
+static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
+{
+    size_t name;
+    for (unsigned i = 0; i < layout->fields && spl_fields_text(&fields, &name) == SPL_FIELD_OK; i++) {
+        int column = column_from_synonym(fields.start, name);
+        if (column >= 0 && layout->column[i] < 0 && !has_column(layout, column))
+            layout->column[i] = (int8_t)column;
+    }
+}
+
+bool spl_text_names_degrees(const char *line, size_t length)
+{
+    static const char *const degrees[] = {"lon", "lat", "long", "longitude", "latitude"};
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
+    size_t name;
+    while (spl_fields_text(&fields, &name) == SPL_FIELD_OK)
+        for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++)
+            if (strlen(degrees[i]) == name && !strncasecmp(degrees[i], fields.start, name))
+                return true;
+    return false;
+}
+
 bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t length)
 {
-    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length)), again = fields;
     size_t name;
     *layout = (struct spl_layout){.exact = true};
     while (spl_fields_text(&fields, &name) == SPL_FIELD_OK) {
@@ -41,6 +80,7 @@ bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t l
         layout->column[layout->fields] = (int8_t)(has_column(layout, column) ? SPL_COLUMN_SKIP : column);
         layout->fields++;
     }
+    take_synonyms(layout, again);
     return true;
 }
 
@@ -100,6 +140,11 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
             return false;
         if (spl_fields_number(&field, &v[i]) != SPL_FIELD_OK)
             v[i] = NAN;
+    }
+    bool whole = spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+    if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2])) /* no point, so the rest of it says nothing */
+        return whole;
+    for (unsigned i = 0; i < layout->fields; i++) {
         sample->fraction[i] |= v[i] != floor(v[i]);
         sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
         sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
@@ -109,7 +154,7 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         sample->crooked[i] |= !(norm == 0 || fabs(norm - 1) < 0.02);
     }
     sample->lines++;
-    return spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+    return whole;
 }
 
 static bool is_normal(const struct spl_text_sample *s, unsigned i)

@@ -2,11 +2,13 @@
  * QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points as triples, which may be none).
  *
  * What is wrong is named with file, line and field. Any thread; no state. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "cloud/colmap_model.h"
+#include "cloud/fields.h"
 
 enum { text_max = 1024 };
 
@@ -38,7 +40,7 @@ static int read_number(const struct spl_source *source, char **words, const char
     /* strtod alone would also take hex floats, "nan" and "infinity" */
     if (word && strspn(word, "0123456789+-.eE") == strlen(word))
         *out = strtod(word, &end);
-    if (!word || end == word || *end)
+    if (!word || end == word || *end || !isfinite(*out))
         return spl_source_fail_line(source, source->line, field, err, "'%.32s' is no number", word ? word : "");
     return SPL_OK;
 }
@@ -52,12 +54,10 @@ static int read_numbers(const struct spl_source *source, char **words, const cha
     return rc;
 }
 
-static int read_id(const struct spl_source *source, const char *word, const char *field, unsigned long *id,
+static int read_id(const struct spl_source *source, const char *word, const char *field, uint64_t *id,
                    struct spl_error *err)
 {
-    char *end = NULL;
-    if (word && word[0] >= '0' && word[0] <= '9')
-        *id = strtoul(word, &end, 10);
+    const char *end = word ? spl_integer_parse(word, word + strlen(word), id) : NULL;
     return end && !*end
                ? SPL_OK
                : spl_source_fail_line(source, source->line, field, err, "'%.32s' is no whole number", word ? word : "");

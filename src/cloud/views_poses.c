@@ -9,6 +9,7 @@
 
 #include "cloud/fields.h"
 #include "cloud/view_list.h"
+#include "geom/size.h"
 
 static const char pose_suffix[] = ".pose.txt";
 

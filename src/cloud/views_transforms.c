@@ -11,6 +11,7 @@
 #include "cloud/path_reader.h"
 #include "cloud/view_list.h"
 #include "geom/camera_matrix.h"
+#include "geom/size.h"
 
 /* A lens value of the frame, or of all frames. */
 static const json_t *get(const json_t *document, const json_t *frame, const char *name)

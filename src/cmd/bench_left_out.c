@@ -8,10 +8,12 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/text.h"
 #include "cmd/bench.h"
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "image/load.h"
 #include "measure/left_out.h"
 
@@ -51,7 +53,9 @@ static void print_width(const char *name, const char *width, const struct spl_le
         all += sums->pixels[i];
     if (!sums->pixels[w])
         return;
-    printf("%-12.12s %-9s %6.1f", name, width, 100 * (double)sums->pixels[w] / (double)all);
+    char shown[13];
+    printf("%-12s %-9s %6.1f", spl_text_show(name, shown, sizeof shown), width,
+           100 * (double)sums->pixels[w] / (double)all);
     for (int step = 0; step < SPL_LEFT_OUT_STEPS; step++) {
         double colored = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_COLORED, step);
         double textured = spl_left_out_psnr(sums, w, SPL_LEFT_OUT_TEXTURED, step);
@@ -119,7 +123,7 @@ static int run(const struct arguments *a, struct spl_error *err)
     struct spl_renderer *renderer = NULL;
     struct spl_left_out sums = {0};
     int rc = spl_view_list_load_photographs(&list, a->cameras, &how, err);
-    if (rc || (rc = spl_dataset_open(a->dataset, true, &dataset, err)))
+    if (rc || (rc = spl_dataset_open_whole(a->dataset, true, &dataset, err)))
         goto done;
     if (!spl_dataset_get_info(dataset)->atoms) {
         rc = spl_fail(err, SPL_E_INPUT, "%s has no textures whose gain could be measured: pack it with --cameras",

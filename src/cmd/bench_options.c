@@ -8,6 +8,7 @@
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "geom/size.h"
 #include "shared.h"
 
@@ -131,6 +132,7 @@ static int take_reference(void *arguments, const char *option, char *text, struc
     return SPL_OK;
 }
 
+#define METHOD_NAME(NAME, name) " " #name
 static const struct spl_cmd_option options[] = {
     {"views", "FILE",
      "with --set a path, from the view 'overview' to the view 'close' of an entry of this JSON file, {\"NAME\": "
@@ -142,7 +144,8 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_COUNT_32(struct spl_cmd_bench_arguments, bench.frames, 2, 100000)},
     {"size", "WxH", "W or xH alone: at 16:9", .otherwise = "1280x720", .take = take_size},
     {"device", "LIST", "such as vulkan,egl; 'splatd devices' lists them", .otherwise = "auto", .take = take_devices},
-    {"method", "LIST", "such as splat,points,fill", .otherwise = "splat; all with -o", .take = take_methods},
+    {"method", "LIST", "of" SPL_METHODS(METHOD_NAME) ", joined by commas", .otherwise = "the first; all with -o",
+     .take = take_methods},
     {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
     {"memory-limit", "MIB", "device memory, or 2G and such; less than the dataset needs measures paging",
      SPL_CMD_MIB(struct spl_cmd_bench_arguments, bench.memory_limit, 1, 1u << 24)},
@@ -281,7 +284,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     a->sweep.dataset_path = argv[optind];
     a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {
-        status = spl_dataset_open(argv[i], false, &a->datasets[a->bench.dataset_count], err);
+        status = spl_dataset_open_whole(argv[i], false, &a->datasets[a->bench.dataset_count], err);
         a->bench.dataset_count += !status;
     }
     return status;

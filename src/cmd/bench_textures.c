@@ -11,6 +11,7 @@
 #include "cmd/bench_textures.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 #include "image/load.h"
 
 static void show_epoch(void *context, const char *what, const struct spl_train_progress *epoch)
@@ -23,7 +24,9 @@ static void show_epoch(void *context, const char *what, const struct spl_train_p
 static void show_photograph(void *context, const char *photograph)
 {
     (void)context;
-    fprintf(stderr, "photograph %s onto the splats\n", photograph);
+    fprintf(stderr, "photograph ");
+    spl_cmd_put_text(stderr, photograph, 0); // as a list of poses names it
+    fprintf(stderr, " onto the splats\n");
 }
 
 static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
@@ -176,7 +179,7 @@ static int open_inputs(struct bench *b, struct spl_error *err)
     const struct spl_photograph_options photographs = {.images = b->a.images, .get_size = get_size};
     int rc = spl_texture_file_open(b->a.textures, &b->file, err);
     if (!rc && b->a.dataset)
-        rc = spl_dataset_open(b->a.dataset, true, &b->dataset, err);
+        rc = spl_dataset_open_whole(b->a.dataset, true, &b->dataset, err);
     if (!rc && b->a.cameras)
         rc = spl_view_list_load_photographs(&b->cameras, b->a.cameras, &photographs, err);
     if (!rc && mkdir(b->a.folder, 0777) && errno != EEXIST)

@@ -8,34 +8,56 @@
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
-    *drawing = (struct spl_cmd_drawing){.width = width, .height = height, .format = -1, .layer = SPL_LAYER_COLOR};
+    *drawing = (struct spl_cmd_drawing){.size = {width, height}, .format = -1, .layer = SPL_LAYER_COLOR};
     spl_encode_options_init(&drawing->encode);
     spl_renderer_options_init(&drawing->renderer);
     spl_view_init(&drawing->view);
     drawing->view.layers = 1u << SPL_LAYER_COLOR;
 }
 
-static int parse_name(const char *command, const char *option, const char *text, int (*from_name)(const char *),
-                      int *out, struct spl_error *err)
+static const char *name_of_layer(int layer)
 {
-    *out = from_name(text);
-    return *out < 0 ? spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd %s --help' lists what it knows",
-                               option, text, command)
-                    : SPL_OK;
+    return spl_layer_name((enum spl_layer)layer);
 }
 
-static int parse_param(struct spl_view *view, const char *command, enum spl_method_param param, const char *text,
-                       struct spl_error *err)
+static const char *name_of_format(int format)
 {
+    return spl_format_name((enum spl_format)format);
+}
+
+static const char *name_of_method(int method)
+{
+    return spl_method_name((enum spl_method)method);
+}
+
+int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_drawing *d = drawing;
+    int rc = spl_cmd_take_name(option, text, spl_layer_from_name, name_of_layer, SPL_LAYER_COUNT, &d->layer, err);
+    d->view.layers = rc ? 0 : 1u << d->layer;
+    return rc;
+}
+
+int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    int method = 0;
+    int rc = spl_cmd_take_name(option, text, spl_method_from_name, name_of_method, SPL_METHOD_COUNT, &method, err);
+    if (!rc)
+        ((struct spl_cmd_drawing *)drawing)->view.method = (enum spl_method)method;
+    return rc;
+}
+
+int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    enum spl_method_param param = (enum spl_method_param)spl_method_param_from_name(option + strspn(option, "-"));
     const struct spl_method_param_info *info = spl_method_param_get(param);
-    char option[64];
     int rc, choice = 0;
     double value = 0;
     uint64_t count = 0;
-    snprintf(option, sizeof option, "--%s", info->name);
     switch (info->kind) {
     case SPL_PARAM_CHOICE:
-        rc = parse_name(command, option, text, info->choice_from_name, &choice, err);
+        rc = spl_cmd_take_name(option, text, info->choice_from_name, info->choice_name, (int)info->most + 1, &choice,
+                               err);
         value = choice;
         break;
     case SPL_PARAM_WHOLE:
@@ -47,60 +69,30 @@ static int parse_param(struct spl_view *view, const char *command, enum spl_meth
         rc = rc ? rc : spl_method_param_check(info, value, err);
     }
     if (!rc)
-        spl_view_set_param(view, param, value);
+        spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
     return rc;
 }
 
-int spl_cmd_drawing_parse(struct spl_cmd_drawing *d, const char *command, int id, const char *text,
-                          struct spl_error *err)
+int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
 {
-    int rc = SPL_OK, choice = 0;
-    uint64_t count = 0;
-    if (id >= SPL_CMD_PARAM && id < SPL_CMD_OWN)
-        return parse_param(&d->view, command, (enum spl_method_param)(id - SPL_CMD_PARAM), text, err);
-    switch (id) {
-    case SPL_CMD_SIZE:
-        return spl_cmd_parse_size("--size", text, &d->width, &d->height, err);
-    case SPL_CMD_METHOD:
-        rc = parse_name(command, "--method", text, spl_method_from_name, &choice, err);
-        d->view.method = (enum spl_method)choice;
-        return rc;
-    case SPL_CMD_LAYER:
-        rc = parse_name(command, "--layer", text, spl_layer_from_name, &d->layer, err);
-        d->view.layers = rc ? 0 : 1u << d->layer;
-        return rc;
-    case SPL_CMD_LOD:
-        return spl_cmd_parse_real("--lod", text, 0, 64, &d->view.lod, err);
-    case SPL_CMD_SUPERSAMPLE:
-        return spl_cmd_parse_real("--supersample", text, 0.25, 4, &d->view.supersample, err);
-    case SPL_CMD_BACKGROUND:
-        return spl_cmd_parse_color("--background", text, d->view.background, err);
-    case SPL_CMD_FORMAT:
-        return parse_name(command, "--format", text, spl_format_from_name, &d->format, err);
-    case SPL_CMD_QUALITY:
-        rc = spl_cmd_parse_count("--quality", text, 1, 100, &count, err);
-        d->encode.quality = (int)count;
-        return rc;
-    case SPL_CMD_DEPTH_SCALE:
-        return spl_cmd_parse_real("--depth-scale", text, 1e-6, 1e9, &d->encode.depth_scale, err);
-    case SPL_CMD_DEVICE:
-        d->renderer.device = text;
-        return SPL_OK;
-    case SPL_CMD_REQUIRE_GPU:
-        d->renderer.require_gpu = true;
-        return SPL_OK;
-    case SPL_CMD_MEMORY_LIMIT:
-        return spl_cmd_parse_bytes("--memory-limit", text, 1, 1, UINT64_MAX, &d->renderer.memory_limit, err);
-    case SPL_CMD_NO_VERIFY:
-        d->no_verify = true;
-        return SPL_OK;
-    default: /* 'o' */
-        d->output = text;
-        return SPL_OK;
-    }
+    return spl_cmd_parse_color(option, text, ((struct spl_cmd_drawing *)drawing)->view.background, err);
 }
 
-static void print_param(FILE *out, enum spl_method_param param)
+int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    return spl_cmd_take_name(option, text, spl_format_from_name, name_of_format, SPL_FORMAT_COUNT,
+                             &((struct spl_cmd_drawing *)drawing)->format, err);
+}
+
+int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    uint64_t count = 0;
+    int rc = spl_cmd_parse_count(option, text, 1, 100, &count, err);
+    ((struct spl_cmd_drawing *)drawing)->encode.quality = (int)count;
+    return rc;
+}
+
+static void print_param(FILE *out, enum spl_method_param param, size_t column)
 {
     const struct spl_method_param_info *info = spl_method_param_get(param);
     char range[256] = "", text[768];
@@ -114,21 +106,20 @@ static void print_param(FILE *out, enum spl_method_param param)
         snprintf(text, sizeof text, "%s: %s (%s)", range, info->help, info->choice_name((int)info->otherwise));
     else
         snprintf(text, sizeof text, "%s; %s (%g)", info->help, range, info->otherwise);
-    used = fprintf(out, "    --%s %s", info->name,
+    used = fprintf(out, "        --%s %s", info->name,
                    info->kind == SPL_PARAM_CHOICE  ? "NAME"
                    : info->kind == SPL_PARAM_WHOLE ? "N"
                                                    : "X");
-    spl_cmd_print_wrapped(out, (size_t)used, 27, text);
+    spl_cmd_print_wrapped(out, (size_t)used, column, text);
 }
 
-void spl_cmd_drawing_help(FILE *out)
+void spl_cmd_print_methods(FILE *out, size_t column)
 {
-    fprintf(out, "Methods, and what each takes:\n");
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         const struct spl_method_info *info = spl_method_get((enum spl_method)method);
-        spl_cmd_print_wrapped(out, (size_t)fprintf(out, "  --method %s", info->name), 27, info->help);
+        spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --method %s", info->name), column, info->help);
         for (int i = 0; i < SPL_PARAM_COUNT; i++)
             if (info->params >> i & 1)
-                print_param(out, (enum spl_method_param)i);
+                print_param(out, (enum spl_method_param)i, column);
     }
 }

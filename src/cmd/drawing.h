@@ -1,18 +1,18 @@
-/* What every command that makes images takes: how to draw, how to encode, where to render. */
+/* What every command that makes images takes: how to draw, how to encode, where to render, as rows of its table. */
 #ifndef SPL_CMD_DRAWING_H
 #define SPL_CMD_DRAWING_H
 
-#include <getopt.h>
 #include <stdint.h>
 #include <stdio.h>
 
 #include <splatd/image.h>
 #include <splatd/render.h>
 
-#include "base/error.h"
+#include "cmd/table.h"
 
+/* First member of the arguments of a command that has the rows below. */
 struct spl_cmd_drawing {
-    uint32_t width, height;              /* of --size; else what they were before */
+    uint32_t size[2];                    /* of --size; else what it was before */
     int format, layer;                   /* enum; format: -1 = not given */
     bool no_verify;
     const char *output;                  /* argument of -o; NULL = not given */
@@ -23,36 +23,37 @@ struct spl_cmd_drawing {
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height);
 
-/* Ids of the shared options; a command's own begin at SPL_CMD_OWN. */
-enum spl_cmd_drawing_id {
-    SPL_CMD_SIZE = 256, SPL_CMD_METHOD, SPL_CMD_LAYER, SPL_CMD_LOD, SPL_CMD_SUPERSAMPLE, SPL_CMD_BACKGROUND,
-    SPL_CMD_FORMAT, SPL_CMD_QUALITY, SPL_CMD_DEPTH_SCALE, SPL_CMD_DEVICE,
-    SPL_CMD_REQUIRE_GPU, SPL_CMD_MEMORY_LIMIT, SPL_CMD_NO_VERIFY,
-    SPL_CMD_PARAM, /* of a method, + enum spl_method_param */
-    SPL_CMD_OWN = SPL_CMD_PARAM + SPL_PARAM_COUNT,
-};
+/* `take` of rows. */
+int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err);
+void spl_cmd_print_methods(FILE *out, size_t column);
 
-/* Rows of getopt_long's table. */
-#define SPL_CMD_PARAM_OPTION(name, ...) {#name, required_argument, NULL, SPL_CMD_PARAM + SPL_PARAM_##name},
-#define SPL_CMD_DRAWING_OPTIONS                                                                                        \
-    SPL_METHOD_PARAMS(SPL_CMD_PARAM_OPTION, SPL_CMD_PARAM_OPTION, SPL_CMD_PARAM_OPTION)                                \
-    {"size", required_argument, NULL, SPL_CMD_SIZE}, {"method", required_argument, NULL, SPL_CMD_METHOD},              \
-        {"layer", required_argument, NULL, SPL_CMD_LAYER}, {"lod", required_argument, NULL, SPL_CMD_LOD},              \
-        {"supersample", required_argument, NULL, SPL_CMD_SUPERSAMPLE},                                                 \
-        {"background", required_argument, NULL, SPL_CMD_BACKGROUND},                                                   \
-        {"format", required_argument, NULL, SPL_CMD_FORMAT}, {"quality", required_argument, NULL, SPL_CMD_QUALITY},    \
-        {"depth-scale", required_argument, NULL, SPL_CMD_DEPTH_SCALE},                                                 \
-        {"device", required_argument, NULL, SPL_CMD_DEVICE}, {"require-gpu", no_argument, NULL, SPL_CMD_REQUIRE_GPU},  \
-        {"memory-limit", required_argument, NULL, SPL_CMD_MEMORY_LIMIT},                                               \
-        {"no-verify", no_argument, NULL, SPL_CMD_NO_VERIFY}, {"output", required_argument, NULL, 'o'},                 \
-        {"help", no_argument, NULL, 'h'}
-
-/* Writes what --help says of the methods and their parameters. */
-void spl_cmd_drawing_help(FILE *out);
-
-/* Takes the argument of a shared option, -o among them; `text` is borrowed. SPL_E_USAGE names the option, and `command`
- * for its help. */
-int spl_cmd_drawing_parse(struct spl_cmd_drawing *drawing, const char *command, int id, const char *text,
-                          struct spl_error *err);
+#define SPL_CMD_PARAM_ROW(param, ...) {.name = #param, .form = "X", .take = spl_cmd_take_param},
+#define SPL_CMD_DRAWING_ROWS                                                                                           \
+    {"lod", "L", "wanted spacing of splats in pixels; 0 = every splat", .otherwise = "1",                              \
+     SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
+        {"supersample", "N", "samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
+         .otherwise = "1", SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                           \
+        {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
+         .take = spl_cmd_take_background},                                                                             \
+        {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
+        SPL_METHOD_PARAMS(SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW)                                     \
+        {"method", "NAME", NULL, .take = spl_cmd_take_method}
+#define SPL_CMD_ENCODING_ROWS                                                                                          \
+    {"quality", "Q", "of a JPEG, 1 to 100", .otherwise = "90", .take = spl_cmd_take_quality},                          \
+        {"depth-scale", "S", "steps per unit of a depth PNG", .otherwise = "1000",                                     \
+         SPL_CMD_REAL(struct spl_cmd_drawing, encode.depth_scale, 1e-6, 1e9)}
+#define SPL_CMD_MACHINE_ROWS                                                                                           \
+    {.help = "Machine:"},                                                                                              \
+        {"device", "NAME", "'vulkan', 'egl', 'vulkan:1', a UUID or part of a name; see 'splatd devices'",              \
+         SPL_CMD_TEXT(struct spl_cmd_drawing, renderer.device)},                                                       \
+        {"require-gpu", NULL, "refuse software devices", SPL_CMD_FLAG(struct spl_cmd_drawing, renderer.require_gpu)},  \
+        {"memory-limit", "BYTES", "of device memory; 2G and such, too",                                                \
+         SPL_CMD_BYTES(struct spl_cmd_drawing, renderer.memory_limit, 1, UINT64_MAX)},                                 \
+        {"no-verify", NULL, "trust the file's checksums", SPL_CMD_FLAG(struct spl_cmd_drawing, no_verify)}
 
 #endif

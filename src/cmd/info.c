@@ -104,14 +104,18 @@ static void print_colors(const json_t *colors, uint64_t kept)
         if (!strcmp(from, "photographs")) {
             photographs = true;
             kept -= points < kept ? points : kept;
-            printf("%-16s%s: %s points, with the poses of %s\n", label, from, grouped(points, text), source);
+            printf("%-16s%s: %s points, with the poses of ", label, from, grouped(points, text));
         } else if (!photographs) {
-            printf("%-16s%s: %s points of %s\n", label, from, grouped(points, text), source);
+            printf("%-16s%s: %s points of ", label, from, grouped(points, text));
         } else if (kept && json_array_size(colors) == 2) {
-            printf("%-16s%s: the other %s points, of %s\n", label, from, grouped(kept, text), source);
+            printf("%-16s%s: the other %s points, of ", label, from, grouped(kept, text));
         } else if (kept) {
-            printf("%-16s%s: of the other %s points, those of %s\n", label, from, grouped(kept, text), source);
+            printf("%-16s%s: of the other %s points, those of ", label, from, grouped(kept, text));
+        } else {
+            continue;
         }
+        spl_cmd_put_text(stdout, source, 0);
+        printf("\n");
     }
 }
 
@@ -122,9 +126,27 @@ static void print_stream(const struct spl_stream_info *stream)
     for (int k = 0; k < SPL_STREAM_KNOWN_COUNT; k++)
         if (!strcmp(spl_streams_known[k].name, stream->name))
             about = spl_streams_known[k].about;
-    printf(", %s", stream->name);
-    if (about || *unit)
-        printf(" (%s%s%s)", unit, about && *unit ? ", " : "", about ? about : "");
+    printf(", ");
+    spl_cmd_put_text(stdout, stream->name, 0);
+    if (!about && !*unit)
+        return;
+    printf(" (");
+    spl_cmd_put_text(stdout, unit, 0);
+    printf("%s%s)", about && *unit ? ", " : "", about ? about : "");
+}
+
+static void print_line(const char *label, const char *text)
+{
+    printf("%-16s", label);
+    spl_cmd_put_text(stdout, text, 0);
+    printf("\n");
+}
+
+static void print_bytes(const char *attribute, double bytes)
+{
+    printf("  ");
+    spl_cmd_put_text(stdout, attribute, 14);
+    printf("%6.2f\n", bytes);
 }
 
 static void print_table(const struct spl_info_report *report)
@@ -134,8 +156,9 @@ static void print_table(const struct spl_info_report *report)
     const json_t *crs = json_object_get(spl_dataset_get_meta(report->dataset), "crs");
     char a[32], b[32], c[32], d[32];
     size_t i;
-    printf("%s  version %016" PRIx64 ", %.1f MB\n", info->id, info->version, (double)info->file_bytes / 1e6);
-    json_array_foreach(sources, i, source) printf("%-16s%s\n", i ? "" : "  source", json_string_value(source));
+    spl_cmd_put_text(stdout, info->id, 0);
+    printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
+    json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     printf("  points        %s read, %s kept\n", grouped(info->points, a), grouped(info->leaf_splats, b));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
@@ -156,7 +179,7 @@ static void print_table(const struct spl_info_report *report)
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
     printf("  unit          %s\n", info->unit);
     if (json_is_string(crs))
-        printf("  crs           %s\n", json_string_value(crs));
+        print_line("  crs", json_string_value(crs));
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
@@ -173,11 +196,13 @@ static void print_table(const struct spl_info_report *report)
     printf("\n  bytes a splat\n");
     for (int attribute = 0; attribute < spl_info_count(info); attribute++)
         if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
-            printf("  %-14s%6.2f\n", spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute));
-    printf("  %-14s%6.2f\n\n  bits that the scene needed (share of the splats)\n", "total",
-           spl_info_total_bytes_per_splat(info));
+            print_bytes(spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute));
+    print_bytes("total", spl_info_total_bytes_per_splat(info));
+    printf("\n  bits that the scene needed (share of the splats)\n");
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
-        printf("  %-22s", k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name);
+        printf("  ");
+        spl_cmd_put_text(stdout, k < SPL_INFO_CODES ? spl_info_codes[k].label : info->streams[k - SPL_INFO_CODES].name,
+                         22);
         for (int width = 0; width <= SPL_INFO_WIDTH_MAX; width++)
             if (report->widths[k][width] > 0)
                 printf("  %d: %.1f %%", width, 100 * report->widths[k][width]);

@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "dataset/chunk_clip.h"
 
@@ -24,57 +25,65 @@ static uint32_t code_word(const struct spl_chunk *chunk, enum spl_attribute attr
     return attribute == SPL_ATTRIBUTE_COLOR ? chunk->color_bits : chunk->geometry_bits;
 }
 
-static void gather_widths(struct spl_info_report *report)
+static void gather_widths(struct spl_info_report *report, const struct spl_tables *tables, uint32_t index)
 {
-    uint64_t chunk_count;
-    uint32_t stream_count;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(report->dataset, &chunk_count);
-    const struct spl_stream *streams = spl_dataset_get_streams(report->dataset, &stream_count);
-    for (uint64_t c = 0; c < chunk_count; c++) {
-        double share = chunks[c].count / (double)report->info->splats;
-        if (spl_chunk_kind(&chunks[c]) != SPL_CHUNK_DISCS)
-            continue;
-        for (int k = 0; k < SPL_INFO_CODES; k++)
-            for (unsigned s = 0; s < spl_info_codes[k].shift_count; s++) {
-                uint32_t width = code_word(&chunks[c], spl_info_codes[k].attribute) >> spl_info_codes[k].shifts[s];
-                width &= (1u << spl_info_codes[k].bits) - 1;
-                report->widths[k][width] += share / spl_info_codes[k].shift_count;
-            }
-        for (uint32_t s = 0; s < stream_count; s++)
-            report->widths[SPL_INFO_CODES + s][streams[s].width[c]] += share;
+    const struct spl_chunk *chunk = &tables->chunks[index];
+    double share = chunk->count / (double)report->info->splats;
+    for (int k = 0; k < SPL_INFO_CODES; k++)
+        for (unsigned s = 0; s < spl_info_codes[k].shift_count; s++) {
+            uint32_t width = code_word(chunk, spl_info_codes[k].attribute) >> spl_info_codes[k].shifts[s];
+            width &= (1u << spl_info_codes[k].bits) - 1;
+            report->widths[k][width] += share / spl_info_codes[k].shift_count;
+        }
+    for (uint32_t s = 0; s < tables->stream_count; s++)
+        report->widths[SPL_INFO_CODES + s][tables->width[s][index]] += share;
+}
+
+static void gather_node(struct spl_info_report *report, const struct spl_node *node, const struct spl_chunk *chunks)
+{
+    uint32_t depth = node->depth < SPL_INFO_LEVELS_MAX ? node->depth : SPL_INFO_LEVELS_MAX - 1;
+    struct spl_info_level *level = &report->levels[depth];
+    report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
+    level->nodes++;
+    level->chunks += node->chunk_count;
+    for (uint32_t c = 0; c < node->chunk_count; c++) {
+        uint32_t splats = spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS ? chunks[c].count : 0;
+        level->splats += splats;
+        level->pieces += spl_chunk_count_pieces(&chunks[c]);
+        level->spacing += (double)node->spacing * splats;
+    }
+}
+
+static void gather_page(struct spl_info_report *report, const struct spl_tables *tables)
+{
+    for (uint32_t n = 0; n < tables->node_count; n++)
+        gather_node(report, &tables->nodes[n], tables->chunks + (tables->nodes[n].first_chunk - tables->first_chunk));
+    for (uint32_t c = 0; c < tables->chunk_count; c++) {
+        const struct spl_chunk *chunk = &tables->chunks[c];
+        uint32_t kind = spl_chunk_kind(chunk);
+        report->clips += spl_clip_count(chunk);
+        report->chunks[kind]++;
+        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(chunk) : chunk->count;
+        report->bytes[kind] += SPL_CHUNK_BYTES + 4ull * spl_chunk_words(chunk);
+        if (kind == SPL_CHUNK_DISCS)
+            gather_widths(report, tables, c);
     }
 }
 
 int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint64_t node_count, chunk_count;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     *report = (struct spl_info_report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
-    for (uint64_t n = 0; n < node_count; n++) {
-        uint32_t depth = nodes[n].depth < SPL_INFO_LEVELS_MAX ? nodes[n].depth : SPL_INFO_LEVELS_MAX - 1;
-        struct spl_info_level *level = &report->levels[depth];
-        report->level_count = depth + 1 > report->level_count ? depth + 1 : report->level_count;
-        level->nodes++;
-        level->chunks += nodes[n].chunk_count;
-        for (uint32_t c = 0; c < nodes[n].chunk_count; c++) {
-            const struct spl_chunk *chunk = &chunks[nodes[n].first_chunk + c];
-            uint32_t splats = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
-            level->splats += splats;
-            level->pieces += spl_chunk_count_pieces(chunk);
-            level->spacing += (double)nodes[n].spacing * splats;
-        }
+    for (uint32_t page = 0; page < report->info->pages; page++) {
+        struct spl_error why = {0};
+        struct spl_tables *read;
+        const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, page, &read, &why);
+        if (!tables)
+            return spl_fail(err, why.code, "%s", why.message);
+        gather_page(report, tables);
+        free(read);
     }
     for (uint32_t i = 0; i < report->level_count; i++)
         report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
-    for (uint64_t c = 0; c < chunk_count; c++) {
-        uint32_t kind = spl_chunk_kind(&chunks[c]);
-        report->clips += spl_clip_count(&chunks[c]);
-        report->chunks[kind]++;
-        report->items[kind] += kind == SPL_CHUNK_LINES ? spl_chunk_count_pieces(&chunks[c]) : chunks[c].count;
-        report->bytes[kind] += SPL_CHUNK_BYTES + 4ull * spl_chunk_words(&chunks[c]);
-    }
-    gather_widths(report);
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }

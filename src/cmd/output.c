@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/text.h"
 
 int spl_cmd_write_output(const char *path, const void *bytes, size_t length, struct spl_error *err)
 {
@@ -25,6 +26,16 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
     int rc = spl_write_all(fd, bytes, length) ? spl_fail_errno(err, errno, "cannot write '%s'", path) : SPL_OK;
     close(fd);
     return rc;
+}
+
+void spl_cmd_put_text(FILE *out, const char *text, int width)
+{
+    size_t length;
+    bool printable;
+    for (; (length = spl_text_next(text, &printable)); text += length, width--)
+        fprintf(out, "%.*s", printable ? (int)length : 1, printable ? text : "?");
+    for (; width > 0; width--)
+        fputc(' ', out);
 }
 
 const char *spl_cmd_ending(const char *path)

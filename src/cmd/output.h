@@ -3,12 +3,16 @@
 #define SPL_CMD_OUTPUT_H
 
 #include <stddef.h>
+#include <stdio.h>
 
 #include "base/error.h"
 
 /* Writes `length` bytes to `path`, "-" being stdout. A file is written beside its place and renamed into it, so that a
  * failure leaves what was there before. Devices and pipes are written to directly. */
 int spl_cmd_write_output(const char *path, const void *bytes, size_t length, struct spl_error *err);
+
+/* A text of a file's, as spl_text_show() has it, in at least `width` characters. */
+void spl_cmd_put_text(FILE *out, const char *text, int width);
 
 /* What stands behind the last dot of the path's last name, "" where there is none: "mp4" of "a.b/c.mp4", "" of "a.b/c",
  * ".c", "a.b/" and "..". Borrows from `path`. */

@@ -78,7 +78,9 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     }
     for (uint32_t s = 0; s < r->stream_count; s++) {
         total += r->streams[s].bits;
-        fprintf(stderr, " %s %.2f,", r->streams[s].name, (double)r->streams[s].bits / 8 / splats);
+        fputc(' ', stderr);
+        spl_cmd_put_text(stderr, r->streams[s].name, 0);
+        fprintf(stderr, " %.2f,", (double)r->streams[s].bits / 8 / splats);
     }
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
@@ -106,7 +108,9 @@ static void say_trained(void *context, uint32_t epoch, double seconds, double ps
 static void say_warning(void *context, const char *text)
 {
     spl_cmd_progress_finish(context);
-    fprintf(stderr, "splatd: warning: %s\n", text);
+    fprintf(stderr, "splatd: warning: ");
+    spl_cmd_put_text(stderr, text, 0);
+    fputc('\n', stderr);
 }
 
 static void name_refused(void *context, const struct spl_error *why)
@@ -155,9 +159,9 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_REAL(struct arguments, pack.position_error, 1e-6, 1)},
     {"normal-error", "DEG", "mean, degrees", .otherwise = "1",
      SPL_CMD_REAL(struct arguments, pack.normal_error, 0.01, 30)},
-    {"points-only", NULL, "position, color and class alone: no normals and radii; method splat draws as fill",
+    {"points-only", NULL, "position, color and class alone: no normals and radii, so nothing is drawn as discs",
      SPL_CMD_FLAG(struct arguments, pack.points_only)},
-    {"no-linear", NULL, "do not look for wires, poles and cables, which method fill draws as they are",
+    {"no-linear", NULL, "do not look for wires, poles and cables: they are drawn as the rest is",
      SPL_CMD_FLAG(struct arguments, pack.no_linear)},
     {"no-clip-lines", NULL, "discs are not cut where surfaces end", SPL_CMD_FLAG(struct arguments, pack.no_clip_lines)},
     {"cameras", "MODEL",
@@ -205,11 +209,11 @@ static const struct spl_cmd_table table = {
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"
         "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
-        "Points as they are, several times faster, to be rendered with method fill or points:\n"
+        "Points as they are, several times faster, for the methods that need no normals and radii:\n"
         "  splatd pack street.las --points-only -o street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
-    .after = "\nAbout 80 bytes of memory a point. Progress and the summary go to stderr.\n",
+    .after = "\nAbout 80 bytes of memory a point, 180 on a wire. Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/text.h"
 
 /* "950", "1.2 k", "34 M": two or three digits. */
 static const char *scaled(double value, char text[16])
@@ -72,9 +73,11 @@ void spl_cmd_progress(void *context, const struct spl_progress *progress)
     struct spl_cmd_progress *state = context;
     int terminal = isatty(STDERR_FILENO);
     uint64_t now = spl_now_ns();
-    if (strncmp(state->stage, progress->stage, sizeof state->stage - 1)) {
+    char stage[sizeof state->stage];
+    spl_text_show(progress->stage, stage, sizeof stage); // with the name of a scan
+    if (strcmp(state->stage, stage)) {
         spl_cmd_progress_finish(state);
-        snprintf(state->stage, sizeof state->stage, "%s", progress->stage);
+        strcpy(state->stage, stage);
         state->start_ns = state->said_ns = now;
         if (!terminal)
             fprintf(stderr, "%s...\n", state->stage);

@@ -13,99 +13,60 @@
 #include <splatd/render.h>
 
 #include "cmd/drawing.h"
-#include "cmd/options.h"
 #include "cmd/output.h"
+#include "geom/size.h"
 
 struct arguments {
+    struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
-    struct spl_cmd_drawing drawing;
 };
 
-static void usage(FILE *out)
-{
-    fprintf(out,
-            "usage: splatd render NAME.spld [OPTION…] -o OUT.{jpg,png,npy}\n\n"
-            "Renders one view of a packed dataset. Without a camera it is the dataset's default view.\n\n"
-            "A first look:\n"
-            "  splatd render courtyard.spld -o view.jpg\n"
-            "From a place, towards a place, metric depth in millimetres:\n"
-            "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --fov 70 --layer depth -o depth.png\n"
-            "A calibrated camera, float depth in metres, nothing = NaN:\n"
-            "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
-            "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
-            "Cut out, four samples a pixel side, to another program:\n"
-            "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n"
-            "Camera, in the dataset's coordinates:\n"
-            "  --eye X,Y,Z --target X,Y,Z --up X,Y,Z    left out: the default view's\n"
-            "  --fov DEG                vertical field of view; or a pinhole in pixels:\n"
-            "  --fx F [--fy F --cx X --cy Y]            fy = fx, principal point in the middle when left out\n"
-            "  --size WxH               pixels (1280x720); W or xH alone: at 16:9\n"
-            "  --near N --far N         view depths that are drawn\n"
-            "Drawing:\n"
-            "  --layer LAYER            color, depth (along the viewing axis), range (along the ray), normal, id,\n"
-            "                           coverage (color)\n"
-            "  --lod L                  wanted spacing of splats in pixels; 0 = every splat (1)\n"
-            "  --supersample N          samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge (1)\n"
-            "  --background COLOUR      a CSS name (white), #rrggbb, #rrggbbaa or transparent (black)\n");
-    spl_cmd_drawing_help(out);
-    fprintf(out,
-            "File:\n"
-            "  -o, --output FILE        written in one piece; '-' is stdout and wants --format\n"
-            "  --format jpeg|png|npy|raw  when the file's ending does not say it\n"
-            "  --quality Q              of a JPEG, 1 to 100 (90)\n"
-            "  --depth-scale S          steps per unit of a depth PNG (1000)\n"
-            "Machine:\n"
-            "  --device NAME            'vulkan', 'egl', 'vulkan:1', a UUID or part of a name; see 'splatd devices'\n"
-            "  --require-gpu            refuse software devices\n"
-            "  --memory-limit BYTES     of device memory; 2G and such, too\n"
-            "  --no-verify              trust the file's checksums\n");
-}
+_Static_assert(offsetof(struct arguments, drawing) == 0, "its rows know it there");
 
-enum option_id { OPT_EYE = SPL_CMD_OWN, OPT_TARGET, OPT_UP, OPT_FOV, OPT_FX, OPT_FY, OPT_CX, OPT_CY, OPT_NEAR, OPT_FAR };
-
-static const struct option options[] = {
-    {"eye", required_argument, NULL, OPT_EYE},
-    {"target", required_argument, NULL, OPT_TARGET},
-    {"up", required_argument, NULL, OPT_UP},
-    {"fov", required_argument, NULL, OPT_FOV},
-    {"fx", required_argument, NULL, OPT_FX},
-    {"fy", required_argument, NULL, OPT_FY},
-    {"cx", required_argument, NULL, OPT_CX},
-    {"cy", required_argument, NULL, OPT_CY},
-    {"near", required_argument, NULL, OPT_NEAR},
-    {"far", required_argument, NULL, OPT_FAR},
-    SPL_CMD_DRAWING_OPTIONS,
-    {0},
+static const struct spl_cmd_option options[] = {
+    {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
+    {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
+    {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
+    {"up", "X,Y,Z", "what is up in the image", SPL_CMD_VECTOR(struct arguments, up)},
+    {"fov", "DEG", "vertical field of view; or a pinhole in pixels:", SPL_CMD_REAL(struct arguments, fov, 1e-6, 179)},
+    {"fx", "F", "focal length", SPL_CMD_REAL(struct arguments, fx, 1e-6, 1e9)},
+    {"fy", "F", "the same, downwards", .otherwise = "fx", SPL_CMD_REAL(struct arguments, fy, 1e-6, 1e9)},
+    {"cx", "X", "principal point", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cx, -1e9, 1e9)},
+    {"cy", "Y", "the same, downwards", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cy, -1e9, 1e9)},
+    {"size", "WxH", "pixels; W or xH alone: at 16:9", .otherwise = "1280x720",
+     SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
+    {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 1e-9, 1e12)},
+    {"far", "N", "and up to which", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
+    {.help = "Drawing:"},
+    {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage",
+     .otherwise = "color", .take = spl_cmd_take_layer},
+    SPL_CMD_DRAWING_ROWS,
+    {.help = "File:"},
+    {"output", "FILE", "written in one piece; '-' is stdout and wants --format", .letter = 'o',
+     SPL_CMD_TEXT(struct spl_cmd_drawing, output)},
+    {"format", "F", "jpeg, png, npy, raw or webp, when the file's ending does not say it", .take = spl_cmd_take_format},
+    SPL_CMD_ENCODING_ROWS,
+    SPL_CMD_MACHINE_ROWS,
 };
 
-static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
-{
-    switch (id) {
-    case OPT_EYE:
-        return spl_cmd_parse_vector("--eye", text, a->eye, err);
-    case OPT_TARGET:
-        return spl_cmd_parse_vector("--target", text, a->target, err);
-    case OPT_UP:
-        return spl_cmd_parse_vector("--up", text, a->up, err);
-    case OPT_FOV:
-        return spl_cmd_parse_real("--fov", text, 1e-6, 179, &a->fov, err);
-    case OPT_FX:
-        return spl_cmd_parse_real("--fx", text, 1e-6, 1e9, &a->fx, err);
-    case OPT_FY:
-        return spl_cmd_parse_real("--fy", text, 1e-6, 1e9, &a->fy, err);
-    case OPT_CX:
-        return spl_cmd_parse_real("--cx", text, -1e9, 1e9, &a->cx, err);
-    case OPT_CY:
-        return spl_cmd_parse_real("--cy", text, -1e9, 1e9, &a->cy, err);
-    case OPT_NEAR:
-        return spl_cmd_parse_real("--near", text, 1e-9, 1e12, &a->near, err);
-    case OPT_FAR:
-        return spl_cmd_parse_real("--far", text, 1e-9, 1e12, &a->far, err);
-    default:
-        return spl_cmd_drawing_parse(&a->drawing, "render", id, text, err);
-    }
-}
+static const struct spl_cmd_table table = {
+    .command = "render",
+    .before =
+        "usage: splatd render NAME.spld [OPTION…] -o OUT.{jpg,png,npy}\n\n"
+        "Renders one view of a packed dataset. Without a camera it is the dataset's default view.\n\n"
+        "A first look:\n"
+        "  splatd render courtyard.spld -o view.jpg\n"
+        "From a place, towards a place, metric depth in millimetres:\n"
+        "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --fov 70 --layer depth -o depth.png\n"
+        "A calibrated camera, float depth in metres, nothing = NaN:\n"
+        "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
+        "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+        "Cut out, four samples a pixel side, to another program:\n"
+        "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
 
 /* --format, else what stands behind the last dot. */
 static int resolve_format(struct arguments *a, struct spl_error *err)
@@ -131,14 +92,14 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     struct spl_camera *camera = &a->drawing.view.camera;
-    int rc = spl_dataset_get_default_camera(dataset, a->drawing.width, a->drawing.height, camera, err);
+    int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
     if (rc)
         return rc;
     if (!isnan(a->fov) && !isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");
     if (!isnan(a->fy) && isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fy is given without --fx");
-    if (!isnan(a->fov) && (rc = spl_camera_set_fov(camera, a->fov, a->drawing.width, a->drawing.height, err)))
+    if (!isnan(a->fov) && (rc = spl_camera_set_fov(camera, a->fov, a->drawing.size[0], a->drawing.size[1], err)))
         return rc;
     if (!isnan(a->fx))
         camera->fx = camera->fy = a->fx;
@@ -212,25 +173,16 @@ int spl_cmd_render(int argc, char **argv)
         .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
         .near = NAN, .far = NAN,
     };
-    spl_cmd_drawing_init(&a.drawing, 1280, 720);
     struct spl_error err = {0};
-    for (int id; (id = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
-        if (id == 'h') {
-            usage(stdout);
-            return 0;
-        }
-        if (id == '?') {
-            fprintf(stderr, "'splatd render --help' shows how\n");
-            return 2;
-        }
-        if (parse_option(id, optarg, &a, &err))
-            return spl_cmd_fail(&err);
-    }
-    if (argc - optind != 1) {
-        fprintf(stderr, "splatd: render takes one dataset: splatd render hall.spld -o view.jpg; "
-                        "'splatd render --help' shows more\n");
-        return 2;
-    }
+    spl_cmd_drawing_init(&a.drawing, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT);
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && argc - optind != 1)
+        rc = spl_fail(&err, SPL_E_USAGE, "render takes one dataset: splatd render hall.spld -o view.jpg; "
+                                         "'splatd render --help' shows more");
+    if (rc)
+        return spl_cmd_fail(&err);
     a.dataset = argv[optind];
     if (resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);

@@ -41,6 +41,22 @@ static int take_choice(const struct spl_cmd_option *o, const char *option, const
     return spl_fail_field(err, SPL_E_USAGE, o->name, "%s takes %s, not '%.32s'", option, all, text);
 }
 
+int spl_cmd_take_name(const char *option, const char *text, int (*from_name)(const char *),
+                      const char *(*name_of)(int place), int count, int *out, struct spl_error *err)
+{
+    const char *names[SPL_CMD_NAMES_MAX + 1] = {0};
+    char all[names_room];
+    *out = from_name(text);
+    if (*out >= 0)
+        return SPL_OK;
+    spl_assert(count <= SPL_CMD_NAMES_MAX);
+    for (int i = 0; i < count; i++)
+        names[i] = name_of(i);
+    join(names, all);
+    return spl_fail_field(err, SPL_E_USAGE, option + strspn(option, "-"), "%s takes %s, not '%.32s'", option, all,
+                          text);
+}
+
 static int take_count_32(const struct spl_cmd_option *o, const char *option, const char *text, uint32_t *out,
                          struct spl_error *err)
 {
@@ -71,6 +87,10 @@ static int take(const struct spl_cmd_option *o, void *arguments, char *text, str
         return take_count_32(o, option, text, member, err);
     case SPL_CMD_KIND_MIB:
         return spl_cmd_parse_bytes(option, text, 1 << 20, o->least, o->most, member, err);
+    case SPL_CMD_KIND_BYTES:
+        return spl_cmd_parse_bytes(option, text, 1, o->least, o->most, member, err);
+    case SPL_CMD_KIND_VECTOR:
+        return spl_cmd_parse_vector(option, text, member, err);
     case SPL_CMD_KIND_PIXELS:
         return spl_cmd_parse_size(option, text, member, (uint32_t *)member + 1, err);
     case SPL_CMD_KIND_CHOICE:
@@ -105,7 +125,7 @@ static void print_limits(const struct spl_cmd_option *o, char *out, size_t room)
     char range[64] = "";
     if (counted && o->most != UINT64_MAX)
         snprintf(range, sizeof range, "%" PRIu64 " to %" PRIu64, o->least, o->most);
-    else if (o->kind == SPL_CMD_KIND_REAL)
+    else if (o->kind == SPL_CMD_KIND_REAL && (o->from > 0 ? o->to / o->from : o->to - o->from) < 1e8)
         snprintf(range, sizeof range, "%g to %g", o->from, o->to);
     out[0] = '\0';
     if (*range || fallback)
@@ -126,7 +146,7 @@ void spl_cmd_table_print_help(const struct spl_cmd_table *table)
     char names[96], text[1024];
     size_t column = 0;
     for (size_t i = 0; i < table->count; i++)
-        if (table->options[i].name) {
+        if (table->options[i].name && table->options[i].help) {
             size_t length = (size_t)print_names(&table->options[i], names, sizeof names) + 2;
             column = length > column && length <= help_column ? length : column;
         }
@@ -135,8 +155,11 @@ void spl_cmd_table_print_help(const struct spl_cmd_table *table)
         const struct spl_cmd_option *o = &table->options[i];
         if (!o->name) {
             puts(o->help);
-            continue;
+            if (o->print)
+                o->print(stdout, column);
         }
+        if (!o->name || !o->help)
+            continue;
         int length = print_names(o, names, sizeof names);
         size_t used = (size_t)snprintf(text, sizeof text, "%s", o->help);
         print_limits(o, text + used, sizeof text - used);

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "base/error.h"
 
@@ -17,6 +18,8 @@ enum spl_cmd_kind {
     SPL_CMD_KIND_COUNT,    /* uint64_t in [least, most] */
     SPL_CMD_KIND_COUNT_32, /* uint32_t, the same */
     SPL_CMD_KIND_MIB,      /* uint64_t of bytes; the text and [least, most] count MiB */
+    SPL_CMD_KIND_BYTES,    /* the same; they count bytes */
+    SPL_CMD_KIND_VECTOR,   /* double[3] */
     SPL_CMD_KIND_PIXELS,   /* uint32_t[2]; a side that is left out follows the default's ratio */
     SPL_CMD_KIND_CHOICE,   /* an enum or int: the place of the text in `names` */
 };
@@ -24,17 +27,19 @@ enum spl_cmd_kind {
 struct spl_cmd_option {
     const char *name; /* NULL: no option, a heading of --help */
     const char *form; /* of its argument, "WxH"; NULL: it takes none */
-    const char *help; /* without range and default, which stand behind it; lines are broken by --help */
+    const char *help; /* without range and default, which stand behind it; lines are broken by --help. NULL: a heading's
+                         `print` says it */
     enum spl_cmd_kind kind;
     char letter;           /* of the short form; 0: there is none */
     size_t offset;         /* of the member in the command's arguments */
-    double from, to;       /* of a REAL */
+    double from, to;       /* of a REAL; --help says them where they are less than eight decades apart */
     uint64_t least, most;  /* of the others */
     const char *fallback;  /* parsed as if it stood first on the command line; NULL: the member stays as it was */
     const char *otherwise; /* only said: what stands for an option that is not given; NULL: nothing */
     const char *const *names; /* of a CHOICE, closed by NULL */
     /* `option` is what messages call it, "--lod"; `text` its argument, which may be cut in place, or NULL. */
     int (*take)(void *arguments, const char *option, char *text, struct spl_error *err);
+    void (*print)(FILE *out, size_t column); /* of a heading: what stands below it, help from `column` on, or NULL */
 };
 
 /* Initialisers of rows: the kind, and a member whose C type it must have. */
@@ -51,6 +56,9 @@ struct spl_cmd_option {
     .kind = SPL_CMD_KIND_COUNT_32, SPL_CMD_MEMBER(type, member, uint32_t), .least = (first), .most = (last)
 #define SPL_CMD_MIB(type, member, first, last)                                                                         \
     .kind = SPL_CMD_KIND_MIB, SPL_CMD_MEMBER(type, member, uint64_t), .least = (first), .most = (last)
+#define SPL_CMD_BYTES(type, member, first, last)                                                                       \
+    .kind = SPL_CMD_KIND_BYTES, SPL_CMD_MEMBER(type, member, uint64_t), .least = (first), .most = (last)
+#define SPL_CMD_VECTOR(type, member) .kind = SPL_CMD_KIND_VECTOR, SPL_CMD_MEMBER(type, member, double[3])
 #define SPL_CMD_PIXELS(type, member) .kind = SPL_CMD_KIND_PIXELS, SPL_CMD_MEMBER(type, member, uint32_t[2])
 #define SPL_CMD_CHOICE(type, member, list)                                                                             \
     .kind = SPL_CMD_KIND_CHOICE,                                                                                       \
@@ -63,6 +71,11 @@ struct spl_cmd_table {
     const struct spl_cmd_option *options; /* --help, -h is beside them */
     size_t count;
 };
+
+/* Finds the place of an argument among names: `from_name` gives it or -1, `name_of` the name of each of `count`, which
+ * the message lists. SPL_E_USAGE. */
+int spl_cmd_take_name(const char *option, const char *text, int (*from_name)(const char *),
+                      const char *(*name_of)(int place), int count, int *out, struct spl_error *err);
 
 enum { SPL_CMD_DONE = 1 };
 

@@ -24,115 +24,70 @@
 #include "base/memory.h"
 #include "cloud/path.h"
 #include "cmd/drawing.h"
-#include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "image/video.h"
 
 struct arguments {
+    struct spl_cmd_drawing drawing; /* first */
     const char *dataset, *path;
     uint64_t frames;
     double fps, seconds;
     int positions, rotations, ease; /* enum */
     bool closed, video;
-    struct spl_cmd_drawing drawing;
     struct spl_camera *cameras; // owned
     size_t count;
     uint64_t saturated;      /* pixels beyond what a depth PNG can hold, of all frames */
     size_t saturated_frames; /* those that have some */
 };
 
-static void usage(FILE *out)
-{
-    fprintf(out,
-            "usage: splatd tour NAME.spld --path FILE -o OUT.mp4|DIR [OPTION…]\n\n"
-            "Renders frames along a camera path: nerfstudio's camera_path.json, Open3D's trajectory, a COLMAP\n"
-            "model, a TUM trajectory, or keyframes of splatd itself.\n\n"
-            "What nerfstudio's viewer has saved, as a video:\n"
-            "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
-            "Ten seconds between keyframes, slow at both ends, at another size:\n"
-            "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
-            "Metric depth images of a recorded trajectory, one a pose, into a folder:\n"
-            "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n"
-            "Path:\n"
-            "  --path FILE              JSON, a TUM text, or the folder of a COLMAP model, binary or text\n"
-            "  --frames N               how many; or\n"
-            "  --seconds S              how long. Neither: every camera of the path is a frame\n"
-            "  --fps F                  frames a second (the path's own, or 30)\n"
-            "  --positions KIND         centripetal, uniform (Catmull-Rom) or linear (centripetal)\n"
-            "  --rotations KIND         squad or slerp (squad)\n"
-            "  --ease KIND              none, in, out or in-out (none)\n"
-            "  --closed                 the last camera is followed by the first\n"
-            "Drawing:\n"
-            "  --size WxH               pixels (the path's own, or 1280x720); W or xH alone: at that ratio\n"
-            "  --lod L, --supersample N, --background COLOUR, and methods with their parameters, as of\n"
-            "  'splatd render'\n"
-            "  --layer LAYER            as of 'splatd render', for images; a video is of color\n"
-            "Output:\n"
-            "  -o, --output OUT         OUT.mp4, or, without an ending, a folder that gets 000000.jpeg and so on\n"
-            "  --format jpeg|png|npy|raw  of images (jpeg)\n"
-            "  --quality Q, --depth-scale S\n"
-            "Machine:\n"
-            "  --device NAME, --require-gpu, --memory-limit BYTES, --no-verify   as of 'splatd render'\n");
-}
+_Static_assert(offsetof(struct arguments, drawing) == 0, "its rows know it there");
 
-enum option_id {
-    OPT_PATH = SPL_CMD_OWN,
-    OPT_FRAMES,
-    OPT_SECONDS,
-    OPT_FPS,
-    OPT_POSITIONS,
-    OPT_ROTATIONS,
-    OPT_EASE,
-    OPT_CLOSED
+static const struct spl_cmd_option options[] = {
+    {.help = "Path:"},
+    {"path", "FILE", "JSON, a TUM text, or the folder of a COLMAP model, binary or text",
+     SPL_CMD_TEXT(struct arguments, path)},
+    {"frames", "N", "how many, or --seconds", SPL_CMD_COUNT(struct arguments, frames, 1, SPL_CAMERA_PATH_MAX)},
+    {"seconds", "S", "how long; without both every camera of the path is a frame",
+     SPL_CMD_REAL(struct arguments, seconds, 1e-3, 86400)},
+    {"fps", "F", "frames a second", .otherwise = "the path's own, or 30",
+     SPL_CMD_REAL(struct arguments, fps, 1e-3, 1000)},
+    {"positions", "KIND", "centripetal, uniform (Catmull-Rom) or linear", .otherwise = "centripetal",
+     SPL_CMD_CHOICE(struct arguments, positions, spl_path_positions_names)},
+    {"rotations", "KIND", "squad or slerp", .otherwise = "squad",
+     SPL_CMD_CHOICE(struct arguments, rotations, spl_path_rotations_names)},
+    {"ease", "KIND", "none, in, out or in-out", .otherwise = "none",
+     SPL_CMD_CHOICE(struct arguments, ease, spl_path_ease_names)},
+    {"closed", NULL, "the last camera is followed by the first", SPL_CMD_FLAG(struct arguments, closed)},
+    {.help = "Drawing:"},
+    {"size", "WxH", "pixels; W or xH alone: at that ratio", .otherwise = "the path's own, or 1280x720",
+     SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
+    {"layer", "LAYER", "as of 'splatd render', for images; a video is of color", .otherwise = "color",
+     .take = spl_cmd_take_layer},
+    SPL_CMD_DRAWING_ROWS,
+    {.help = "Output:"},
+    {"output", "OUT", "OUT.mp4, or, without an ending, a folder that gets 000000.jpeg and so on", .letter = 'o',
+     SPL_CMD_TEXT(struct spl_cmd_drawing, output)},
+    {"format", "F", "of images: jpeg, png, npy, raw or webp", .otherwise = "jpeg", .take = spl_cmd_take_format},
+    SPL_CMD_ENCODING_ROWS,
+    SPL_CMD_MACHINE_ROWS,
 };
 
-static const struct option options[] = {
-    {"path", required_argument, NULL, OPT_PATH},
-    {"frames", required_argument, NULL, OPT_FRAMES},
-    {"seconds", required_argument, NULL, OPT_SECONDS},
-    {"fps", required_argument, NULL, OPT_FPS},
-    {"positions", required_argument, NULL, OPT_POSITIONS},
-    {"rotations", required_argument, NULL, OPT_ROTATIONS},
-    {"ease", required_argument, NULL, OPT_EASE},
-    {"closed", no_argument, NULL, OPT_CLOSED},
-    SPL_CMD_DRAWING_OPTIONS,
-    {0},
+static const struct spl_cmd_table table = {
+    .command = "tour",
+    .before =
+        "usage: splatd tour NAME.spld --path FILE -o OUT.mp4|DIR [OPTION…]\n\n"
+        "Renders frames along a camera path: nerfstudio's camera_path.json, Open3D's trajectory, a COLMAP\n"
+        "model, a TUM trajectory, or keyframes of splatd itself.\n\n"
+        "What nerfstudio's viewer has saved, as a video:\n"
+        "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
+        "Ten seconds between keyframes, slow at both ends, at another size:\n"
+        "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
+        "Metric depth images of a recorded trajectory, one a pose, into a folder:\n"
+        "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
 };
-
-static int parse_kind(const char *option, const char *text, const char *const *names, int *out, struct spl_error *err)
-{
-    for (*out = 0; names[*out]; (*out)++)
-        if (!strcmp(text, names[*out]))
-            return SPL_OK;
-    return spl_fail(err, SPL_E_USAGE, "%s does not know '%s'; 'splatd tour --help' lists what it knows", option, text);
-}
-
-static int parse_option(int id, const char *text, struct arguments *a, struct spl_error *err)
-{
-    switch (id) {
-    case OPT_PATH:
-        a->path = text;
-        return SPL_OK;
-    case OPT_FRAMES:
-        return spl_cmd_parse_count("--frames", text, 1, SPL_CAMERA_PATH_MAX, &a->frames, err);
-    case OPT_SECONDS:
-        return spl_cmd_parse_real("--seconds", text, 1e-3, 86400, &a->seconds, err);
-    case OPT_FPS:
-        return spl_cmd_parse_real("--fps", text, 1e-3, 1000, &a->fps, err);
-    case OPT_POSITIONS:
-        return parse_kind("--positions", text, spl_path_positions_names, &a->positions, err);
-    case OPT_ROTATIONS:
-        return parse_kind("--rotations", text, spl_path_rotations_names, &a->rotations, err);
-    case OPT_EASE:
-        return parse_kind("--ease", text, spl_path_ease_names, &a->ease, err);
-    case OPT_CLOSED:
-        a->closed = true;
-        return SPL_OK;
-    default:
-        return spl_cmd_drawing_parse(&a->drawing, "tour", id, text, err);
-    }
-}
 
 static int resolve_output(struct arguments *a, struct spl_error *err)
 {
@@ -160,7 +115,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const struct spl_camera_limits limits = {.side_px = 65535, .pixels = 64 << 20};
     struct spl_camera_defaults defaults = {.fov = info->default_fov};
-    struct spl_path_options path_options = {a->drawing.width, a->drawing.height, &defaults, &limits};
+    struct spl_path_options path_options = {a->drawing.size[0], a->drawing.size[1], &defaults, &limits};
     struct spl_path_motion motion = {a->positions, a->rotations, a->ease};
     struct spl_camera_path path = {0};
     struct spl_camera camera = {0};
@@ -278,25 +233,16 @@ static int run(struct arguments *a, struct spl_error *err)
 int spl_cmd_tour(int argc, char **argv)
 {
     struct arguments a = {.fps = NAN, .seconds = NAN};
-    spl_cmd_drawing_init(&a.drawing, 0, 0);
     struct spl_error err = {0};
-    for (int id; (id = getopt_long(argc, argv, "o:h", options, NULL)) >= 0;) {
-        if (id == 'h') {
-            usage(stdout);
-            return 0;
-        }
-        if (id == '?') {
-            fprintf(stderr, "'splatd tour --help' shows how\n");
-            return 2;
-        }
-        if (parse_option(id, optarg, &a, &err))
-            return spl_cmd_fail(&err);
-    }
-    if (argc - optind != 1) {
-        fprintf(stderr, "splatd: tour takes one dataset: splatd tour hall.spld --path camera_path.json -o tour.mp4; "
-                        "'splatd tour --help' shows more\n");
-        return 2;
-    }
+    spl_cmd_drawing_init(&a.drawing, 0, 0);
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    if (!rc && argc - optind != 1)
+        rc = spl_fail(&err, SPL_E_USAGE, "tour takes one dataset: splatd tour hall.spld --path camera_path.json -o "
+                                         "tour.mp4; 'splatd tour --help' shows more");
+    if (rc)
+        return spl_cmd_fail(&err);
     a.dataset = argv[optind];
     if (resolve_output(&a, &err) || run(&a, &err))
         return spl_cmd_fail(&err);

@@ -1,18 +1,22 @@
-/* The optional attributes of a dataset: META's list of streams, the sections STRM with each chunk's base and width, and
- * values by splat. A stream of a type that we do not know keeps its place among the others and has no values. Opening
- * on the opener's thread, the rest on any. */
+/* The optional attributes of a dataset: META's list of streams, and values by splat. A stream of a type that we do not
+ * know keeps its place among the others and has no values. Opening on the opener's thread, the rest on any. */
 #include "dataset/dataset.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "base/error.h"
 #include "dataset/chunk.h"
 #include "dataset/open.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *what)
+/* `index` and `member` say which stream is at fault, and what of it; `value` may be NULL. */
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, size_t index, const char *member,
+                 const char *value, const char *what)
 {
-    return spl_fail_field(err, SPL_E_CORRUPT, "streams", "%s: section META: \"streams\" %s; pack the dataset again",
-                          dataset->name, what);
+    return spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                          "%s: section META: \"streams[%zu]%s\" %s%.60s%s %s; pack the dataset again", dataset->name,
+                          index, member, value ? "is \"" : "is no text", value ? value : "",
+                          value ? "\", and" : ", and", what);
 }
 
 /* A text of META for a stream; false where it is none, or too long. NULL or null: optional, and "". */
@@ -27,60 +31,50 @@ static bool take_text(const json_t *json, bool optional, char out[SPL_STREAM_TEX
     return length > 0 || optional;
 }
 
+static int read_stream(struct spl_dataset *dataset, size_t s, const json_t *row, struct spl_error *err)
+{
+    struct spl_stream_info *all = dataset->info.streams, *stream = &all[s];
+    const struct {
+        const char *key, *member;
+        bool optional;
+        char *out;
+    } texts[] = {{"name", ".name", false, stream->name},
+                 {"type", ".type", false, stream->type},
+                 {"unit", ".unit", true, stream->unit}};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        const json_t *text = json_object_get(row, texts[i].key);
+        if (!take_text(text, texts[i].optional, texts[i].out))
+            return wrong(dataset, err, s, texts[i].member, json_string_value(text),
+                         texts[i].optional ? "must be a text of at most 31 bytes, or null"
+                                           : "must be a text of 1 to 31 bytes");
+    }
+    if (spl_stream_name_is_taken(stream->name))
+        return wrong(dataset, err, s, ".name", stream->name, "must be another: this is what every dataset has");
+    for (size_t other = 0; other < s; other++)
+        if (!strcmp(all[other].name, stream->name))
+            return wrong(dataset, err, s, ".name", stream->name, "must be another: a stream before it has this name");
+    dataset->streams[s] = (struct spl_stream){.name = stream->name, .type = stream->type, .unit = stream->unit};
+    dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
+    return SPL_OK;
+}
+
 int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     const json_t *streams = json_object_get(dataset->meta, "streams");
-    if (streams && !json_is_array(streams))
-        return wrong(dataset, err, "must be an array");
-    if (json_array_size(streams) > SPL_STREAMS_MAX)
-        return wrong(dataset, err, "are more than 16");
-    for (size_t s = 0; s < json_array_size(streams); s++) {
-        const json_t *row = json_array_get(streams, s);
-        struct spl_stream_info *stream = &info->streams[s];
-        if (!take_text(json_object_get(row, "name"), false, stream->name) ||
-            !take_text(json_object_get(row, "type"), false, stream->type) ||
-            !take_text(json_object_get(row, "unit"), true, stream->unit))
-            return wrong(dataset, err, "must say \"name\", \"type\" and \"unit\" of each, in at most 31 bytes");
-        for (size_t other = 0; other < s; other++)
-            if (!strcmp(info->streams[other].name, stream->name))
-                return wrong(dataset, err, "has two of one name");
-        dataset->streams[s] = (struct spl_stream){.name = stream->name, .type = stream->type, .unit = stream->unit};
-        dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
+    size_t count = json_array_size(streams);
+    if ((streams && !json_is_array(streams)) || count > SPL_STREAMS_MAX)
+        return spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                              "%s: section META: \"streams\" must be an array of at most %d; pack the dataset again",
+                              dataset->name, SPL_STREAMS_MAX);
+    for (size_t s = 0; s < count; s++) {
+        int rc = read_stream(dataset, s, json_array_get(streams, s), err);
+        if (rc)
+            return rc;
     }
-    info->stream_count = (uint32_t)json_array_size(streams);
-    if (info->stream_count != dataset->found[SPL_KIND_STREAMS].count)
-        return wrong(dataset, err, "are not as many as the sections STRM");
+    info->stream_count = (uint32_t)count;
     info->has_class = spl_dataset_find_stream(dataset, "class") >= 0;
     info->has_uncertainty = spl_dataset_find_stream(dataset, "uncertainty") >= 0;
-    return SPL_OK;
-}
-
-int spl_dataset_check_streams(struct spl_dataset *dataset, struct spl_error *err)
-{
-    struct spl_dataset_info *info = &dataset->info;
-    for (uint32_t s = 0; s < info->stream_count; s++) {
-        uint64_t bytes;
-        const uint32_t *base = spl_dataset_get_copy(dataset, SPL_KIND_STREAMS, s, &bytes);
-        if (bytes / SPL_STREAM_CHUNK_BYTES != info->chunks)
-            return spl_fail(err, SPL_E_CORRUPT,
-                            "%s: section STRM %u has not a base and a width for each chunk; pack the dataset again",
-                            dataset->name, s);
-        const uint8_t *width = (const uint8_t *)(base + info->chunks);
-        dataset->streams[s].base = base;
-        dataset->streams[s].width = width;
-        uint64_t at, bits = 0, words = 0;
-        const char *what = spl_stream_judge(dataset->stream_types[s], base, width, info->chunks, &at);
-        if (what)
-            return spl_fail(err, SPL_E_CORRUPT, "%s: section STRM %u: chunk %llu %s; pack the dataset again",
-                            dataset->name, s, (unsigned long long)at, what);
-        for (uint64_t c = 0; c < info->chunks; c++) {
-            bits += (uint64_t)width[c] * dataset->chunks[c].count;
-            words += spl_stream_words(width[c], dataset->chunks[c].count);
-        }
-        info->streams[s].bits = bits;
-        info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 32 * words - bits + 8 * bytes;
-    }
     return SPL_OK;
 }
 
@@ -92,7 +86,11 @@ const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *datas
 
 uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk)
 {
-    return spl_streams_words(dataset->streams, streams, chunk, dataset->chunks[chunk].count);
+    spl_assert(dataset->whole.nodes);
+    uint32_t words = 0;
+    for (uint32_t s = 0; s < streams; s++)
+        words += spl_stream_words(dataset->whole.width[s][chunk], dataset->whole.chunks[chunk].count);
+    return words;
 }
 
 int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)
@@ -103,24 +101,31 @@ int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)
     return -1;
 }
 
-bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value)
+static bool read_value(const struct spl_dataset *dataset, const struct spl_place *place, uint32_t stream, uint64_t id,
+                       double *value)
 {
     uint32_t words[SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
-    uint64_t index = 0;
-    const struct spl_node *node = NULL;
-    if (stream < 0 || !(node = spl_dataset_find_chunk(dataset, id, &index)))
-        return false;
-    const struct spl_chunk *chunk = &dataset->chunks[index];
-    if (spl_chunk_kind(chunk) != SPL_CHUNK_DISCS) // vertices of lines have no attributes
-        return false;
-    const struct spl_stream *from = &dataset->streams[stream];
-    struct spl_stream_code code = {from->base[index], from->width[index]};
-    uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // opening has checked the page
+    const struct spl_tables *tables = place->tables;
+    const struct spl_chunk *chunk = place->chunk;
+    uint32_t index = (uint32_t)(chunk - tables->chunks);
+    struct spl_stream_code code = {tables->base[stream][index], tables->width[stream][index]};
+    uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // which the page has
     uint64_t word = (uint64_t)chunk->geometry_word + spl_chunk_words(chunk) +
-                    spl_dataset_get_stream_words(dataset, (uint32_t)stream, index);
-    if (spl_dataset_read(dataset, dataset->pages[node->page]->offset + word * sizeof *words, words,
+                    spl_tables_get_stream_words(tables, stream, index);
+    if (spl_dataset_read(dataset, dataset->pages[tables->page]->offset + word * sizeof *words, words,
                          count * sizeof *words, NULL))
         return false;
     *value = spl_stream_decode(dataset->stream_types[stream], code, words, (uint32_t)(id - chunk->first_id));
     return true;
+}
+
+bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value)
+{
+    if (stream < 0)
+        return false;
+    struct spl_place place = spl_dataset_find_place(dataset, id);
+    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices have no attributes
+                 read_value(dataset, &place, (uint32_t)stream, id, value);
+    spl_place_finish(&place);
+    return found;
 }

@@ -10,12 +10,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <xxhash.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "base/sized.h"
 #include "dataset/open.h"
+
+static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as it lies, which is little-endian");
 
@@ -35,9 +39,17 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+static int check_path(const char *path, struct spl_error *err)
+{
+    return path ? SPL_OK
+                : spl_fail_field(err, SPL_E_USAGE, "path", "a dataset needs a path, or with a reader a name");
+}
+
 int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    return spl_dataset_open_until(path, verify, NULL, out, err);
+    *out = NULL;
+    int rc = check_path(path, err);
+    return rc ? rc : spl_dataset_open_until(path, verify, NULL, out, err);
 }
 
 int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
@@ -45,12 +57,17 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
 {
     struct spl_open_options known = {0};
     *out = NULL;
-    int rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    int rc = check_path(path, err);
     if (rc)
         return rc;
-    const atomic_bool *cancelled = spl_cancel_get_flag(known.cancel);
+    rc = spl_sized_read(options, &known, sizeof known, "spl_open_options", err);
+    if (rc)
+        return rc;
+    const struct spl_dataset_opening how = {.verify = known.verify,
+                                            .tables_bytes = known.tables_bytes ? known.tables_bytes : SPL_TABLES_BYTES,
+                                            .cancelled = spl_cancel_get_flag(known.cancel)};
     if (!known.reader)
-        return spl_dataset_open_until(path, known.verify, cancelled, out, err);
+        return spl_dataset_open_as(path, &how, out, err);
     struct spl_reader reader = {0};
     if ((rc = spl_sized_read(known.reader, &reader, sizeof reader, "spl_reader", err)))
         return rc;
@@ -58,22 +75,41 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
         return spl_fail_field(err, SPL_E_USAGE, "read", "struct spl_reader of %s has no read function", path);
     const struct spl_dataset_source source = {
         .size = reader.bytes, .read = reader.read, .close = reader.close, .context = reader.context};
-    return spl_dataset_open_source(&source, path, known.verify, cancelled, out, err);
+    return spl_dataset_open_source_as(&source, path, &how, out, err);
+}
+
+int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                        struct spl_error *err)
+{
+    struct spl_dataset_source source;
+    *out = NULL;
+    int rc = spl_dataset_source_open_file(path, &source, err);
+    if (!rc && (rc = spl_dataset_open_source_as(&source, path, how, out, err)))
+        spl_dataset_source_close(&source);
+    return rc;
 }
 
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err)
 {
-    struct spl_dataset_source source;
-    *out = NULL;
-    int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_source(&source, path, verify, cancelled, out, err)))
-        spl_dataset_source_close(&source);
-    return rc;
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_as(path, &how, out, err);
+}
+
+int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
+{
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){verify, UINT64_MAX, NULL}, out, err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
+{
+    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    return spl_dataset_open_source_as(source, name, &how, out, err);
+}
+
+int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
+                               const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err)
 {
     *out = NULL;
     if (source->size > INT64_MAX / 2) /* so that no sum of sizes wraps */
@@ -83,14 +119,16 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
     if (!dataset)
         return SPL_E_NOMEM;
     int rc = SPL_E_NOMEM;
-    dataset->cancelled = cancelled;
+    atomic_init(&dataset->references, 1);
+    dataset->cancelled = how->cancelled;
     dataset->source = *source;
+    dataset->tables_limit = how->tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
         goto done;
     strcpy(dataset->name, name);
-    rc = spl_dataset_read_sections(dataset, verify, err);
+    rc = spl_dataset_read_sections(dataset, how->verify, err);
     if (!rc)
         rc = spl_dataset_check_sections(dataset, err);
     if (!rc)
@@ -100,27 +138,55 @@ done:
         dataset->source = (struct spl_dataset_source){0}; /* stays the caller's */
         spl_dataset_close(dataset);
     } else {
+        dataset->opened = true;
         *out = dataset;
     }
     return rc;
 }
 
-void spl_dataset_close(struct spl_dataset *dataset)
+void spl_dataset_hold(const struct spl_dataset *dataset)
 {
-    if (!dataset)
-        return;
+    unsigned before = atomic_fetch_add(&((struct spl_dataset *)dataset)->references, 1);
+    spl_assert(before > 0);
+}
+
+static void destroy(struct spl_dataset *dataset)
+{
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
     for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
         free(dataset->copies[i]);
     free(dataset->copies);
     free(dataset->found_all);
-    free(dataset->page_nodes);
-    free(dataset->page_first);
+    free(dataset->tables);
+    free(dataset->whole.nodes);
+    free(dataset->whole.chunks);
+    free(dataset->whole.textures);
+    for (uint32_t s = 0; s < SPL_STREAMS_MAX; s++) {
+        free(dataset->whole.base[s]);
+        free(dataset->whole.width[s]);
+    }
     spl_dictionary_finish(&dataset->dictionary);
     free(dataset->sections);
     free(dataset->name);
     free(dataset);
+}
+
+void spl_dataset_let_go(const struct spl_dataset *dataset)
+{
+    struct spl_dataset *mine = (struct spl_dataset *)dataset;
+    if (atomic_fetch_sub(&mine->references, 1) == 1)
+        destroy(mine);
+}
+
+void spl_dataset_close(struct spl_dataset *dataset)
+{
+    if (!dataset)
+        return;
+    uint64_t deadline_ns = spl_now_ns() + patience_ns;
+    while (!dataset->source.owned && atomic_load(&dataset->references) > 1 && spl_remaining_ns(deadline_ns))
+        usleep(1000); // what a caller lends is read no more when this returns
+    spl_dataset_let_go(dataset);
 }
 
 const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset)
@@ -128,16 +194,23 @@ const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *da
     return &dataset->info;
 }
 
+bool spl_dataset_keeps_all(const struct spl_dataset *dataset)
+{
+    return dataset->whole.nodes;
+}
+
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count)
 {
+    spl_assert(dataset->whole.nodes);
     *count = dataset->info.nodes;
-    return dataset->nodes;
+    return dataset->whole.nodes;
 }
 
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count)
 {
+    spl_assert(dataset->whole.nodes);
     *count = dataset->info.chunks;
-    return dataset->chunks;
+    return dataset->whole.chunks;
 }
 
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
@@ -145,21 +218,20 @@ const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset)
     return dataset->meta;
 }
 
-/* Errors of pages reach clients, whom the path is no business of. */
-static const char *name_of(const struct spl_dataset *dataset)
+const char *spl_dataset_get_name(const struct spl_dataset *dataset)
 {
     return dataset->info.id[0] ? dataset->info.id : dataset->name;
 }
 
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
 {
-    return spl_dataset_source_read(&dataset->source, name_of(dataset), offset, out, bytes, err);
+    return spl_dataset_source_read(&dataset->source, spl_dataset_get_name(dataset), offset, out, bytes, err);
 }
 
 int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err)
 {
     return spl_is_cancelled(dataset->cancelled)
-               ? spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", name_of(dataset))
+               ? spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", spl_dataset_get_name(dataset))
                : SPL_OK;
 }
 
@@ -196,7 +268,7 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
     if (!rc && dataset->verified && XXH3_64bits(out, page->bytes) != page->hash)
         rc = spl_fail(err, SPL_E_CORRUPT,
                       "%s: page %u was overwritten while in use; put the dataset back under another name and rename it",
-                      name_of(dataset), index);
+                      spl_dataset_get_name(dataset), index);
     return rc;
 }
 
@@ -237,5 +309,5 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_CHUNK] = "chunk",
         [SPL_ATTRIBUTE_TEXTURE] = "texture",   [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
-    return names[attribute];
+    return (unsigned)attribute < SPL_ATTRIBUTE_COUNT ? names[attribute] : "unknown";
 }

@@ -11,20 +11,47 @@
 #include "dataset/format.h"
 #include "dataset/source.h"
 #include "dataset/streams.h"
+#include "dataset/tables.h"
 #include "sparse/dictionary.h"
+
+/* How to open one. */
+struct spl_dataset_opening {
+    bool verify;                  /* as of spl_dataset_open() */
+    uint64_t tables_bytes;        /* all tables are kept where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
+    const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
+};
+
+int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                        struct spl_error *err);
 
 /* spl_dataset_open() that gives up soon after another thread has set *cancelled (borrowed until close; may be NULL)
  * with SPL_E_CANCELLED, as later does whatever else takes long with the dataset. */
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err);
 
+/* spl_dataset_open() for tools that take each splat in turn: it keeps all tables, whatever they take. */
+int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
+
 /* The same from any source, which is `name` in errors and, without folder and extension, the dataset's id. On success
  * the dataset has taken *source and closes it last; on failure it stays the caller's, open. */
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err);
 
+int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
+                               const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err);
+
+/* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
+ * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;
+ * let_go() closes the source, which may block. */
+void spl_dataset_hold(const struct spl_dataset *dataset);
+void spl_dataset_let_go(const struct spl_dataset *dataset);
+
+/* Nodes, chunks and the words of chunks' textures (NULL without) of the whole dataset, which must keep all its tables:
+ * spl_dataset_open_whole(), or spl_dataset_keeps_all(). */
+bool spl_dataset_keeps_all(const struct spl_dataset *dataset);
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count);
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count);
+const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 
 /* Bytes of page `index` (< info.pages). */
@@ -35,10 +62,8 @@ size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t in
  * blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
-/* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none, the words of CTEX (one a
- * chunk) are NULL then. */
+/* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none. */
 const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset);
-const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset);
 
 /* Bytes of the textures of page `index` (< info.pages); 0 without textures. */
 size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t index);
@@ -73,13 +98,14 @@ int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name)
  * find_splat. Any thread; blocks on disk. */
 bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
 
-/* Words that the first `streams` streams of a chunk take behind its own. */
+/* Words that the first `streams` streams of a chunk take behind its own; of a dataset that keeps all its tables. */
 uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk);
 
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
- *   bool (optional, true)}, "streams" [{"name": string, "type": string, "unit": string}] (optional; the writer's),
+ *   bool (optional, true)}, "counts" {…} (the writer's, see counts.h),
+ *   "streams" [{"name": string, "type": string, "unit": string}] (optional; the writer's),
  *   "unit" "m" | "ft" | "us-ft" | "unknown" (optional), "crs" string or null (optional), "sources" [string], "pack"
  * {...} (optional, free: settings, statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |

@@ -13,6 +13,7 @@
 #define SPL_FILE_ALIGNMENT 65536u  /* of pages; other sections start on 64 bytes */
 #define SPL_PAGE_BYTES (16u << 20) /* target; a page is at most SPL_PAGE_BYTES_MAX */
 #define SPL_PAGE_BYTES_MAX (64u << 20)
+#define SPL_HEAD_BYTES_MAX (16u << 20) /* the writer begins a new page rather than a longer head */
 #define SPL_NODE_CHUNKS_MAX 4096u
 #define SPL_META_BYTES_MAX (8u << 20) /* JSON takes some fifty times as much memory at worst */
 
@@ -29,21 +30,31 @@ struct spl_file_header { /* at offset 0 */
 };
 
 #define SPL_FOURCC(a, b, c, d) ((uint32_t)(a) | (uint32_t)(b) << 8 | (uint32_t)(c) << 16 | (uint32_t)(d) << 24)
-#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')   /* JSON: sources, counts, statistics, default view */
-#define SPL_SECTION_NODES SPL_FOURCC('N', 'O', 'D', 'E')  /* struct spl_node[], breadth first, node 0 is the root */
-#define SPL_SECTION_CHUNKS SPL_FOURCC('C', 'H', 'N', 'K') /* the first SPL_CHUNK_BYTES of each struct spl_chunk */
-#define SPL_SECTION_STREAM SPL_FOURCC('S', 'T', 'R', 'M') /* bases and widths of an attribute; `index` as in META */
-#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')   /* chunk data; `index` is the page's number */
+#define SPL_SECTION_META SPL_FOURCC('M', 'E', 'T', 'A')      /* JSON: sources, counts, statistics, default view */
+#define SPL_SECTION_DIRECTORY SPL_FOURCC('P', 'D', 'I', 'R') /* struct spl_page_row[pages + 1] */
+#define SPL_SECTION_HEAD SPL_FOURCC('H', 'E', 'A', 'D')      /* what a page holds, see below; `index` is the page's */
+#define SPL_SECTION_PAGE SPL_FOURCC('P', 'A', 'G', 'E')      /* chunk data; `index` is the page's number */
 /* Textures; a file has all of these kinds or none. */
-#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')          /* struct spl_atoms_header, cosine coefficients */
-#define SPL_SECTION_CHUNK_TEXTURES SPL_FOURCC('C', 'T', 'E', 'X') /* uint32_t[chunks], see below */
-#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P')       /* codes of a page's chunks; `index` is the page's */
+#define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')    /* struct spl_atoms_header, cosine coefficients */
+#define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's */
 
 struct spl_section {
     uint32_t type;
     uint32_t index; /* number among the sections of its type */
     uint64_t offset, bytes;
     uint64_t hash; /* XXH3-64 of the section's bytes */
+};
+
+/* Where a page's share of nodes (which lie breadth first, node 0 is the root), chunks and splats begins; the row
+ * behind the last page's closes it. A page has those from its row's on to the next one's.
+ *
+ * HEAD has, back to back: the first SPL_NODE_BYTES of each struct spl_node of the page; the first SPL_CHUNK_BYTES of
+ * each struct spl_chunk; with textures a uint32_t of each chunk (SPL_CHUNK_TEXTURE_*, 0 = none); of each optional
+ * attribute a uint32_t of each chunk, its base; of each attribute a uint8_t of each chunk, its width. */
+struct spl_page_row {
+    uint64_t first_node, first_chunk;
+    uint64_t first_id;    /* of splats and vertices of lines */
+    uint64_t first_child; /* the node that the first child of the page's nodes is, or would be */
 };
 
 /* An octree node: splats that represent its cube at the node's spacing. A leaf holds the originals. A cut through the
@@ -53,13 +64,17 @@ struct spl_node {
     float size;       /* edge of the cube */
     float spacing;    /* median distance of neighbouring splats, metres: median radius / SPL_RADIUS_SPACING */
     float box_min[3], box_max[3]; /* of its splats' and all descendants' discs, relative to origin */
-    uint64_t first_child;         /* children are consecutive; 0 and count 0 for a leaf */
-    uint64_t first_chunk;
-    uint32_t page;        /* all chunks of a node lie in one page */
     uint16_t chunk_count; /* 1..SPL_NODE_CHUNKS_MAX */
     uint8_t child_count;  /* 0..8 */
     uint8_t depth;        /* root = 0 */
+
+    /* Not on disk: sums over the nodes before it. */
+    uint32_t page;        /* all chunks of a node lie in one page */
+    uint64_t first_child; /* children are consecutive; of a leaf it means nothing */
+    uint64_t first_chunk;
 };
+
+#define SPL_NODE_BYTES 60u /* of a node on disk */
 
 /* extra_bits: number of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31; on disk, the
  * number of splats 0..7. */
@@ -114,14 +129,13 @@ struct spl_atoms_header {
     uint32_t reserved[2]; /* 0 */
 };
 
-/* CTEX is a uint32_t for each chunk, TEXP words that they name: SPL_CHUNK_TEXTURE_*, SPL_TEXTURE_* of shared.h. */
-
 /* r = 2 sqrt(area of a splat's share / pi): on a square grid of spacing h, eq. 20 gives r = 1.128 h. */
 #define SPL_RADIUS_SPACING 1.128379f
 
 _Static_assert(sizeof(struct spl_file_header) == 56, "on disk");
 _Static_assert(sizeof(struct spl_section) == 32, "on disk");
-_Static_assert(sizeof(struct spl_node) == 80, "on disk");
+_Static_assert(sizeof(struct spl_page_row) == 32, "on disk");
+_Static_assert(offsetof(struct spl_node, page) == SPL_NODE_BYTES, "on disk");
 _Static_assert(offsetof(struct spl_chunk, count) == SPL_CHUNK_BYTES, "on disk");
 _Static_assert(sizeof(struct spl_atoms_header) == 16, "on disk");
 

@@ -1,53 +1,47 @@
-/* One splat, or vertex of a line, by its id: which chunk and node hold it; and the linear splats of all leaves. Chunks
- * continue each other's ids, so a binary search finds the chunk; nodes are looked through. Words are read from the
- * file, not through a map, so that a file that was cut short in place is no SIGBUS. Any thread. */
+/* One splat, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages and
+ * chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a map, so that
+ * a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
+
+#include <stdlib.h>
 
 #include "dataset/chunk.h"
 #include "dataset/open.h"
 
-static const struct spl_node *node_of(const struct spl_dataset *dataset, uint64_t chunk)
+struct spl_place spl_dataset_find_place(const struct spl_dataset *dataset, uint64_t id)
 {
-    uint64_t count = 0;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &count);
-    for (uint64_t i = 0; i < count; i++)
-        if (chunk - nodes[i].first_chunk < nodes[i].chunk_count) // wraps where it lies before
-            return &nodes[i];
-    return NULL;
-}
-
-static bool chunk_of(const struct spl_dataset *dataset, uint64_t id, uint64_t *index)
-{
-    uint64_t count = 0, low = 0;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &count);
-    for (uint64_t high = count; low < high;) {
-        uint64_t middle = *index = low + (high - low) / 2;
-        if (id - chunks[middle].first_id < chunks[middle].count)
-            return true;
-        if (id < chunks[middle].first_id)
-            high = middle;
+    struct spl_place place = {0};
+    if (id >= dataset->info.ids)
+        return place;
+    uint32_t page = spl_dataset_find_page_of_id(dataset, id), low = 0;
+    place.tables = spl_dataset_borrow_tables(dataset, page, &place.read, NULL);
+    if (!place.tables)
+        return place;
+    for (uint32_t high = place.tables->chunk_count; high - low > 1;) {
+        uint32_t middle = low + (high - low) / 2;
+        if (place.tables->chunks[middle].first_id <= id)
+            low = middle;
         else
-            low = middle + 1;
+            high = middle;
     }
-    return false;
+    place.chunk = &place.tables->chunks[low];
+    return place;
 }
 
-const struct spl_node *spl_dataset_find_chunk(const struct spl_dataset *dataset, uint64_t id, uint64_t *chunk)
+void spl_place_finish(struct spl_place *place)
 {
-    return chunk_of(dataset, id, chunk) ? node_of(dataset, *chunk) : NULL;
+    free(place->read);
+    *place = (struct spl_place){0};
 }
 
-bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat)
+static bool read_splat(const struct spl_dataset *dataset, const struct spl_place *place, uint64_t id,
+                       struct spl_splat *splat)
 {
     uint32_t words[SPL_CHUNK_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
-    uint64_t index = 0;
-    const struct spl_node *node = spl_dataset_find_chunk(dataset, id, &index);
-    if (!node)
-        return false;
-    struct spl_chunk chunk = dataset->chunks[index];
-    uint32_t count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS; // opening has checked that the page has them
+    struct spl_chunk chunk = *place->chunk;
+    uint32_t count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS; // reading the tables has checked that the page has them
     spl_assert(count <= sizeof words / sizeof *words);
-    uint64_t offset = dataset->pages[node->page]->offset + (uint64_t)chunk.geometry_word * sizeof *words;
+    uint64_t offset = dataset->pages[place->tables->page]->offset + (uint64_t)chunk.geometry_word * sizeof *words;
     if (spl_dataset_read(dataset, offset, words, count * sizeof *words, NULL))
         return false;
     chunk.geometry_word = 0;
@@ -55,24 +49,51 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, stru
     return true;
 }
 
+bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat)
+{
+    struct spl_place place = spl_dataset_find_place(dataset, id);
+    bool found = place.tables && read_splat(dataset, &place, id, splat);
+    spl_place_finish(&place);
+    return found;
+}
+
+static int count_chunk(const struct spl_dataset *dataset, uint32_t page, const struct spl_chunk *chunk,
+                       uint64_t *linear, struct spl_error *err)
+{
+    uint32_t mask[SPL_LINEAR_WORDS];
+    if (!(chunk->geometry_bits >> SPL_GEOMETRY_LINEAR) || spl_chunk_kind(chunk) != SPL_CHUNK_DISCS)
+        return SPL_OK;
+    if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME) {
+        uint64_t word = spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS; // which the page has
+        int rc =
+            spl_dataset_read(dataset, dataset->pages[page]->offset + word * sizeof *mask, mask, sizeof mask, err);
+        if (rc)
+            return rc;
+    }
+    *linear += spl_chunk_count_linear(chunk, mask);
+    return SPL_OK;
+}
+
+static int count_page(const struct spl_dataset *dataset, uint32_t page, uint64_t *linear, struct spl_error *err)
+{
+    struct spl_tables *read;
+    struct spl_error why = {0};
+    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, page, &read, &why);
+    int rc = tables ? SPL_OK : why.code;
+    for (uint32_t n = 0; !rc && n < tables->node_count; n++) {
+        const struct spl_node *node = &tables->nodes[n];
+        const struct spl_chunk *chunks = tables->chunks + (node->first_chunk - tables->first_chunk);
+        for (uint32_t c = 0; !rc && c < node->chunk_count && !node->child_count; c++)
+            rc = count_chunk(dataset, page, &chunks[c], linear, &why);
+    }
+    free(read);
+    return rc ? spl_fail(err, rc, "%s", why.message) : SPL_OK;
+}
+
 int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear, struct spl_error *err)
 {
-    for (uint64_t n = 0; n < dataset->info.nodes; n++) {
-        const struct spl_node *node = &dataset->nodes[n];
-        for (uint32_t c = 0; c < node->chunk_count && !node->child_count; c++) {
-            const struct spl_chunk *chunk = &dataset->chunks[node->first_chunk + c];
-            uint32_t mask[SPL_LINEAR_WORDS];
-            if (!(chunk->geometry_bits >> SPL_GEOMETRY_LINEAR) || spl_chunk_kind(chunk) != SPL_CHUNK_DISCS)
-                continue;
-            if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME) {
-                uint64_t word = spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS; // which the page has, as opening saw
-                int rc = spl_dataset_read(dataset, dataset->pages[node->page]->offset + word * sizeof *mask, mask,
-                                          sizeof mask, err);
-                if (rc)
-                    return rc;
-            }
-            *linear += spl_chunk_count_linear(chunk, mask);
-        }
-    }
-    return SPL_OK;
+    int rc = SPL_OK;
+    for (uint32_t page = 0; page < dataset->info.pages && !rc; page++)
+        rc = count_page(dataset, page, linear, err);
+    return rc;
 }

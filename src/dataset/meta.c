@@ -1,39 +1,93 @@
 /* Opening, second stage: META, the JSON section with what pack knew about the dataset as a whole. Every key that
- * readers rely on is checked here once, so that nobody after this handles a missing or absurd one. The opener's thread.
+ * readers rely on is checked here once, so that nobody after this handles a missing or absurd one; a refusal says which
+ * key, what it is and what it may be. The opener's thread.
  */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "dataset/open.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *key, const char *what)
+/* Of what is no number and no text the shape alone. */
+static const char *show_shape(const json_t *value, char text[40])
 {
-    return spl_fail_field(err, SPL_E_CORRUPT, key, "%s: section META: \"%s\" %s; pack the dataset again", dataset->name,
-                          key, what);
+    if (json_is_array(value))
+        snprintf(text, 40, "an array of %zu", json_array_size(value));
+    else
+        strcpy(text, !value                   ? "missing"
+                     : json_is_object(value)  ? "an object"
+                     : json_is_boolean(value) ? json_is_true(value) ? "true" : "false"
+                                              : "null");
+    return text;
 }
 
-static int get_count(const struct spl_dataset *dataset, const char *key, uint64_t *out, struct spl_error *err)
+/* `what` is what is allowed: "FILE: section META: "KEY" is VALUE, and must be WHAT". `path` is the key's, from the top.
+ */
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *path, const json_t *value,
+                 const char *what)
+{
+    char shape[40], *text = NULL;
+    const char *shown = show_shape(value, shape);
+    if (json_is_string(value) || json_is_number(value))
+        shown = text = json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(17));
+    int rc = spl_fail_field(err, SPL_E_CORRUPT, path,
+                            "%s: section META: \"%s\" is %.60s, and must be %s; pack the dataset again", dataset->name,
+                            path, shown ? shown : shape, what);
+    free(text);
+    return rc;
+}
+
+/* The same of entry `index` of the array at `path`, or of `member` of it where that is not NULL. */
+static int wrong_entry(const struct spl_dataset *dataset, struct spl_error *err, const char *path, size_t index,
+                       const char *member, const json_t *value, const char *what)
+{
+    char entry[128];
+    snprintf(entry, sizeof entry, "%s[%zu]%s%s", path, index, member ? "." : "", member ? member : "");
+    return wrong(dataset, err, entry, value, what);
+}
+
+static int get_count(const struct spl_dataset *dataset, const char *key, uint64_t most, const char *what, uint64_t *out,
+                     struct spl_error *err)
 {
     const json_t *value = json_object_get(dataset->meta, key);
-    if (!json_is_integer(value) || json_integer_value(value) < 1)
-        return wrong(dataset, err, key, "must be a positive integer");
+    if (!json_is_integer(value) || json_integer_value(value) < 1 || (uint64_t)json_integer_value(value) > most)
+        return wrong(dataset, err, key, value, what);
     *out = (uint64_t)json_integer_value(value);
     return SPL_OK;
 }
 
-/* `array` is the value of `key`, or of a member of it. */
-static int get_vector(const struct spl_dataset *dataset, const char *key, const json_t *array, double out[3],
+/* "parent.member", three coordinates. */
+static int get_vector(const struct spl_dataset *dataset, const char *parent, const char *member, double out[3],
                       struct spl_error *err)
 {
-    if (json_array_size(array) != 3)
-        return wrong(dataset, err, key, "must hold arrays of three numbers");
+    char path[64];
+    const json_t *array = json_object_get(json_object_get(dataset->meta, parent), member);
+    snprintf(path, sizeof path, "%s.%s", parent, member);
+    if (!json_is_array(array) || json_array_size(array) != 3)
+        return wrong(dataset, err, path, array, "an array of three numbers");
     for (size_t i = 0; i < 3; i++) {
         const json_t *number = json_array_get(array, i);
         if (!json_is_number(number) || fabs(json_number_value(number)) > 1e15)
-            return wrong(dataset, err, key, "holds something else than a coordinate");
+            return wrong_entry(dataset, err, path, i, NULL, number, "a coordinate, from -1e15 to 1e15");
         out[i] = json_number_value(number);
     }
     return SPL_OK;
+}
+
+static int get_bounds(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    int rc = get_vector(dataset, "bounds", "min", info->bounds_min, err);
+    if (!rc)
+        rc = get_vector(dataset, "bounds", "max", info->bounds_max, err);
+    for (int a = 0; !rc && a < 3; a++)
+        if (info->bounds_min[a] > info->bounds_max[a])
+            rc =
+                wrong_entry(dataset, err, "bounds.min", (size_t)a, NULL,
+                            json_array_get(json_object_get(json_object_get(dataset->meta, "bounds"), "min"), (size_t)a),
+                            "at most that of \"bounds.max\"");
+    return rc;
 }
 
 static int get_view(struct spl_dataset *dataset, struct spl_error *err)
@@ -41,39 +95,35 @@ static int get_view(struct spl_dataset *dataset, struct spl_error *err)
     struct spl_dataset_info *info = &dataset->info;
     const char *key = "default_view";
     const json_t *view = json_object_get(dataset->meta, key), *fov = json_object_get(view, "fov");
-    int rc = get_vector(dataset, key, json_object_get(view, "eye"), info->default_eye, err);
+    int rc = get_vector(dataset, key, "eye", info->default_eye, err);
     if (!rc)
-        rc = get_vector(dataset, key, json_object_get(view, "target"), info->default_target, err);
+        rc = get_vector(dataset, key, "target", info->default_target, err);
     if (!rc)
-        rc = get_vector(dataset, key, json_object_get(view, "up"), info->default_up, err);
+        rc = get_vector(dataset, key, "up", info->default_up, err);
     if (rc)
         return rc;
     if (!json_is_number(fov) || !(json_number_value(fov) > 0 && json_number_value(fov) <= 179))
-        return wrong(dataset, err, key, "has no \"fov\" between 0 and 179 degrees");
+        return wrong(dataset, err, "default_view.fov", fov, "a number of degrees above 0, up to 179");
     info->default_fov = json_number_value(fov);
     struct spl_camera camera = {0};
     struct spl_error why = {0};
     if (spl_camera_look_at(&camera, info->default_eye, info->default_target, info->default_up, &why))
-        return wrong(dataset, err, key, "is no view: its eye, target and up do not fit together");
+        return spl_fail_field(err, SPL_E_CORRUPT, key,
+                              "%s: section META: \"%s\" is no view: %s; pack the dataset again", dataset->name, key,
+                              why.message);
     return SPL_OK;
 }
 
-static int get_color(struct spl_dataset *dataset, struct spl_error *err)
+static int get_attributes(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const json_t *value = json_object_get(json_object_get(dataset->meta, "attributes"), "color");
-    if (!json_is_boolean(value))
-        return wrong(dataset, err, "attributes", "must say whether there is a \"color\", true or false");
-    dataset->info.has_color = json_is_true(value);
-    return SPL_OK;
-}
-
-/* Optional: a file that does not say so has normals and radii. */
-static int get_surface(struct spl_dataset *dataset, struct spl_error *err)
-{
-    const json_t *value = json_object_get(json_object_get(dataset->meta, "attributes"), "surface");
-    if (value && !json_is_boolean(value))
-        return wrong(dataset, err, "attributes", "must say whether there is a \"surface\", true or false");
-    dataset->info.has_surface = !json_is_false(value);
+    const json_t *attributes = json_object_get(dataset->meta, "attributes");
+    const json_t *color = json_object_get(attributes, "color"), *surface = json_object_get(attributes, "surface");
+    if (!json_is_boolean(color))
+        return wrong(dataset, err, "attributes.color", color, "true or false");
+    if (surface && !json_is_boolean(surface))
+        return wrong(dataset, err, "attributes.surface", surface, "true, which a missing one means too, or false");
+    dataset->info.has_color = json_is_true(color);
+    dataset->info.has_surface = !json_is_false(surface);
     return SPL_OK;
 }
 
@@ -82,17 +132,15 @@ static int check_stations(struct spl_dataset *dataset, struct spl_error *err)
 {
     const char *key = "stations";
     const json_t *stations = json_object_get(dataset->meta, key);
-    if (!stations)
-        return SPL_OK;
-    if (!json_is_array(stations))
-        return wrong(dataset, err, key, "must be an array");
+    if (stations && !json_is_array(stations))
+        return wrong(dataset, err, key, stations, "an array");
     for (size_t i = 0; i < json_array_size(stations); i++) {
-        const json_t *matrix = json_array_get(stations, i);
-        if (json_array_size(matrix) != 16)
-            return wrong(dataset, err, key, "must hold matrices of 16 numbers");
-        for (size_t j = 0; j < 16; j++)
-            if (!json_is_number(json_array_get(matrix, j)))
-                return wrong(dataset, err, key, "must hold matrices of 16 numbers");
+        const json_t *matrix = json_array_get(stations, i), *number = matrix;
+        bool good = json_is_array(matrix) && json_array_size(matrix) == 16;
+        for (size_t j = 0; good && j < 16; j++)
+            good = json_is_number(number = json_array_get(matrix, j));
+        if (!good)
+            return wrong_entry(dataset, err, key, i, NULL, matrix, "a matrix of 16 numbers");
     }
     return SPL_OK;
 }
@@ -101,10 +149,10 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
 {
     const json_t *sources = json_object_get(dataset->meta, "sources");
     if (!json_is_array(sources))
-        return wrong(dataset, err, "sources", "must be an array of names");
+        return wrong(dataset, err, "sources", sources, "an array of names");
     for (size_t i = 0; i < json_array_size(sources); i++)
         if (!json_is_string(json_array_get(sources, i)))
-            return wrong(dataset, err, "sources", "must be an array of names");
+            return wrong_entry(dataset, err, "sources", i, NULL, json_array_get(sources, i), "a name");
     return SPL_OK;
 }
 
@@ -118,9 +166,9 @@ static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
     while (i < sizeof units / sizeof *units && (!said || strcmp(said, units[i])))
         i++;
     if (i == sizeof units / sizeof *units)
-        return wrong(dataset, err, "unit", "must be m, ft, us-ft or unknown");
+        return wrong(dataset, err, "unit", unit, "m, ft, us-ft or unknown");
     if (crs && !json_is_null(crs) && !json_is_string(crs))
-        return wrong(dataset, err, "crs", "must be a text (WKT, or EPSG and a number), or null");
+        return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number), or null");
     strcpy(dataset->info.unit, units[i]);
     return SPL_OK;
 }
@@ -131,17 +179,43 @@ static int check_color(struct spl_dataset *dataset, struct spl_error *err)
     const char *key = "color";
     const json_t *all = json_object_get(dataset->meta, key);
     if (all && !json_is_array(all))
-        return wrong(dataset, err, key, "must be an array");
+        return wrong(dataset, err, key, all, "an array");
     for (size_t i = 0; i < json_array_size(all); i++) {
         const json_t *one = json_array_get(all, i), *points = json_object_get(one, "points");
-        const char *from = json_string_value(json_object_get(one, "from"));
-        if (!json_is_string(json_object_get(one, "source")) || !json_is_integer(points) ||
-            json_integer_value(points) < 0)
-            return wrong(dataset, err, key, "must say of each \"source\" how many \"points\" it is of");
+        const json_t *source = json_object_get(one, "source"), *from_json = json_object_get(one, "from");
+        const char *from = json_string_value(from_json);
+        if (!json_is_string(source))
+            return wrong_entry(dataset, err, key, i, "source", source, "a name");
+        if (!json_is_integer(points) || json_integer_value(points) < 0)
+            return wrong_entry(dataset, err, key, i, "points", points, "a whole number, 0 or more");
         if (!from || (strcmp(from, "rgb") && strcmp(from, "intensity") && strcmp(from, "constant") &&
                       strcmp(from, "photographs")))
-            return wrong(dataset, err, key, "is \"from\" rgb, intensity, constant or photographs");
+            return wrong_entry(dataset, err, key, i, "from", from_json, "rgb, intensity, constant or photographs");
     }
+    return SPL_OK;
+}
+
+/* What nodes and chunks add up to; held against them where all are read. */
+static int get_counts(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    struct spl_counts *counts = &dataset->counts;
+    const json_t *json = json_object_get(dataset->meta, "counts");
+    if (!spl_counts_from_json(json, info->stream_count, counts))
+        return wrong(
+            dataset, err, "counts", json,
+            "an object that says how many \"splats\", \"pieces\" and \"linear_chunks\" there are, and \"bits\" and "
+            "\"stream_bits\" of each attribute");
+    if (counts->splats < info->leaf_splats)
+        return wrong(dataset, err, "counts.splats", json_object_get(json, "splats"), "at least \"leaf_splats\"");
+    counts->leaf_splats = info->leaf_splats;
+    counts->levels = info->levels;
+    info->splats = counts->splats;
+    info->pieces = counts->pieces;
+    info->has_linear = counts->linear_chunks > 0;
+    memcpy(info->attribute_bits, counts->bits, sizeof info->attribute_bits);
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        info->streams[s].bits = counts->stream_bits[s];
     return SPL_OK;
 }
 
@@ -158,24 +232,22 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     if (!json_is_object(dataset->meta))
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again",
                         dataset->name);
-    const json_t *bounds = json_object_get(dataset->meta, "bounds");
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
+    const char *count = "a whole number, 1 or more";
     uint64_t levels = 0;
-    int rc = get_count(dataset, "points", &info->points, err);
+    int rc = get_count(dataset, "points", INT64_MAX, count, &info->points, err);
     if (!rc)
-        rc = get_count(dataset, "leaf_splats", &info->leaf_splats, err);
+        rc = get_count(dataset, "leaf_splats", INT64_MAX, count, &info->leaf_splats, err);
+    if (!rc && info->leaf_splats > info->points)
+        rc = wrong(dataset, err, "leaf_splats", json_object_get(dataset->meta, "leaf_splats"), "at most \"points\"");
     if (!rc)
-        rc = get_count(dataset, "levels", &levels, err);
+        rc = get_count(dataset, "levels", UINT8_MAX + 1, "a whole number from 1 to 256", &levels, err);
     if (!rc)
-        rc = get_vector(dataset, "bounds", json_object_get(bounds, "min"), info->bounds_min, err);
-    if (!rc)
-        rc = get_vector(dataset, "bounds", json_object_get(bounds, "max"), info->bounds_max, err);
+        rc = get_bounds(dataset, err);
     if (!rc)
         rc = get_view(dataset, err);
     if (!rc)
-        rc = get_color(dataset, err);
-    if (!rc)
-        rc = get_surface(dataset, err);
+        rc = get_attributes(dataset, err);
     if (!rc)
         rc = check_sources(dataset, err);
     if (!rc)
@@ -186,18 +258,11 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = get_unit(dataset, err);
     if (!rc)
         rc = spl_dataset_read_streams(dataset, err);
+    if (!rc && (!json_is_number(radius) || !(json_number_value(radius) > 0)))
+        rc = wrong(dataset, err, "splat_radius", radius, "a number above 0");
     if (rc)
         return rc;
-    for (int a = 0; a < 3; a++)
-        if (info->bounds_min[a] > info->bounds_max[a])
-            return wrong(dataset, err, "bounds", "has a minimum above its maximum");
-    if (!json_is_number(radius) || !(json_number_value(radius) > 0))
-        return wrong(dataset, err, "splat_radius", "must be a positive number");
     info->splat_radius = json_number_value(radius);
-    if (info->leaf_splats > info->points)
-        return wrong(dataset, err, "leaf_splats", "is larger than \"points\"");
-    if (levels > UINT32_MAX)
-        return wrong(dataset, err, "levels", "is absurd");
     info->levels = (uint32_t)levels;
-    return SPL_OK;
+    return get_counts(dataset, err);
 }

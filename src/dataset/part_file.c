@@ -51,7 +51,12 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
         struct stat st;
         file->fd = open(file->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (file->fd < 0) {
-            rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
+            const char *slash = strrchr(path, '/');
+            if (errno == ENOENT && slash)
+                rc = spl_fail(err, SPL_E_IO, "cannot create %s: there is no folder '%.*s'", path,
+                              (int)(slash - path) + 1, path);
+            else
+                rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
             goto failed;
         }
         flock(file->fd, LOCK_EX | LOCK_NB); /* in use; file systems without locks are not swept either */

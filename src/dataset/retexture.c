@@ -128,14 +128,13 @@ int spl_dataset_retexture(const struct spl_retexture *retexture, const char *pat
     memcpy(p.nodes, nodes, node_count * sizeof *nodes);
     if ((rc = allocate(&p, node_count, chunk_count, err)) || (rc = spl_dataset_writer_create(path, &p.writer, err)))
         goto done;
+    if (what.page_bytes)
+        spl_dataset_writer_set_page_bytes(p.writer, what.page_bytes);
     spl_dataset_writer_set_streams(p.writer, streams, p.stream_count);
     if (what.dictionary)
         rc = spl_dataset_writer_set_dictionary(p.writer, what.dictionary, err);
-    for (uint64_t i = 0, next = 0; i < node_count && !rc; next += p.nodes[i++].chunk_count)
-        rc = p.nodes[i].first_chunk == next
-                 ? write_node(&p, &p.nodes[i], err)
-                 : spl_fail(err, SPL_E_UNSUPPORTED, "the chunks of %s are not in the order of its nodes; pack it again",
-                            spl_dataset_get_info(what.from)->id);
+    for (uint64_t i = 0; i < node_count && !rc; i++)
+        rc = write_node(&p, &p.nodes[i], err);
     if (!rc)
         rc = spl_dataset_writer_finish(p.writer, p.nodes, node_count, p.chunks, chunk_count, meta, err);
 done:

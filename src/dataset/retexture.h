@@ -11,7 +11,7 @@
 #include "sparse/code.h"
 
 struct spl_retexture {
-    const struct spl_dataset *from;          /* its own textures, if any, are dropped */
+    const struct spl_dataset *from;          /* keeps all its tables; its own textures are dropped */
     const uint8_t (*colors)[3];              /* by splat id, info.splats of them; NULL: those that it has */
     const struct spl_dictionary *dictionary; /* NULL or without atoms: no textures are written */
     /* Sets the codes of chunk `chunk`, whose splats are chunks[chunk].first_id on: called once for each, in rising
@@ -21,6 +21,7 @@ struct spl_retexture {
     void *context;
     const json_t *color_source; /* put before what META's "color" has; NULL = nothing */
     const json_t *textures;     /* META's "textures": settings, statistics; NULL = none */
+    size_t page_bytes;          /* of the new file's pages, about; 0 = SPL_PAGE_BYTES */
 };
 
 /* Writes `path` (temporary file, sync, rename): geometry and optional attributes are copied bit for bit. Blocks on

@@ -1,8 +1,9 @@
 /* Opening, first stage: header, section table, where sections lie, and their checksums; and the table that says of each
  * kind of section how many there may be, how large they are, whether they are kept in memory and what checks their
  * content. Every size and offset is compared with the source's real length before it is used; sums cannot wrap because
- * each term is bounded by it. Checksums of what is kept are always checked, the pages' when asked for, on all cores.
- * What is checked is the copy in memory that is used afterwards; pages are read in passing. The opener's thread. */
+ * each term is bounded by it. Checksums of what is kept are always checked, the pages' when asked for, on all cores;
+ * those of heads by who reads them (tables.c). What is checked is the copy in memory that is used afterwards; pages
+ * are read in passing. The opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,14 +20,13 @@ enum { table_alignment = 8 };
 /* A kind of section: a row to add, not code. */
 static const struct kind {
     uint32_t type;
-    enum { ONCE, BY_PAGE, BY_STREAM } number; /* in a file, or one for each page or stream, in their order */
+    enum { ONCE, BY_PAGE } number; /* in a file, or one for each page, in their order */
     bool required;
-    bool kept;    /* in memory, from open to close */
-    bool texture; /* a file has all of these kinds or none */
-    const char *by_chunk; /* what is wrong where there is not an item for each chunk; NULL: need not be */
+    bool kept;     /* in memory, from open to close */
+    bool resident; /* on the device, where it is drawn from */
+    bool texture;  /* a file has all of these kinds or none */
+    bool by_reader; /* its checksum is looked at by who reads it, not while sections are listed */
     uint32_t alignment, item_bytes;
-    uint32_t room_bytes; /* of an item in memory, where that is more: items lie at the end of their copy, so that a
-                            check can lay them out anew from its start */
     uint64_t bytes_min, bytes_max;
     const char *wrong_size;
     int (*check)(struct spl_dataset *dataset, struct spl_error *err); // may be NULL: nothing more than the checksum
@@ -34,27 +34,21 @@ static const struct kind {
     [SPL_KIND_META] = {SPL_SECTION_META, .required = true, .kept = true, .alignment = 64, .item_bytes = 1,
                        .bytes_max = SPL_META_BYTES_MAX, .wrong_size = "is larger than 8 MiB",
                        .check = spl_dataset_check_meta},
+    [SPL_KIND_DIRECTORY] = {SPL_SECTION_DIRECTORY, .required = true, .kept = true, .alignment = 64,
+                            .item_bytes = sizeof(struct spl_page_row), .bytes_max = UINT64_MAX,
+                            .wrong_size = "is not a whole number of rows", .check = spl_dataset_check_directory},
     [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .kept = true, .texture = true, .alignment = 64, .item_bytes = 1,
                         .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = UINT64_MAX,
                         .wrong_size = "is shorter than its header", .check = spl_dataset_check_dictionary},
-    [SPL_KIND_CHUNK_TEXTURES] = {SPL_SECTION_CHUNK_TEXTURES, .kept = true, .texture = true, .by_chunk = "has not one word for each chunk", .alignment = 64,
-                                 .item_bytes = sizeof(uint32_t), .bytes_max = UINT64_MAX,
-                                 .wrong_size = "has not one word for each chunk"},
-    [SPL_KIND_CHUNKS] = {SPL_SECTION_CHUNKS, .required = true, .kept = true, .alignment = 64,
-                         .item_bytes = SPL_CHUNK_BYTES, .room_bytes = sizeof(struct spl_chunk),
-                         .bytes_min = SPL_CHUNK_BYTES, .bytes_max = UINT64_MAX,
-                         .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_chunks},
-    [SPL_KIND_STREAMS] = {SPL_SECTION_STREAM, .number = BY_STREAM, .kept = true, .by_chunk = "has not a base and a width for each chunk", .alignment = 64,
-                          .item_bytes = SPL_STREAM_CHUNK_BYTES, .bytes_max = UINT64_MAX,
-                          .wrong_size = "is not a whole number of chunks", .check = spl_dataset_check_streams},
-    [SPL_KIND_NODES] = {SPL_SECTION_NODES, .required = true, .kept = true, .alignment = 64,
-                        .item_bytes = sizeof(struct spl_node), .bytes_min = sizeof(struct spl_node),
-                        .bytes_max = UINT64_MAX, .wrong_size = "is not a whole number of nodes",
-                        .check = spl_dataset_check_nodes},
-    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .alignment = SPL_FILE_ALIGNMENT,
-                        .item_bytes = sizeof(uint32_t), .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t),
-                        .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have"},
-    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .number = BY_PAGE, .texture = true, .alignment = 64,
+    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .resident = true,
+                        .alignment = SPL_FILE_ALIGNMENT, .item_bytes = sizeof(uint32_t),
+                        .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t), .bytes_max = SPL_PAGE_BYTES_MAX,
+                        .wrong_size = "has a size that no page can have"},
+    [SPL_KIND_HEADS] = {SPL_SECTION_HEAD, .number = BY_PAGE, .required = true, .by_reader = true, .alignment = 64,
+                        .item_bytes = 1, .bytes_min = SPL_NODE_BYTES + SPL_CHUNK_BYTES,
+                        .bytes_max = SPL_HEAD_BYTES_MAX, .wrong_size = "has a size that no head can have",
+                        .check = spl_dataset_check_heads},
+    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .number = BY_PAGE, .resident = true, .texture = true, .alignment = 64,
                            .item_bytes = sizeof(uint32_t), .bytes_min = SPL_TEXTURE_TAIL_WORDS * sizeof(uint32_t),
                            .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have",
                            .check = spl_dataset_check_textures},
@@ -186,22 +180,15 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
     return SPL_OK;
 }
 
-/* What a copy has before its section's bytes. */
-static uint64_t room_before(const struct spl_section *section)
-{
-    const struct kind *kind = kind_of(section);
-    return kind->room_bytes ? section->bytes / kind->item_bytes * (kind->room_bytes - kind->item_bytes) : 0;
-}
-
-/* A section as it is in the file, malloc'd, behind its room; NULL and `err` when it cannot be read. */
+/* A section as it is in the file, malloc'd; NULL and `err` when it cannot be read. */
 static void *copy_section(const struct spl_dataset *dataset, const struct spl_section *section, struct spl_error *err)
 {
-    const uint64_t block = 16 << 20, room = room_before(section);
-    char *copy = spl_alloc_raw(room + section->bytes, 1, err);
+    const uint64_t block = 16 << 20;
+    char *copy = spl_alloc_raw(section->bytes, 1, err);
     for (uint64_t done = 0; copy && done < section->bytes; done += block) {
         uint64_t left = section->bytes - done;
         if (spl_dataset_check_cancelled(dataset, err) ||
-            spl_dataset_read(dataset, section->offset + done, copy + room + done, left < block ? left : block, err)) {
+            spl_dataset_read(dataset, section->offset + done, copy + done, left < block ? left : block, err)) {
             free(copy);
             return NULL;
         }
@@ -212,16 +199,16 @@ static void *copy_section(const struct spl_dataset *dataset, const struct spl_se
 /* A file that lists a kind has as many as it should, and none of the kinds that it needs is missing. */
 static int check_numbers(const struct spl_dataset *dataset, struct spl_error *err)
 {
-    static const char *const some = "lists some of ATOM, CTEX and a TEXP for each page, but not all";
+    static const char *const some = "lists some of ATOM and a TEXP for each page, but not all";
     bool textures = false;
     for (int k = 0; k < SPL_KIND_COUNT; k++)
         textures |= kinds[k].texture && dataset->found[k].count;
     for (int k = 0; k < SPL_KIND_COUNT; k++) {
         uint32_t count = dataset->found[k].count;
-        char what[32], letters[5];
+        char what[48], letters[5];
         letters_of(kinds[k].type, letters);
-        snprintf(what, sizeof what, "lists no section %s", letters);
-        if (kinds[k].required && !count)
+        snprintf(what, sizeof what, "lists no section %s%s", letters, count ? " of each page" : "");
+        if (kinds[k].required && (kinds[k].number == BY_PAGE ? count != dataset->info.pages || !count : !count))
             return corrupt(dataset, err, "section table", what);
         if (kinds[k].texture && count != (!textures ? 0 : kinds[k].number == BY_PAGE ? dataset->info.pages : 1))
             return corrupt(dataset, err, "section table", some);
@@ -255,21 +242,16 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
             return corrupt(dataset, err, section_name(s, name), kind->number ? "is out of order" : "occurs twice");
         if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
             return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
-        if (kind->number == BY_STREAM && list->count == SPL_STREAMS_MAX)
-            return corrupt(dataset, err, section_name(s, name), "is one more than a dataset can have");
         list->at[list->count++] = s;
-        dataset->info.page_bytes += kind->number == BY_PAGE ? s->bytes : 0;
+        dataset->info.page_bytes += kind->resident ? s->bytes : 0;
     }
     dataset->info.pages = dataset->found[SPL_KIND_PAGES].count;
     int rc = check_numbers(dataset, err);
     if (rc)
         return rc;
-    dataset->info.nodes = dataset->found[SPL_KIND_NODES].at[0]->bytes / sizeof(struct spl_node);
-    dataset->info.chunks = dataset->found[SPL_KIND_CHUNKS].at[0]->bytes / SPL_CHUNK_BYTES;
-    for (int k = 0; k < SPL_KIND_COUNT; k++) /* before any of them is copied */
-        for (uint32_t i = 0; i < dataset->found[k].count && kinds[k].by_chunk; i++)
-            if (dataset->found[k].at[i]->bytes != dataset->info.chunks * kinds[k].item_bytes)
-                return corrupt(dataset, err, section_name(dataset->found[k].at[i], name), kinds[k].by_chunk);
+    const struct spl_section *directory = dataset->found[SPL_KIND_DIRECTORY].at[0];
+    if (directory->bytes != (dataset->info.pages + 1ull) * sizeof(struct spl_page_row))
+        return corrupt(dataset, err, "section PDIR", "has not a row for each page, and one that closes them");
     return SPL_OK;
 }
 
@@ -281,10 +263,9 @@ const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_sec
     return index < list->count ? dataset->copies[list->at[index] - dataset->sections] : NULL;
 }
 
-/* Everything but the pages into memory. */
+/* What is kept into memory. */
 static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint64_t bytes;
     if (!(dataset->copies = spl_alloc(dataset->section_count, sizeof *dataset->copies, err)))
         return SPL_E_NOMEM;
     for (uint32_t i = 0; i < dataset->section_count; i++) {
@@ -295,9 +276,6 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
     }
     dataset->pages = dataset->found[SPL_KIND_PAGES].at;
     dataset->textures = dataset->found[SPL_KIND_TEXTURES].count ? dataset->found[SPL_KIND_TEXTURES].at : NULL;
-    dataset->nodes = (void *)spl_dataset_get_copy(dataset, SPL_KIND_NODES, 0, &bytes);
-    dataset->chunks = (void *)spl_dataset_get_copy(dataset, SPL_KIND_CHUNKS, 0, &bytes);
-    dataset->chunk_textures = (void *)spl_dataset_get_copy(dataset, SPL_KIND_CHUNK_TEXTURES, 0, &bytes);
     return SPL_OK;
 }
 
@@ -311,11 +289,12 @@ struct hashing {
 static int check_section(const struct spl_dataset *dataset, uint32_t index, bool verify)
 {
     const struct spl_section *section = &dataset->sections[index];
+    const struct kind *kind = kind_of(section);
     uint64_t hash = section->hash;
     int rc = SPL_OK;
     if (dataset->copies[index])
-        hash = XXH3_64bits((const char *)dataset->copies[index] + room_before(section), section->bytes);
-    else if (verify)
+        hash = XXH3_64bits(dataset->copies[index], section->bytes);
+    else if (verify && !(kind && kind->by_reader))
         rc = spl_dataset_hash_section(dataset, section, &hash, NULL);
     return rc ? rc : hash == section->hash ? SPL_OK : SPL_E_CORRUPT;
 }

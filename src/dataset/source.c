@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -75,7 +76,8 @@ int spl_dataset_source_open_file(const char *path, struct spl_dataset_source *ou
                                            .read = read_file,
                                            .close = close_file,
                                            .context = file,
-                                           .map = file->bytes ? file->map : NULL};
+                                           .map = file->bytes ? file->map : NULL,
+                                           .owned = true};
     return rc;
 }
 
@@ -97,14 +99,18 @@ int spl_dataset_source_read(const struct spl_dataset_source *source, const char 
     for (char *to = out; bytes;) {
         int64_t got = source->read(source->context, offset, to, bytes);
         if (got < 0)
-            return spl_fail_errno(err, got > -4096 ? (int)-got : EIO, "cannot read %s", name); // a caller's may be anything
+            return spl_fail_errno(err, got > -4096 ? (int)-got : EIO, // a caller's may be anything
+                                  "cannot read %s, %zu bytes from offset %" PRIu64, name, bytes, offset);
         if (!got)
             return spl_fail(err, SPL_E_CORRUPT,
-                            "%s was cut short while in use; put the dataset back under another name and rename it",
-                            name);
+                            "%s was cut short while in use: nothing lies at offset %" PRIu64
+                            "; put the dataset back under another name and rename it",
+                            name, offset);
         if ((uint64_t)got > bytes)
-            return spl_fail(err, SPL_E_IO, "cannot read %s: its reader returned more bytes than it was asked for",
-                            name);
+            return spl_fail(err, SPL_E_IO,
+                            "cannot read %s, %zu bytes from offset %" PRIu64
+                            ": its reader returned more bytes than it was asked for",
+                            name, bytes, offset);
         to += got;
         offset += (uint64_t)got;
         bytes -= (size_t)got;

@@ -2,6 +2,7 @@
 #ifndef SPL_DATASET_SOURCE_H
 #define SPL_DATASET_SOURCE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -15,6 +16,7 @@ struct spl_dataset_source {
     void (*close)(void *context); // may be NULL
     void *context;
     const void *map; /* all bytes at once, for tools; may be NULL, so that nobody who serves looks through it */
+    bool owned;      /* nothing of it is the caller's, who need not know when it is closed */
 };
 
 /* A regular file by its descriptor, and a map of it. On failure there is nothing to close; errors name `path`. */

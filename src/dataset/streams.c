@@ -110,6 +110,18 @@ enum spl_stream_type spl_stream_type_from_name(const char *name)
     return (enum spl_stream_type)type;
 }
 
+bool spl_stream_name_is_taken(const char *name)
+{
+    static const char *const others[] = {"total", "position_axis", "normal_coordinate", "color_component"};
+    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
+        if (!strcmp(name, spl_attribute_name((enum spl_attribute)a)))
+            return true;
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (!strcmp(name, others[i]))
+            return true;
+    return false;
+}
+
 uint32_t spl_stream_encode(enum spl_stream_type type, const double *values, uint32_t count,
                            struct spl_stream_code *code, uint32_t *words)
 {

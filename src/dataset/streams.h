@@ -4,6 +4,7 @@
 #ifndef SPL_DATASET_STREAMS_H
 #define SPL_DATASET_STREAMS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -30,16 +31,20 @@ struct spl_stream_code {
 struct spl_stream {
     const char *name, *type, *unit; /* as in the file, borrowed; unit "" = none */
     const char *about;              // may be NULL: where it comes from, of those that we know
-    const uint32_t *base;           /* by chunk, borrowed */
+    const uint32_t *base;           /* by chunk, borrowed; NULL where the dataset does not keep all tables */
     const uint8_t *width;
 };
 
-/* What a section STRM has: the bases of all chunks, then the widths. */
+/* What a page's head has of a chunk and stream: its base and its width. */
 enum { SPL_STREAM_CHUNK_BYTES = 5 };
 
 /* The attributes that we know. */
 enum { SPL_STREAM_CLASS, SPL_STREAM_UNCERTAINTY, SPL_STREAM_KNOWN_COUNT };
 extern const struct spl_stream spl_streams_known[SPL_STREAM_KNOWN_COUNT];
+
+/* Is it the name of what every dataset has, or of what is said beside the streams (their total, the parts that widths are
+ * counted of)? No stream may have it: the figures of both stand in one object of 'splatd info --json'. */
+bool spl_stream_name_is_taken(const char *name);
 
 /* Largest number of words of one stream of a chunk. */
 enum { SPL_STREAM_WORDS_MAX = SPL_CHUNK_SPLATS };
@@ -47,16 +52,6 @@ enum { SPL_STREAM_WORDS_MAX = SPL_CHUNK_SPLATS };
 static inline uint32_t spl_stream_words(uint32_t width, uint32_t count)
 {
     return (count * width + 31) / 32;
-}
-
-/* Words of the first `count` streams of chunk `chunk`, which has so many splats. */
-static inline uint32_t spl_streams_words(const struct spl_stream *streams, uint32_t count, uint64_t chunk,
-                                         uint32_t splats)
-{
-    uint32_t words = 0;
-    for (uint32_t s = 0; s < count; s++)
-        words += spl_stream_words(streams[s].width[chunk], splats);
-    return words;
 }
 
 /* Chooses base and width for `count` (1..SPL_CHUNK_SPLATS) values, writes `words` (room for SPL_STREAM_WORDS_MAX) and

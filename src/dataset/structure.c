@@ -1,19 +1,18 @@
-/* Opening, third stage: nodes and chunks. Afterwards any walk of the tree ends, every index is in range, every stream
- * lies in its page and every code decodes to finite numbers, so the renderer and the shaders check nothing. Linear in
- * nodes and chunks, and never more memory than a byte a chunk. The opener's thread. */
+/* Heads of pages: what nodes and chunks may say. A head is held against its row of the directory alone: its sums end where
+ * the next row begins, so each node but the root is exactly one node's child, whose number is larger than its parent's;
+ * each chunk is one node's; every stream lies in its page; and every code decodes to finite numbers. Any walk of the tree
+ * ends, and the renderer and the shaders check nothing. Linear in nodes and chunks. Any thread. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include <stdio.h>
 
-#include "base/memory.h"
 #include "dataset/codec.h"
 #include "dataset/open.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *item,
-                 size_t index, const char *what)
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, uint32_t page, const char *item,
+                 uint64_t number, const char *what)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s: %s %zu %s; pack the dataset again", dataset->name, section,
-                    item, index, what);
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section HEAD %u: %s %llu %s; pack the dataset again",
+                    spl_dataset_get_name(dataset), page, item, (unsigned long long)number, what);
 }
 
 static bool finite3(const float v[3])
@@ -41,15 +40,12 @@ static const char *judge_node(const struct spl_node *node)
             return "has a box whose minimum lies above its maximum";
     if (node->child_count > 8)
         return "has more than 8 children";
-    if (node->child_count == 0 && node->first_child != 0)
-        return "has a first child but no children";
     if (node->chunk_count == 0 || node->chunk_count > SPL_NODE_CHUNKS_MAX)
         return "has no chunks, or too many";
     return NULL;
 }
 
-/* What is wrong between a child and its parent, or NULL. */
-static const char *judge_child(const struct spl_node *parent, const struct spl_node *child)
+const char *spl_node_judge_child(const struct spl_node *parent, const struct spl_node *child)
 {
     if (child->depth != parent->depth + 1)
         return "is not one deeper than its parent";
@@ -64,119 +60,92 @@ static const char *judge_child(const struct spl_node *parent, const struct spl_n
     return NULL;
 }
 
-int spl_dataset_check_chunks(struct spl_dataset *dataset, struct spl_error *err)
+/* Bases and widths of each stream. */
+static int judge_streams(const struct spl_dataset *dataset, const struct spl_tables *tables, struct spl_error *err)
 {
-    struct spl_dataset_info *info = &dataset->info;
-    const char *from = (const char *)dataset->chunks + info->chunks * (sizeof(struct spl_chunk) - SPL_CHUNK_BYTES);
-    for (uint64_t i = 0; i < info->chunks; i++, from += SPL_CHUNK_BYTES) {
-        struct spl_chunk *chunk = &dataset->chunks[i];
-        memmove(chunk, from, SPL_CHUNK_BYTES); /* never beyond it: the rest lies behind */
-        chunk->count = chunk->extra_bits >> SPL_EXTRA_COUNT & 255;
-        chunk->extra_bits &= ~(255u << SPL_EXTRA_COUNT);
-        chunk->first_id = info->ids;
+    for (uint32_t s = 0; s < tables->stream_count; s++) {
+        uint64_t at;
+        const char *what =
+            spl_stream_judge(dataset->stream_types[s], tables->base[s], tables->width[s], tables->chunk_count, &at);
+        char item[SPL_STREAM_TEXT_MAX + 24];
+        snprintf(item, sizeof item, "attribute %s of chunk", dataset->streams[s].name);
+        if (what)
+            return wrong(dataset, err, tables->page, item, tables->first_chunk + at, what);
+    }
+    return SPL_OK;
+}
+
+/* Chunks, which get their ids; after the streams, whose codes lie behind theirs. */
+static int judge_chunks(const struct spl_dataset *dataset, struct spl_tables *tables, struct spl_error *err)
+{
+    const struct spl_page_row *row = &dataset->rows[tables->page];
+    uint64_t id = row->first_id, page_words = dataset->pages[tables->page]->bytes / 4 - SPL_PAGE_TAIL_WORDS;
+    for (uint32_t c = 0; c < tables->chunk_count; c++) {
+        struct spl_chunk *chunk = &tables->chunks[c];
+        chunk->first_id = id;
         const struct spl_chunk_codec *codec = spl_chunk_get_codec(spl_chunk_kind(chunk));
         const char *what = codec ? codec->judge(chunk) : "is of a kind that this version does not know";
         if (what)
-            return wrong(dataset, err, "CHNK", "chunk", i, what);
-        info->ids += chunk->count;
-        codec->add_bits(chunk, info->attribute_bits);
-        bool discs = spl_chunk_kind(chunk) == SPL_CHUNK_DISCS;
-        info->splats += discs ? chunk->count : 0;
-        info->pieces += spl_chunk_count_pieces(chunk);
-        info->has_linear |= discs && chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != 0;
-    }
-    info->attribute_bits[SPL_ATTRIBUTE_CHUNK] += 8ull * info->nodes * sizeof(struct spl_node);
-    return SPL_OK;
-}
-
-/* The chunks of one node: in its page, and in no other node. Adds up their splats. */
-static int claim_chunks(struct spl_dataset *dataset, uint64_t index, uint8_t *claimed, uint64_t *splats,
-                        struct spl_error *err)
-{
-    const struct spl_node *node = &dataset->nodes[index];
-    if (node->page >= dataset->info.pages)
-        return wrong(dataset, err, "NODE", "node", index, "names a page that does not exist");
-    if (node->first_chunk > dataset->info.chunks || node->chunk_count > dataset->info.chunks - node->first_chunk)
-        return wrong(dataset, err, "NODE", "node", index, "names chunks that do not exist");
-    uint64_t page_words = dataset->pages[node->page]->bytes / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS;
-    for (uint64_t i = node->first_chunk; i < node->first_chunk + node->chunk_count; i++) {
-        const struct spl_chunk *chunk = &dataset->chunks[i];
-        if (claimed[i])
-            return wrong(dataset, err, "NODE", "node", index, "shares a chunk with another node");
-        uint32_t words =
-            spl_chunk_words(chunk) + spl_streams_words(dataset->streams, dataset->info.stream_count, i, chunk->count);
+            return wrong(dataset, err, tables->page, "chunk", tables->first_chunk + c, what);
+        uint32_t words = codec->words(chunk) + spl_tables_get_stream_words(tables, tables->stream_count, c);
         if (chunk->geometry_word > page_words || words > page_words - chunk->geometry_word)
-            return wrong(dataset, err, "CHNK", "chunk", i, "reaches beyond the end of its page");
-        claimed[i] = 1;
-        *splats += spl_chunk_kind(chunk) == SPL_CHUNK_DISCS ? chunk->count : 0;
+            return wrong(dataset, err, tables->page, "chunk", tables->first_chunk + c,
+                         "reaches beyond the end of its page");
+        id += chunk->count;
     }
-    return SPL_OK;
+    return id == row[1].first_id ? SPL_OK
+                                 : wrong(dataset, err, tables->page, "chunk", row[1].first_chunk - 1,
+                                         "does not end with the id that PDIR says");
 }
 
-/* Nodes lie breadth first: the children of each follow those of the node before it. So each is reached exactly once. */
-static int check_tree(struct spl_dataset *dataset, uint8_t *claimed, struct spl_error *err)
+/* Nodes, which get their page, first child and first chunk. */
+static int judge_nodes(const struct spl_dataset *dataset, struct spl_tables *tables, struct spl_error *err)
 {
-    struct spl_dataset_info *info = &dataset->info;
-    uint64_t next = 1, leaf_splats = 0, chunks = 0;
-    uint32_t depth = 0;
-    if (dataset->nodes[0].depth != 0)
-        return wrong(dataset, err, "NODE", "node", 0, "is the root, but its depth is not 0");
-    for (uint64_t i = 0; i < info->nodes; i++) {
-        const struct spl_node *node = &dataset->nodes[i];
+    const struct spl_page_row *row = &dataset->rows[tables->page], *next = row + 1;
+    uint64_t child = row->first_child, chunk = row->first_chunk, number = row->first_node;
+    for (uint32_t n = 0; n < tables->node_count; n++, number++) {
+        struct spl_node *node = &tables->nodes[n];
+        node->page = tables->page;
+        node->first_child = child;
+        node->first_chunk = chunk;
         const char *what = judge_node(node);
-        if (!what && i >= next)
+        if (!what && (node->depth == 0) != (number == 0))
+            what = "is the root and its depth is not 0, or is not and it is";
+        if (!what && node->depth >= dataset->info.levels)
+            what = "lies deeper than META's \"levels\"";
+        if (!what && number >= child)
             what = "is no node's child";
-        if (!what && node->child_count && (node->first_child != next || node->child_count > info->nodes - next))
-            what = "has children that do not follow those of the node before it";
+        if (!what && node->child_count > next->first_child - child)
+            what = "has more children than PDIR leaves it";
+        if (!what && node->chunk_count > next->first_chunk - chunk)
+            what = "has more chunks than PDIR leaves it";
         if (what)
-            return wrong(dataset, err, "NODE", "node", i, what);
-        for (uint32_t child = 0; child < node->child_count; child++) {
-            what = judge_child(node, &dataset->nodes[next + child]);
-            if (what)
-                return wrong(dataset, err, "NODE", "node", next + child, what);
-        }
-        next += node->child_count;
-        chunks += node->chunk_count;
-        depth = node->depth;
-        uint64_t splats = 0;
-        int rc = claim_chunks(dataset, i, claimed, &splats, err);
-        if (rc)
-            return rc;
-        if (node->child_count == 0)
-            leaf_splats += splats;
+            return wrong(dataset, err, tables->page, "node", number, what);
+        child += node->child_count;
+        chunk += node->chunk_count;
     }
-    if (chunks != info->chunks)
-        return wrong(dataset, err, "CHNK", "number of chunks", info->chunks, "is larger than what the nodes hold");
-    if (leaf_splats != info->leaf_splats)
-        return wrong(dataset, err, "META", "\"leaf_splats\"", info->leaf_splats, "is not what the leaves hold");
-    if (depth + 1 != info->levels)
-        return wrong(dataset, err, "META", "\"levels\"", info->levels, "is not the depth of the tree");
-    return SPL_OK;
+    return child == next->first_child && chunk == next->first_chunk
+               ? SPL_OK
+               : wrong(dataset, err, tables->page, "node", number - 1,
+                       "does not end with the child or the chunk that PDIR says");
 }
 
-/* A counting sort, so that whoever goes through the pages meets each node once, however many pages there are. */
-static int sort_nodes_by_page(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_judge_head(const struct spl_dataset *dataset, struct spl_tables *tables, struct spl_error *err)
 {
-    const struct spl_dataset_info *info = &dataset->info;
-    uint64_t *first = dataset->page_first = spl_alloc((size_t)info->pages + 2, sizeof *first, err);
-    dataset->page_nodes = first ? spl_alloc_raw(info->nodes, sizeof *dataset->page_nodes, err) : NULL;
-    if (!dataset->page_nodes)
-        return SPL_E_NOMEM;
-    for (uint64_t n = 0; n < info->nodes; n++)
-        first[dataset->nodes[n].page + 2]++;
-    for (uint32_t p = 2; p <= info->pages; p++)
-        first[p] += first[p - 1];
-    for (uint64_t n = 0; n < info->nodes; n++) /* first[p + 1] moves from the page's first to its last */
-        dataset->page_nodes[first[dataset->nodes[n].page + 1]++] = n;
-    return SPL_OK;
+    int rc = judge_streams(dataset, tables, err);
+    if (!rc)
+        rc = judge_chunks(dataset, tables, err);
+    return rc ? rc : judge_nodes(dataset, tables, err);
 }
 
-int spl_dataset_check_nodes(struct spl_dataset *dataset, struct spl_error *err)
+int spl_dataset_check_children(const struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint8_t *claimed = spl_alloc(dataset->info.chunks, 1, err);
-    if (!claimed)
-        return SPL_E_NOMEM;
-    int rc = check_tree(dataset, claimed, err);
-    free(claimed);
-    return rc || !dataset->chunk_textures ? rc : sort_nodes_by_page(dataset, err);
+    const struct spl_node *nodes = dataset->whole.nodes;
+    for (uint64_t n = 0; n < dataset->info.nodes; n++)
+        for (uint64_t child = nodes[n].first_child; child < nodes[n].first_child + nodes[n].child_count; child++) {
+            const char *what = spl_node_judge_child(&nodes[n], &nodes[child]);
+            if (what)
+                return wrong(dataset, err, nodes[child].page, "node", child, what);
+        }
+    return SPL_OK;
 }

@@ -23,8 +23,8 @@ static inline uint32_t spl_texture_planes(uint32_t chunk_texture)
 }
 
 /* Writes `code` to `words` (room for SPL_TEXTURE_WORDS_MAX) with the widths that its planes state, and returns the
- * number of words; with the one that CTEX has, spl_chunk_code_bits() / 32. Codes that do not fit their widths are an
- * assertion. */
+ * number of words; with the one that its page's head has, spl_chunk_code_bits() / 32. Codes that do not fit their
+ * widths are an assertion. */
 uint32_t spl_texture_encode(const struct spl_chunk_code *code, uint32_t *words);
 
 /* What is wrong with the codes of a chunk of `splats` splats and `planes` planes (> 0) at words[0 .. count), for a

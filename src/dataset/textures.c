@@ -14,67 +14,70 @@
 #include "dataset/texture.h"
 #include "sparse/atom.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *section, const char *what)
+static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *what)
 {
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section %s %s; copy or pack the dataset again", dataset->name, section,
-                    what);
+    return spl_fail(err, SPL_E_CORRUPT, "%s: section ATOM %s; copy or pack the dataset again", dataset->name, what);
 }
 
 int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err)
 {
-    uint64_t bytes, chunk_bytes;
+    uint64_t bytes;
     const struct spl_atoms_header *header = spl_dataset_get_copy(dataset, SPL_KIND_ATOMS, 0, &bytes);
     struct spl_dataset_info *info = &dataset->info;
-    spl_dataset_get_copy(dataset, SPL_KIND_CHUNK_TEXTURES, 0, &chunk_bytes);
     if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
         header->reserved[1])
-        return wrong(dataset, err, "ATOM", "has a size of textures or a reserved field that version 2 does not have");
+        return wrong(dataset, err, "has a size of textures or a reserved field that version 2 does not have");
     if (!header->count || header->count > SPL_DICTIONARY_MAX ||
         spl_dictionary_expanded_bytes(header->count, header->size) > SPL_DICTIONARY_BYTES_MAX)
-        return wrong(dataset, err, "ATOM", "has no atoms, or more than a device can bind");
+        return wrong(dataset, err, "has no atoms, or more than a device can bind");
     if (8 * (bytes - sizeof *header) < 12 * (uint64_t)header->count)
-        return wrong(dataset, err, "ATOM", "ends before its atoms do");
-    if (chunk_bytes != info->chunks * sizeof(uint32_t))
-        return wrong(dataset, err, "CTEX", "has not one word for each chunk");
+        return wrong(dataset, err, "ends before its atoms do");
     int rc = spl_dictionary_init(&dataset->dictionary, header->count, header->size, err);
     if (rc)
         return rc;
     const char *what =
         spl_atoms_read((const uint8_t *)header + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
     if (what)
-        return wrong(dataset, err, "ATOM", what);
+        return wrong(dataset, err, what);
     info->atoms = header->count;
     info->texture_size = header->size;
     info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);
     info->page_bytes += info->dictionary_bytes;
     info->attribute_bits[SPL_ATTRIBUTE_DICTIONARY] = 8 * bytes;
-    info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * chunk_bytes;
+    info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] = 8 * sizeof(uint32_t) * info->chunks;
     for (uint32_t page = 0; page < info->pages; page++)
         info->attribute_bits[SPL_ATTRIBUTE_TEXTURE] += 8 * dataset->textures[page]->bytes;
     return SPL_OK;
 }
 
-/* Judges the codes of every chunk of page `index`, whose textures are `words`. */
-static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
+/* Judges the codes of every chunk of the page that `tables` describe, whose textures are `words`. */
+static int judge_codes(const struct spl_dataset *dataset, const struct spl_tables *tables, const uint32_t *words,
+                       struct spl_error *err)
 {
-    size_t count = dataset->textures[index]->bytes / sizeof *words - SPL_TEXTURE_TAIL_WORDS;
-    for (uint64_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
-        const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
-        for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
-            uint32_t texture = dataset->chunk_textures[c], first = spl_texture_word(texture);
-            if (!texture)
-                continue;
-            const char *what = first < count
-                                   ? spl_texture_judge(words + first, count - first, spl_texture_planes(texture),
-                                                       dataset->chunks[c].count, dataset->dictionary.count)
-                                   : "starts beyond the end of the section";
-            if (what)
-                return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %llu %s; pack the dataset again",
-                                dataset->info.id[0] ? dataset->info.id : dataset->name, index,
-                                (unsigned long long)c, what);
-        }
+    size_t count = dataset->textures[tables->page]->bytes / sizeof *words - SPL_TEXTURE_TAIL_WORDS;
+    for (uint32_t c = 0; c < tables->chunk_count; c++) {
+        uint32_t texture = tables->textures[c], first = spl_texture_word(texture);
+        if (!texture)
+            continue;
+        const char *what = first < count ? spl_texture_judge(words + first, count - first, spl_texture_planes(texture),
+                                                             tables->chunks[c].count, dataset->dictionary.count)
+                                         : "starts beyond the end of the section";
+        if (what)
+            return spl_fail(err, SPL_E_CORRUPT, "%s: section TEXP %u: chunk %llu %s; pack the dataset again",
+                            spl_dataset_get_name(dataset), tables->page,
+                            (unsigned long long)(tables->first_chunk + c), what);
     }
     return SPL_OK;
+}
+
+static int judge_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, struct spl_error *err)
+{
+    struct spl_tables *read;
+    struct spl_error why = {0};
+    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, index, &read, &why);
+    int rc = tables ? judge_codes(dataset, tables, words, &why) : why.code;
+    free(read);
+    return rc ? spl_fail(err, rc, "%s", why.message) : SPL_OK;
 }
 
 const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset)
@@ -84,7 +87,8 @@ const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset
 
 const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset)
 {
-    return dataset->chunk_textures;
+    spl_assert(dataset->whole.nodes);
+    return dataset->whole.textures;
 }
 
 size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t index)
@@ -146,19 +150,17 @@ int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *er
 static int count_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,
                       struct spl_error *err)
 {
-    (void)err;
-    uint64_t *histogram = context;
-    for (uint64_t n = dataset->page_first[index]; n < dataset->page_first[index + 1]; n++) {
-        const struct spl_node *node = &dataset->nodes[dataset->page_nodes[n]];
-        for (uint64_t c = node->first_chunk; c < node->first_chunk + node->chunk_count; c++) {
-            uint32_t texture = dataset->chunk_textures[c];
-            if (spl_chunk_kind(&dataset->chunks[c]) != SPL_CHUNK_DISCS)
-                continue;
-            spl_texture_count(words + spl_texture_word(texture), spl_texture_planes(texture), dataset->chunks[c].count,
-                              histogram);
-        }
+    struct spl_tables *read;
+    struct spl_error why = {0};
+    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, index, &read, &why);
+    for (uint32_t c = 0; tables && c < tables->chunk_count; c++) {
+        uint32_t texture = tables->textures[c];
+        if (spl_chunk_kind(&tables->chunks[c]) == SPL_CHUNK_DISCS)
+            spl_texture_count(words + spl_texture_word(texture), spl_texture_planes(texture), tables->chunks[c].count,
+                              context);
     }
-    return SPL_OK;
+    free(read);
+    return tables ? SPL_OK : spl_fail(err, why.code, "%s", why.message);
 }
 
 int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogram, struct spl_error *err)

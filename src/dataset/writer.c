@@ -1,4 +1,5 @@
-/* Writing a .spld file: pages go out as they fill, everything that describes them follows, the header comes last, over
+/* Writing a .spld file: pages go out as they fill, everything that describes them follows (a directory, and a head of each
+ * page), the header comes last, over
  * the zeroes at the file's start. Until the rename all of it lies in PATH.part-PID; the header is missing there until
  * everything else is written, so that even a stray part file never opens as a dataset. One page is held in memory.
  * Owned by one thread at a time. */
@@ -11,7 +12,9 @@
 
 #include "base/memory.h"
 #include "dataset/atoms.h"
+#include "dataset/counts.h"
 #include "dataset/dictionary.h"
+#include "dataset/head.h"
 #include "dataset/part_file.h"
 
 enum { section_alignment = 64 };
@@ -31,9 +34,11 @@ struct spl_dataset_writer {
     const struct spl_dictionary *dictionary; /* NULL = no textures */
     const struct spl_stream *streams;        /* of all chunks */
     uint32_t stream_count;
+    size_t page_nodes, page_chunks; /* of the page being filled */
     struct spl_section *sections;
     size_t section_count, section_capacity;
     uint32_t page_count;
+    size_t page_limit; /* bytes that a page is to have at most; one with a larger node has more */
 };
 
 static uint64_t align(uint64_t offset, uint64_t alignment)
@@ -87,6 +92,7 @@ static int flush_page(struct spl_dataset_writer *writer, struct spl_error *err)
     if (!rc && writer->dictionary)
         rc = flush_words(writer, SPL_SECTION_TEXTURES, &writer->textures, err);
     writer->page_count++;
+    writer->page_nodes = writer->page_chunks = 0;
     return rc;
 }
 
@@ -112,6 +118,7 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
     if (!writer)
         return SPL_E_NOMEM;
     writer->offset = sizeof(struct spl_file_header);
+    writer->page_limit = SPL_PAGE_BYTES;
     int rc = reserve(&writer->page, SPL_PAGE_BYTES / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS, err);
     if (!rc)
         rc = spl_part_file_init(&writer->file, path, err);
@@ -120,6 +127,12 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
     else
         *out = writer;
     return rc;
+}
+
+void spl_dataset_writer_set_page_bytes(struct spl_dataset_writer *writer, size_t bytes)
+{
+    spl_assert(bytes <= SPL_PAGE_BYTES_MAX);
+    writer->page_limit = bytes;
 }
 
 int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const struct spl_dictionary *dictionary,
@@ -164,9 +177,11 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
         page_bytes(larger, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES_MAX)
         return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)",
                         writer->file.path, larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
-    if (to->used &&
-        (page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > SPL_PAGE_BYTES ||
-         page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES)) {
+    if (writer->page_nodes &&
+        (spl_head_bytes(writer->page_nodes + 1, writer->page_chunks + chunk_count, SPL_STREAMS_MAX, true) >
+             SPL_HEAD_BYTES_MAX ||
+         page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > writer->page_limit ||
+         page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > writer->page_limit)) {
         int rc = flush_page(writer, err);
         if (rc)
             return rc;
@@ -180,6 +195,8 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
     for (size_t i = 0; i < chunk_count; i++)
         chunks[i].geometry_word += (uint32_t)to->used;
     to->used += word_count;
+    writer->page_nodes++;
+    writer->page_chunks += chunk_count;
     *page = writer->page_count;
     return SPL_OK;
 }
@@ -199,22 +216,8 @@ void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const str
     writer->stream_count = count;
 }
 
-static int write_streams(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
-{
-    size_t bases = chunk_count * sizeof(uint32_t), all = chunk_count * SPL_STREAM_CHUNK_BYTES;
-    char *bytes = writer->stream_count ? spl_alloc_raw(all, 1, err) : NULL;
-    int rc = writer->stream_count && !bytes ? SPL_E_NOMEM : SPL_OK;
-    for (uint32_t s = 0; s < writer->stream_count && !rc; s++) {
-        memcpy(bytes, writer->streams[s].base, bases);
-        memcpy(bytes + bases, writer->streams[s].width, chunk_count);
-        rc = add_section(writer, SPL_SECTION_STREAM, s, bytes, all, err);
-    }
-    free(bytes);
-    return rc;
-}
-
-/* META as the caller has it, and "streams"; NULL where memory is refused. */
-static char *describe(const struct spl_dataset_writer *writer, const json_t *meta)
+/* META as the caller has it, "streams" and "counts"; NULL where memory is refused. */
+static char *describe(const struct spl_dataset_writer *writer, const struct spl_counts *counts, const json_t *meta)
 {
     json_t *whole = json_copy((json_t *)meta), *streams = json_array();
     for (uint32_t s = 0; s < writer->stream_count; s++) {
@@ -224,13 +227,13 @@ static char *describe(const struct spl_dataset_writer *writer, const json_t *met
     }
     bool failed = json_array_size(streams) != writer->stream_count;
     failed |= json_object_set_new(whole, "streams", streams) != 0;
+    failed |= json_object_set_new(whole, "counts", spl_counts_to_json(counts, writer->stream_count)) != 0;
     char *text = failed ? NULL : json_dumps(whole, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     json_decref(whole);
     return text;
 }
 
-/* ATOM and CTEX. */
-static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count, struct spl_error *err)
+static int write_dictionary(struct spl_dataset_writer *writer, struct spl_error *err)
 {
     const struct spl_dictionary *from = writer->dictionary;
     struct spl_atoms_header header = {.count = from->count, .size = from->size};
@@ -243,42 +246,82 @@ static int write_textures(struct spl_dataset_writer *writer, size_t chunk_count,
     spl_atoms_write(from, bytes + sizeof header);
     int rc = add_section(writer, SPL_SECTION_ATOMS, 0, bytes, sizeof header + stream, err);
     free(bytes);
-    spl_assert(writer->chunk_textures.used == chunk_count);
-    return rc ? rc
-              : add_section(writer, SPL_SECTION_CHUNK_TEXTURES, 0, writer->chunk_textures.at,
-                            chunk_count * sizeof(uint32_t), err);
+    return rc;
 }
 
-static int write_chunks(struct spl_dataset_writer *writer, const struct spl_chunk *chunks, size_t chunk_count,
-                        struct spl_error *err)
+/* What the caller has said of nodes and chunks, cut into pages. */
+struct described {
+    struct spl_tables *pages;
+    struct spl_page_row *rows; /* and one that closes them */
+    struct spl_counts counts;
+};
+
+/* Sums over the nodes in their order, and each page's part of the arrays, which are borrowed. */
+static int cut_into_pages(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
+                          const struct spl_chunk *chunks, size_t chunk_count, struct described *out,
+                          struct spl_error *err)
 {
-    char *bytes = spl_alloc_raw(chunk_count, SPL_CHUNK_BYTES, err);
+    struct spl_page_row row = {.first_child = 1};
+    size_t n = 0;
+    out->pages = spl_alloc(writer->page_count, sizeof *out->pages, err);
+    out->rows = spl_alloc(writer->page_count + 1ull, sizeof *out->rows, err);
+    if (!out->pages || !out->rows)
+        return SPL_E_NOMEM;
+    for (uint32_t page = 0; page < writer->page_count; page++) {
+        struct spl_tables *tables = &out->pages[page];
+        *tables = (struct spl_tables){.page = page,
+                                      .stream_count = writer->stream_count,
+                                      .first_node = row.first_node,
+                                      .first_chunk = row.first_chunk,
+                                      .nodes = (struct spl_node *)nodes + n,
+                                      .chunks = (struct spl_chunk *)chunks + row.first_chunk};
+        tables->textures = writer->dictionary ? writer->chunk_textures.at + row.first_chunk : NULL;
+        for (uint32_t s = 0; s < writer->stream_count; s++) {
+            tables->base[s] = (uint32_t *)writer->streams[s].base + row.first_chunk;
+            tables->width[s] = (uint8_t *)writer->streams[s].width + row.first_chunk;
+        }
+        out->rows[page] = row;
+        for (; n < node_count && nodes[n].page == page; n++) {
+            row.first_child += nodes[n].child_count;
+            row.first_chunk += nodes[n].chunk_count;
+        }
+        row.first_node = n;
+        tables->node_count = (uint32_t)(n - tables->first_node);
+        tables->chunk_count = (uint32_t)(row.first_chunk - tables->first_chunk);
+        spl_assert(row.first_chunk <= chunk_count);
+        for (uint32_t c = 0; c < tables->chunk_count; c++)
+            row.first_id += tables->chunks[c].count;
+        spl_counts_add_tables(&out->counts, tables);
+    }
+    out->rows[writer->page_count] = row;
+    spl_assert(n == node_count && row.first_chunk == chunk_count); /* pages rise */
+    spl_assert(!writer->dictionary || writer->chunk_textures.used == chunk_count);
+    return SPL_OK;
+}
+
+static int write_head(struct spl_dataset_writer *writer, const struct spl_tables *tables, struct spl_error *err)
+{
+    size_t size = spl_head_bytes(tables->node_count, tables->chunk_count, tables->stream_count, tables->textures);
+    char *bytes = spl_alloc_raw(size, 1, err);
     if (!bytes)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < chunk_count; i++) {
-        struct spl_chunk chunk = chunks[i];
-        chunk.extra_bits |= chunk.count << SPL_EXTRA_COUNT;
-        memcpy(bytes + i * SPL_CHUNK_BYTES, &chunk, SPL_CHUNK_BYTES);
-    }
-    int rc = add_section(writer, SPL_SECTION_CHUNKS, 0, bytes, chunk_count * SPL_CHUNK_BYTES, err);
+    spl_head_write(tables, bytes);
+    int rc = add_section(writer, SPL_SECTION_HEAD, tables->page, bytes, size, err);
     free(bytes);
     return rc;
 }
 
-static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
-                      const struct spl_chunk *chunks, size_t chunk_count, const char *meta, struct spl_error *err)
+static int write_rest(struct spl_dataset_writer *writer, const struct described *what, const char *meta,
+                      struct spl_error *err)
 {
-    int rc = flush_page(writer, err);
+    int rc = add_section(writer, SPL_SECTION_META, 0, meta, strlen(meta), err);
     if (!rc)
-        rc = add_section(writer, SPL_SECTION_META, 0, meta, strlen(meta), err);
-    if (!rc)
-        rc = add_section(writer, SPL_SECTION_NODES, 0, nodes, node_count * sizeof *nodes, err);
-    if (!rc)
-        rc = write_chunks(writer, chunks, chunk_count, err);
-    if (!rc)
-        rc = write_streams(writer, chunk_count, err);
+        rc = add_section(writer, SPL_SECTION_DIRECTORY, 0, what->rows,
+                         (writer->page_count + 1ull) * sizeof *what->rows, err);
+    for (uint32_t page = 0; page < writer->page_count && !rc; page++)
+        rc = write_head(writer, &what->pages[page], err);
     if (!rc && writer->dictionary)
-        rc = write_textures(writer, chunk_count, err);
+        rc = write_dictionary(writer, err);
     if (rc)
         return rc;
     size_t table_bytes = writer->section_count * sizeof *writer->sections;
@@ -296,21 +339,35 @@ static int write_rest(struct spl_dataset_writer *writer, const struct spl_node *
     return rc ? rc : spl_part_file_write(&writer->file, 0, &header, sizeof header, err);
 }
 
-int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
-                              const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
-                              struct spl_error *err)
+static int finish(struct spl_dataset_writer *writer, const struct described *what, const json_t *meta,
+                  struct spl_error *err)
 {
-    spl_assert(!writer->file.committed && node_count && chunk_count);
-    char *text = describe(writer, meta);
+    char *text = describe(writer, &what->counts, meta);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->file.path);
     int rc = strlen(text) > SPL_META_BYTES_MAX
                  ? spl_fail(err, SPL_E_LIMIT, "what describes the dataset has %zu bytes, a file takes %u", strlen(text),
                             SPL_META_BYTES_MAX)
-                 : write_rest(writer, nodes, node_count, chunks, chunk_count, text, err);
+                 : write_rest(writer, what, text, err);
     if (!rc)
         rc = spl_part_file_commit(&writer->file, err);
     free(text);
+    return rc;
+}
+
+int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
+                              const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
+                              struct spl_error *err)
+{
+    struct described what = {0};
+    spl_assert(!writer->file.committed && node_count && chunk_count);
+    int rc = flush_page(writer, err);
+    if (!rc)
+        rc = cut_into_pages(writer, nodes, node_count, chunks, chunk_count, &what, err);
+    if (!rc)
+        rc = finish(writer, &what, meta, err);
+    free(what.pages);
+    free(what.rows);
     return rc;
 }
 

@@ -16,9 +16,12 @@ struct spl_dataset_writer;
 /* Creates PATH.part-PID beside `path`, and removes those that killed processes left of it. */
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err);
 
+/* Pages of about so many bytes, instead of SPL_PAGE_BYTES: for tests that want many of them. */
+void spl_dataset_writer_set_page_bytes(struct spl_dataset_writer *writer, size_t bytes);
+
 /* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new
- * page when the node does not fit the current one; sets *page, and adds the node's place in the page to each
- * chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
+ * page when the node, or what describes it, does not fit the current one; sets *page, and adds the node's place in the
+ * page to each chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */
 int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_t *words, size_t word_count,
                                 struct spl_chunk *chunks, size_t chunk_count, uint32_t *page, struct spl_error *err);
 
@@ -31,7 +34,7 @@ int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const s
 struct spl_node_textures {
     const uint32_t *words;
     size_t word_count;
-    const uint32_t *chunk_texture; /* each chunk's word of CTEX, with the place in `words` */
+    const uint32_t *chunk_texture; /* of each chunk, SPL_CHUNK_TEXTURE_*, with the place in `words` */
 };
 
 /* add_node for a file with textures. Nodes must come in the order of their chunks. */
@@ -46,8 +49,10 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
 void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams,
                                     uint32_t count);
 
-/* Writes nodes, chunks and `meta` (borrowed; "streams" follow from set_streams), the table and the header, syncs file
- * and directory, renames over the target. The writer stays to be destroyed. */
+/* Writes `meta` (borrowed; "streams" follow from set_streams, "counts" from what is written), directory, heads, the table
+ * and the header, syncs file and folder, renames over the target. Nodes come in the order in which they were added, with
+ * the page that add_node gave them, breadth first: the children of each follow those of the one before it, its chunks
+ * those of the one before it; first_child and first_chunk are not looked at. The writer stays to be destroyed. */
 int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                               const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,
                               struct spl_error *err);

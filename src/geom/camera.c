@@ -50,7 +50,7 @@ static int check_finite(const double *v, int n, const char *field, struct spl_er
 {
     for (int i = 0; i < n; i++)
         if (!isfinite(v[i]))
-            return spl_fail_field(err, SPL_E_INPUT, field, "number %d of %s is not finite", i + 1, field);
+            return spl_fail_field(err, SPL_E_INPUT, field, "number %d of %s, %g, is not finite", i + 1, field, v[i]);
     return SPL_OK;
 }
 

@@ -57,7 +57,7 @@ int spl_value_check(const struct spl_value *value, enum spl_value_kind kind, con
                               value->count);
     for (unsigned i = 0; i < value->count; i++)
         if (!isfinite(value->n[i]))
-            return spl_fail_field(err, SPL_E_INPUT, name, "%s must be finite", name);
+            return spl_fail_field(err, SPL_E_INPUT, name, "%s must be finite, not %g", name, value->n[i]);
     double n = value->n[0];
     if (kind == SPL_KIND_COUNT && (n < 0 || n > 1e15 || n != floor(n)))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be a whole number from 0 on, not %g", name, n);

@@ -1,4 +1,5 @@
-/* Sizes of images: of which one side, or both, are left out, and of one that is made larger or smaller. */
+/* Sizes of images: of which one side, or both, are left out, and of one that is made larger or smaller; and from where
+ * on is drawn. */
 #ifndef SPL_GEOM_SIZE_H
 #define SPL_GEOM_SIZE_H
 
@@ -7,6 +8,9 @@
 #include <splatd/camera.h>
 
 enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
+
+/* Where no dataset is at hand whose size would say; far is infinite then. */
+#define SPL_CAMERA_NEAR_DEFAULT 0.01
 
 /* Fills the sides of `size`, width and height, that are 0: both from `shape`, one from the other at the ratio of
  * `shape`, to the nearest pixel, halves up, at least 1. A shape of 0 x 0 leaves them 0. No upper limit: the caller

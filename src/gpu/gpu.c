@@ -73,21 +73,23 @@ void spl_gpu_close(struct spl_gpu *gpu)
 int spl_gpu_buffer_create(struct spl_gpu *gpu, enum spl_gpu_buffer_kind kind, uint64_t bytes,
                           struct spl_gpu_buffer **out, struct spl_error *err)
 {
-    static const char *const kinds[] = {"device", "upload", "readback"};
+    static const char *const kinds[] = {"a device", "an upload", "a readback"};
+    const uint64_t mib = 1 << 20;
     *out = NULL;
     spl_assert(bytes > 0 && kind <= SPL_GPU_READBACK);
     if (gpu->lost)
         return lost(gpu, err);
     if (bytes > gpu->limits.buffer_bytes)
         return spl_fail(err, SPL_E_LIMIT,
-                        "a %s buffer of %" PRIu64 " bytes exceeds the largest that device '%s' allows, %" PRIu64,
+                        "%s buffer of %" PRIu64 " bytes exceeds the largest that device '%s' allows, %" PRIu64,
                         kinds[kind], bytes, gpu->info.name, gpu->limits.buffer_bytes);
     bytes = (bytes + 15) / 16 * 16;
     if (bytes > gpu->limits.memory_bytes - gpu->memory)
         return spl_fail(err, SPL_E_LIMIT,
-                        "a %s buffer of %" PRIu64 " bytes exceeds the memory limit: %" PRIu64 " of %" PRIu64
-                        " bytes are taken on device '%s'", kinds[kind], bytes, gpu->memory, gpu->limits.memory_bytes,
-                        gpu->info.name);
+                        "%s buffer of %" PRIu64 " bytes exceeds the memory limit: %" PRIu64 " of %" PRIu64
+                        " bytes are taken on device '%s'; it takes at least %" PRIu64 ", say %" PRIu64 "M",
+                        kinds[kind], bytes, gpu->memory, gpu->limits.memory_bytes, gpu->info.name, gpu->memory + bytes,
+                        (gpu->memory + bytes + mib - 1) / mib);
     int code = gpu->backend->buffer_create(gpu, kind, bytes, out, err);
     if (code < 0)
         return code;

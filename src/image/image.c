@@ -38,7 +38,7 @@ const char *spl_layer_name(enum spl_layer layer)
 
 int spl_layer_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_LAYER_COUNT; i++)
+    for (int i = 0; name && i < SPL_LAYER_COUNT; i++)
         if (!strcmp(name, layers[i].name))
             return i;
     return -1;
@@ -51,10 +51,10 @@ const char *spl_format_name(enum spl_format format)
 
 int spl_format_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_FORMAT_COUNT; i++)
+    for (int i = 0; name && i < SPL_FORMAT_COUNT; i++)
         if (!strcmp(name, formats[i].name))
             return i;
-    return strcmp(name, "jpg") ? -1 : SPL_FORMAT_JPEG;
+    return !name || strcmp(name, "jpg") ? -1 : SPL_FORMAT_JPEG;
 }
 
 const char *spl_format_media_type(enum spl_format format)
@@ -115,6 +115,9 @@ static int check(const struct spl_image *image, const struct spl_encode_options 
                         image->height);
     if (image->row_bytes && image->row_bytes < (size_t)image->width * spl_pixel_bytes(image->type))
         return spl_fail(err, SPL_E_USAGE, "rows of %u pixels do not fit row_bytes %zu", image->width,
+                        image->row_bytes);
+    if (image->row_bytes > SIZE_MAX / 2 / image->height)
+        return spl_fail(err, SPL_E_USAGE, "%u rows of %zu bytes are more than memory can hold", image->height,
                         image->row_bytes);
     return SPL_OK;
 }

@@ -88,13 +88,16 @@ int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct s
                               descr ? descr : "");
     if (!order || strncmp(order, "False", 5))
         return fail(path, "fortran_order", "rows must come first: fortran_order must be False", err);
-    unsigned count = parse_shape(find(header, "'shape'"), shape);
+    const char *given = find(header, "'shape'"), *text = given ? given : "none";
+    size_t length = strcspn(text, ")}\n");
+    unsigned count = parse_shape(given, shape);
     if (count != dimensions || (channels && shape[2] != channels))
-        return spl_fail_field(err, SPL_E_INPUT, "shape", "%s: layer %s has the shape (height, width%s)", path,
+        return spl_fail_field(err, SPL_E_INPUT, "shape", "%s: layer %s has the shape (height, width%s), not %.*s", path,
                               spl_layer_name(out->layer),
                               channels == 4 ? ", 4"
                               : channels    ? ", 3"
-                                            : "");
+                                            : "",
+                              length < 60 ? (int)length + (text[length] == ')') : 60, text);
     long start = ftell(file);
     struct stat status;
     uint64_t limit = SPL_IMAGE_PIXELS_MAX, pixel_bytes = spl_pixel_bytes(out->type);

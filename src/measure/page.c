@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <splatd/method.h>
+
 #include "base/memory.h"
 #include "measure/markup.h"
 #include "measure/page_html.h" /* made from page.html: unsigned char page_html[] */
@@ -98,13 +100,27 @@ static int write_svg(struct page *page, struct spl_error *err)
     return SPL_OK;
 }
 
+static int write_method(struct page *page, struct spl_error *err)
+{
+    (void)err;
+    spl_markup_text(page->out, spl_method_name(SPL_METHOD_DEFAULT));
+    return SPL_OK;
+}
+
+static int write_atoms(struct page *page, struct spl_error *err)
+{
+    (void)err;
+    fprintf(page->out, "%g", spl_method_param_get(SPL_PARAM_atoms)->otherwise);
+    return SPL_OK;
+}
+
 static int fill_template(struct page *page, struct spl_error *err)
 {
     static const struct {
         const char *mark;
         int (*write)(struct page *, struct spl_error *);
-    } places[] = {
-        {"@TITLE@", write_title}, {"@CHART@", write_svg}, {"@REPORT@", write_report}, {"@PICTURES@", write_pictures}};
+    } places[] = {{"@TITLE@", write_title}, {"@METHOD@", write_method}, {"@ATOMS@", write_atoms},
+                  {"@CHART@", write_svg},   {"@REPORT@", write_report}, {"@PICTURES@", write_pictures}};
     int rc = SPL_OK;
     for (const char *at = (const char *)page_html; !rc && *at;) {
         size_t i = 0, count = sizeof places / sizeof *places;

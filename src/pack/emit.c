@@ -367,7 +367,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     }
     if (!rc) {
         unite_boxes(out->nodes, tree->count);
-        out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * sizeof *out->nodes * 8;
+        out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * SPL_NODE_BYTES * 8;
         spl_dataset_writer_set_streams(writer, out->streams.list, out->streams.count);
         spl_stage_end(stage);
     }

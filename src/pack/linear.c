@@ -30,13 +30,12 @@ static void finish_level(struct spl_linear_level *l)
     *l = (struct spl_linear_level){0};
 }
 
-static int search_level(struct spl_points *points, struct spl_linear_level *l, unsigned threads, uint64_t *marked,
-                        struct spl_error *err)
+static int search_level(struct spl_points *points, struct spl_linear_level *l, uint64_t *marked, struct spl_error *err)
 {
-    int rc = spl_linear_find_lines(l, threads, err);
+    int rc = spl_linear_find_lines(l, err);
     if (rc || !l->line_count)
         return rc;
-    spl_linear_drop_surfaces(l, threads);
+    spl_linear_drop_surfaces(l);
     l->owner = spl_alloc(l->cells.count, sizeof *l->owner, err);
     if (!l->owner)
         return SPL_E_NOMEM;
@@ -58,7 +57,8 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
             finest = l.cells.edge;
         l.across_max = widest * finest / l.cells.edge;
         l.length_min = length_min[k > 0];
-        rc = search_level(points, &l, stage->threads, &marked, err);
+        l.stage = stage;
+        rc = search_level(points, &l, &marked, err);
         spl_stage_add(stage, 1, 0);
         if (!rc)
             rc = spl_stage_check(stage, err);

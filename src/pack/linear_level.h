@@ -4,6 +4,7 @@
 #define SPL_PACK_LINEAR_LEVEL_H
 
 #include "pack/cells.h"
+#include "pack/stage.h"
 
 enum spl_line_state { SPL_LINE_ALIVE, SPL_LINE_INNER, SPL_LINE_BORDER, SPL_LINE_EDGE };
 enum { SPL_LINE_BUCKET_BITS = 12 };
@@ -21,6 +22,7 @@ struct spl_line {
 };
 
 struct spl_linear_level {
+    const struct spl_stage *stage; /* cancelled: what is not done yet is left, and of no use */
     struct spl_cells cells;
     uint8_t *is_line; /* of each cell */
     struct spl_line *lines;
@@ -33,10 +35,10 @@ struct spl_linear_level {
 
 /* Fills is_line, lines and bucket: the cells that are long and thin with what lies around them. Parallel. What it
  * allocates is the level's on success and on failure. SPL_E_NOMEM. */
-int spl_linear_find_lines(struct spl_linear_level *l, unsigned threads, struct spl_error *err);
+int spl_linear_find_lines(struct spl_linear_level *l, struct spl_error *err);
 
 /* Sets the states of lines: which ones are edges of other things, or scan lines of a surface. Parallel. */
-void spl_linear_drop_surfaces(struct spl_linear_level *l, unsigned threads);
+void spl_linear_drop_surfaces(struct spl_linear_level *l);
 
 /* Joins lines to pieces; `owner` holds zeros. */
 void spl_linear_connect(const struct spl_points *p, struct spl_linear_level *l);

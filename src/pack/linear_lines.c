@@ -44,7 +44,7 @@ static void judge_cells(void *context, size_t begin, size_t end, unsigned worker
 {
     struct spl_linear_level *l = context;
     (void)worker;
-    for (size_t k = begin; k < end; k++)
+    for (size_t k = begin; k < end && !spl_stage_is_cancelled(l->stage); k++)
         l->is_line[k] = judge(l, (uint32_t)k);
 }
 
@@ -52,7 +52,7 @@ static void fit_lines(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct spl_linear_level *l = context;
     (void)worker;
-    for (size_t i = begin; i < end; i++) {
+    for (size_t i = begin; i < end && !spl_stage_is_cancelled(l->stage); i++) {
         struct spl_line *line = &l->lines[i];
         struct spl_cell_sums around = spl_cells_around(&l->cells, line->cell);
         float m[6];
@@ -70,9 +70,10 @@ static void fit_lines(void *context, size_t begin, size_t end, unsigned worker)
     }
 }
 
-int spl_linear_find_lines(struct spl_linear_level *l, unsigned threads, struct spl_error *err)
+int spl_linear_find_lines(struct spl_linear_level *l, struct spl_error *err)
 {
     uint32_t count = 0;
+    unsigned threads = l->stage->threads;
     l->is_line = spl_alloc(l->cells.count, 1, err);
     if (!l->is_line)
         return SPL_E_NOMEM;

@@ -107,7 +107,7 @@ void spl_linear_connect(const struct spl_points *p, struct spl_linear_level *l)
         if (l->lines[i].state == SPL_LINE_ALIVE)
             l->owner[l->lines[i].cell] = i + 1;
     }
-    for (uint32_t i = 0; i < l->line_count; i++) {
+    for (uint32_t i = 0; i < l->line_count && !spl_stage_is_cancelled(l->stage); i++) {
         struct spl_line *line = &l->lines[i];
         int64_t at[3];
         if (line->state != SPL_LINE_ALIVE)
@@ -156,7 +156,7 @@ uint64_t spl_linear_mark(struct spl_points *p, struct spl_linear_level *l)
             root->high[c] = root == line ? middle : fmax(root->high[c], middle);
         }
     }
-    for (uint32_t i = 0; i < l->line_count; i++) {
+    for (uint32_t i = 0; i < l->line_count && !spl_stage_is_cancelled(l->stage); i++) {
         struct spl_line *line = &l->lines[i];
         const struct spl_line *root = &l->lines[root_of(l->lines, i)];
         double squared = 0;

@@ -81,7 +81,7 @@ static void check_sides(void *context, size_t begin, size_t end, unsigned worker
 {
     struct spl_linear_level *l = context;
     (void)worker;
-    for (size_t i = begin; i < end; i++) {
+    for (size_t i = begin; i < end && !spl_stage_is_cancelled(l->stage); i++) {
         struct spl_line *line = &l->lines[i];
         struct sides sides = {0};
         double reach = fmin(apart_most * line->spacing, lateral_reach);
@@ -143,12 +143,13 @@ static void check_edges(void *context, size_t begin, size_t end, unsigned worker
 {
     struct spl_linear_level *l = context;
     (void)worker;
-    for (size_t i = begin; i < end; i++)
+    for (size_t i = begin; i < end && !spl_stage_is_cancelled(l->stage); i++)
         l->lines[i].state = is_edge(l, &l->lines[i]) ? SPL_LINE_EDGE : SPL_LINE_ALIVE;
 }
 
-void spl_linear_drop_surfaces(struct spl_linear_level *l, unsigned threads)
+void spl_linear_drop_surfaces(struct spl_linear_level *l)
 {
+    unsigned threads = l->stage->threads;
     spl_parallel_for(threads, l->line_count, 256, check_edges, l);
     for (int round = 0; round < 3; round++) {
         l->border = round > 0;

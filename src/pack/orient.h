@@ -11,15 +11,26 @@ struct spl_component {
     uint8_t flip;  /* result of spl_orient_components(): 1 = turn the set's normals */
 };
 
-/* Scratch of one worker for a block of up to `capacity` points. */
-struct spl_orient {
-    uint32_t *parent;  /* forest over the block's points */
-    uint8_t *flip;     /* sign relative to the parent */
-    uint32_t *label;   /* out: component of each point, numbered from 0 in the block */
-    uint8_t *anchored; /* in: 1 where the normal's side is known */
+/* What neighbours say of the signs of two points, or of two components. */
+struct spl_orient_edge {
+    uint32_t a, b; /* a < b */
+    int64_t votes; /* 2^20 * the sum of their agreements: > 0, the two agree as they are */
 };
 
-int spl_orient_init(struct spl_orient *orient, size_t capacity, struct spl_error *err);
+/* Adds an edge behind `count` others, or its votes to the last one, which mostly has the same ends; returns how many
+ * there are now. */
+size_t spl_orient_add_edge(struct spl_orient_edge *edges, size_t count, uint32_t a, uint32_t b, float agreement);
+
+/* Scratch of one worker for a block of up to `capacity` points with `k` neighbours each. */
+struct spl_orient {
+    uint32_t *parent;              /* forest over the block's points */
+    uint8_t *flip;                 /* sign relative to the parent */
+    uint32_t *label;               /* out: component of each point, numbered from 0 in the block */
+    uint8_t *anchored;             /* in: 1 where the normal's side is known */
+    struct spl_orient_edge *edges; /* 2 * capacity * k of them */
+};
+
+int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, struct spl_error *err);
 void spl_orient_finish(struct spl_orient *orient);
 
 /* Signs within the block [begin, end): `neighbours` holds `k` indices a point (unused ones UINT32_MAX). Turns normals
@@ -27,18 +38,13 @@ void spl_orient_finish(struct spl_orient *orient);
 uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, size_t begin, size_t end,
                           const uint32_t *neighbours, unsigned k);
 
-/* An edge between components of different blocks: `agreement` in [-1, 1] of the two normals at its ends. */
-struct spl_orient_edge {
-    uint32_t a, b;
-    float agreement;
-};
-
-/* Decides component.flip over all blocks: strongest edges first, anchored components fixed, the others upwards on the
- * whole. */
-int spl_orient_components(struct spl_component *components, size_t count, const struct spl_orient_edge *edges,
+/* Decides component.flip over all blocks, from the edges between their components, which it moves and unites in place:
+ * anchored components stay, the others go upwards on the whole. */
+int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
                           size_t edge_count, struct spl_error *err);
 
-/* How well normals i and j agree in sign, bending like an arc from one to the other. */
+/* How well normals i and j agree in sign, bending like an arc from one to the other, in [-1, 1]; near 0 where one point
+ * lies behind the other. */
 float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j);
 
 #endif

@@ -148,7 +148,12 @@ static void compare_kinds(const struct saying *s)
     }
     if (blank.count && s->scans->count > 1)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", list(&blank));
-    if (kinds > 1 && s->scans->intensity) {
+    if (s->scans->intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
+        say(s,
+            "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours "
+            "are %s",
+            text);
+    else if (kinds > 1 && s->scans->intensity) {
         struct group lack = {0};
         for (size_t i = 0; i < s->scans->count; i++)
             if (s->scans->list[i].points_from[SPL_COLORS_RGB] || s->scans->list[i].points_from[SPL_COLORS_CONSTANT])

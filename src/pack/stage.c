@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/error.h"
 
 /* Seconds for which planned work counts against measured speed: until they have passed the machine is taken to be the
  * one that the plan was made on. */

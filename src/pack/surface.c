@@ -154,10 +154,9 @@ static int join_blocks(struct surface *s, struct spl_error *err)
             const uint32_t *list = block->unsettled.neighbours + d * s->k;
             for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
                 if (list[a] / block_points != b)
-                    edge[count++] =
-                        (struct spl_orient_edge){block->first_component + s->label[i],
-                                                 s->blocks[list[a] / block_points].first_component + s->label[list[a]],
-                                                 spl_orient_agreement(s->points, i, list[a])};
+                    count = spl_orient_add_edge(edge, count, block->first_component + s->label[i],
+                                                s->blocks[list[a] / block_points].first_component + s->label[list[a]],
+                                                spl_orient_agreement(s->points, i, list[a]));
         }
     }
     if (!rc)
@@ -214,7 +213,7 @@ static int allocate(struct surface *s, struct spl_error *err)
         s->scratch[t].limit = spl_alloc_raw(capacity, sizeof(float), err);
         s->scratch[t].moments = spl_alloc_raw(capacity, sizeof *s->scratch[t].moments, err);
         if (!s->scratch[t].neighbours || !s->scratch[t].limit || !s->scratch[t].moments ||
-            spl_orient_init(&s->scratch[t].orient, capacity, err))
+            spl_orient_init(&s->scratch[t].orient, capacity, s->k, err))
             return SPL_E_NOMEM;
     }
     if (!all_sides_known(p)) {

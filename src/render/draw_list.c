@@ -171,18 +171,19 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
     return rc;
 }
 
-uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed, uint64_t most_lines)
+uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
+                                    uint64_t most_lines)
 {
-    uint64_t slots = 0;
+    uint64_t rounds = 0;
     most = most < ENTRIES_MAX ? most : ENTRIES_MAX;
     for (size_t i = 0; i < list->batch_count; i++) {
         struct spl_draw_batch *batch = &list->batches[i];
-        batch->first_slot = (uint32_t)slots;
+        batch->first_round = (uint32_t)rounds;
         uint64_t own = batch->key.smooth ? most_summed : batch->key.kind == SPL_CHUNK_LINES ? most_lines : most;
-        batch->slot_entries = (uint32_t)(own < most ? own : most);
-        slots += (batch->entries + batch->slot_entries - 1) / batch->slot_entries;
+        batch->round_entries = (uint32_t)(own < most ? own : most);
+        rounds += (batch->entries + batch->round_entries - 1) / batch->round_entries;
     }
-    return slots;
+    return rounds;
 }
 
 void spl_draw_list_finish(struct spl_draw_list *list)

@@ -25,7 +25,7 @@ struct spl_draw_key {
 struct spl_draw_batch {
     struct spl_draw_key key;
     uint32_t first_entry, entries;
-    uint32_t first_slot, slot_entries; /* parameters: a slot for every so many entries, the same in every pass */
+    uint32_t first_round, round_entries; /* a round draws so many entries, the last the rest */
 };
 
 struct spl_draw_list {
@@ -37,11 +37,11 @@ struct spl_draw_list {
     size_t chunk_count, entry_count, batch_count;
     size_t chunk_capacity, entry_capacity, batch_capacity;
     struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
-    uint64_t splats;         /* that are drawn */
-    uint64_t listed_splats;  /* the same, once for every window that they are drawn in */
-    uint32_t nodes;          /* that the chunks came from */
-    uint64_t sample_splats;  /* upper bound of the splats that reach any one sample */
-    bool complete;           /* false: a coarser node stood in for pages that are not resident */
+    uint64_t splats;                   /* that are drawn */
+    uint64_t listed_splats;            /* the same, once for every window that they are drawn in */
+    uint32_t nodes;                    /* that the chunks came from */
+    uint64_t sample_splats;            /* upper bound of the splats that reach any one sample */
+    bool complete;                     /* false: a coarser node stood in for pages that are not resident */
 };
 
 /* Empties the list and keeps its memory. */
@@ -55,11 +55,11 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, 
 /* Lays out entries and batches of all chunks added. SPL_E_NOMEM. */
 int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err);
 
-/* Gives every batch its slots of parameters, of `most` entries at most, of `most_summed` where texels are interpolated,
- * of `most_lines` of lines (all 1 and more), and returns how many there are. All passes share them, so that a page takes at most
- * one for each of its kinds of chunks, whatever layers a view has. */
-uint64_t spl_draw_list_count_slots(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
-                                   uint64_t most_lines);
+/* Cuts every batch into rounds, each a dispatch with parameters of its own, of `most` entries at most, of `most_summed`
+ * where texels are interpolated, of `most_lines` of lines (all 1 and more), and returns how many there are. All passes
+ * share them, so that a page takes at most one for each of its kinds of chunks, whatever layers a view has. */
+uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
+                                    uint64_t most_lines);
 
 void spl_draw_list_finish(struct spl_draw_list *list);
 

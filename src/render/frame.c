@@ -3,6 +3,7 @@
 #include "render/frame.h"
 
 #include "base/clock.h"
+#include "base/memory.h"
 #include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
@@ -21,7 +22,7 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
-    bool awaited = !job->view->partial || slot == SPL_FIRST_SLOT;
+    bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
@@ -48,6 +49,16 @@ static enum spl_select_answer ask_textures(void *context, uint32_t page)
     return dictionary == SPL_SELECT_YES ? textures : dictionary;
 }
 
+/* The same of tables, which a walk cannot do without: what is on its way is not there. */
+static enum spl_select_answer ask_tables(void *context, uint32_t page, const struct spl_tables **tables)
+{
+    struct spl_frame_job *job = context;
+    uint32_t slot = spl_slot_of_tables(job->resident->dataset, page);
+    enum spl_select_answer answer = ask_slot(job, slot);
+    *tables = job->resident->pages[slot].tables;
+    return answer == SPL_SELECT_YES && !*tables ? SPL_SELECT_LATER : answer;
+}
+
 /* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page among
  * them. */
 static int end_walk(struct spl_frame_job *job, struct spl_error *err)
@@ -68,6 +79,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .low_pass = SPL_LOW_PASS,
         .discs = method->discs,
         .lines = method->lines,
+        .tables = ask_tables,
         .resident = ask_page,
         .atoms = spl_view_is_textured(job->view) ? job->view->disc.atoms : 0,
         .textured = ask_textures,
@@ -88,6 +100,7 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
     if (waits)
         return waits;
     job->frame->stats.complete &= complete;
+    job->frame->stats.pending |= job->renderer->residency.later;
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
@@ -137,6 +150,23 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
     }
 }
 
+int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        struct spl_image *image = &frame->images[layer];
+        if (!(view->layers >> layer & 1) || image->pixels)
+            continue;
+        *image = (struct spl_image){.layer = layer,
+                                    .type = spl_readback_type(layer),
+                                    .width = view->camera.width,
+                                    .height = view->camera.height};
+        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
+        if (!image->pixels)
+            return SPL_E_NOMEM;
+    }
+    return SPL_OK;
+}
+
 /* Records every group and layer of the view into the list that was begun; the n-th requested layer starts at word n *
  * pixels. */
 static int record(struct spl_tile *tile, struct spl_error *err)
@@ -145,7 +175,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
     uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
     bool first = true;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
-    int rc = spl_tile_take_slots(tile, err);
+    int rc = spl_tile_take_rounds(tile, err);
     for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
         uint32_t layers = 0;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)
@@ -213,6 +243,8 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     int rc = list_tile(job, tile, err);
     if (!rc)
+        rc = spl_frame_make_images(job->frame, job->view, err);
+    if (!rc)
         rc = draw_tile(tile, err);
     if (rc)
         return rc;
@@ -224,6 +256,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     stats->chunks_drawn += r->list.chunk_count;
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;
+    stats->pending |= r->residency.later;
     stats->tiles++;
     return SPL_OK;
 }

@@ -11,6 +11,7 @@
 #include "base/memory.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
+enum { fruitless_max = 8 };
 
 static void begin_reads(struct spl_hold *hold)
 {
@@ -18,7 +19,7 @@ static void begin_reads(struct spl_hold *hold)
         uint32_t slot = hold->slots[hold->begun];
         struct spl_resident_page *page = &hold->pages[slot];
         struct spl_io_rank rank = {.awaited = true};
-        if (page->buffer && !page->filled && !page->failed &&
+        if (spl_resident_has_room(page) && !page->filled && !page->failed &&
             !spl_residency_begin_read(hold->residency, hold->dataset, page, slot, rank))
             return;
     }
@@ -32,7 +33,7 @@ static void start_wait(struct spl_hold *hold, struct spl_residency *residency, s
     hold->waits = true;
     hold->dataset = resident->dataset;
     hold->pages = resident->pages;
-    hold->moved_ns = spl_now_ns();
+    hold->since_ns = spl_now_ns();
     hold->begun = hold->come = 0;
 }
 
@@ -45,22 +46,45 @@ static void leave_line(struct spl_residency *residency, const struct spl_hold *h
     residency->releases++;
 }
 
+/* A walk asks in the same order for as long as what it asks for is there. */
+static void note_progress(struct spl_hold *hold, const struct spl_residency *residency,
+                          const struct spl_resident_dataset *resident)
+{
+    size_t ready = 0;
+    while (ready < residency->asked_count && resident->pages[residency->asked[ready]].filled)
+        ready++;
+    hold->fruitless = ready + 1 > hold->ready ? 0 : hold->fruitless + 1;
+    hold->ready = ready + 1 > hold->ready ? ready + 1 : hold->ready;
+}
+
+bool spl_hold_gives_up(const struct spl_hold *hold)
+{
+    return hold->fruitless >= fruitless_max;
+}
+
 int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_dataset *resident, struct spl_hold *hold,
                       uint64_t *awaited, struct spl_error *err)
 {
     spl_assert(!hold->waits);
     hold->crowded = residency->crowded;
     hold->count = 0;
+    hold->stalled = residency->stalled;
     if (residency->crowded) {
-        if (!residency->first_in_line)
+        if (hold->stalled)
+            leave_line(residency, hold); // nobody stands behind a disk that hangs
+        else if (!residency->first_in_line)
             residency->first_in_line = hold;
         hold->releases = residency->releases;
+        hold->hanging = spl_io_count_hanging(residency->io);
         start_wait(hold, residency, resident);
         return SPL_SLOT_PENDING;
     }
     leave_line(residency, hold);
-    if (!residency->pending)
+    if (!residency->pending) {
+        hold->ready = hold->fruitless = 0;
         return SPL_OK;
+    }
+    note_progress(hold, residency, resident);
     uint32_t *slots = spl_realloc(hold->slots, residency->asked_count, sizeof *slots, err);
     if (!slots)
         return SPL_E_NOMEM;
@@ -83,14 +107,13 @@ static int follow(struct spl_hold *hold, struct spl_error *err)
         const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
         if (page->failed)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
-        if (!page->buffer)
+        if (!spl_resident_has_room(page))
             return 1;
         if (!page->filled) {
             if (!page->read && hold->begun > hold->come) /* it lost its room, and has another's: nobody reads it */
                 hold->begun = hold->come;
             return 0;
         }
-        hold->moved_ns = spl_now_ns();
     }
     return 1;
 }
@@ -104,13 +127,15 @@ int spl_hold_poll(struct spl_hold *hold, struct spl_error *err)
         if (rc)
             return rc < 0 ? rc : SPL_OK;
         begin_reads(hold);
-    } else if (hold->residency->releases != hold->releases) {
+    } else if (hold->stalled ? !spl_io_hangs(hold->residency->io, hold->dataset)
+                             : hold->residency->releases != hold->releases ||
+                                   spl_io_count_hanging(hold->residency->io) != hold->hanging) {
         return SPL_OK;
     }
-    if (spl_now_ns() - hold->moved_ns < patience_ns)
+    uint64_t moved_ns = spl_io_get_moved_ns(hold->residency->io, hold->dataset);
+    if (spl_now_ns() - (moved_ns > hold->since_ns ? moved_ns : hold->since_ns) < patience_ns)
         return SPL_SLOT_PENDING;
-    return spl_fail(err, SPL_E_TIMEOUT, "no page of the dataset has come for %d s",
-                    (int)(patience_ns / SPL_NS_PER_S));
+    return spl_fail(err, SPL_E_TIMEOUT, "no page has come for %d s", (int)(patience_ns / SPL_NS_PER_S));
 }
 
 /* Ends a wait. Why reads failed is forgotten; where `all`, reads that nobody waits for any more are dropped. */
@@ -121,7 +146,7 @@ static void let_go(struct spl_hold *hold, bool all)
     struct spl_residency *residency = hold->residency;
     for (size_t i = 0; i < hold->count; i++) {
         struct spl_resident_page *page = &hold->pages[hold->slots[i]];
-        if (!--page->holds && (page->failed || (all && page->buffer && !page->filled)))
+        if (!--page->holds && (page->failed || (all && spl_resident_has_room(page) && !page->filled)))
             spl_residency_drop_slot(residency, page);
     }
     residency->releases += hold->count > 0;

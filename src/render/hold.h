@@ -23,8 +23,12 @@ struct spl_hold {
     uint32_t *slots;                        /* `count` of them, held; in the order that they were asked for */
     size_t count, begun, come;              /* those whose reads have begun; that have come, without a gap */
     uint64_t releases;                      /* of residency, when there was no room */
-    uint64_t moved_ns;                      /* when one came last */
+    uint64_t since_ns;                      /* when it began to wait */
+    size_t hanging;                         /* disks, when there was no room */
     bool crowded;                           /* no slots: it waits for room */
+    bool stalled;                           /* the same, until its own disk answers */
+    size_t ready;                           /* of the slots before the first that was missed: the most of any walk, + 1 */
+    uint32_t fruitless;                     /* waits behind which there were no more */
     bool alone;                             /* the caller makes no step of another frame meanwhile: holds give way */
 };
 
@@ -33,8 +37,13 @@ struct spl_hold {
 int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_dataset *resident, struct spl_hold *hold,
                       uint64_t *awaited, struct spl_error *err);
 
+/* Has waiting got it nowhere? Every wait ends with all that was held in its place, so that the walk behind gets further; but
+ * where others drive that out without end (who renders to the end meanwhile, a device that is out of memory below its
+ * limit), a frame takes what is there for this tile. */
+bool spl_hold_gives_up(const struct spl_hold *hold);
+
 /* SPL_SLOT_PENDING as long as there is nothing to do for its frame; 0: it is to let go and to walk (again). Why a slot
- * cannot be read; SPL_E_TIMEOUT when nothing has come for 10 s. */
+ * cannot be read; SPL_E_TIMEOUT when its disk has not answered for 10 s. */
 int spl_hold_poll(struct spl_hold *hold, struct spl_error *err);
 
 /* Lets go: for another walk. */

@@ -1,9 +1,11 @@
-/* The io thread; see io.h.
+/* The io threads; see io.h.
  *
- * Invariants: `staged` counts the bytes of the read under way and of those ended that were not given back, and is raised
- * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. A read is in one list at a time, but for the
- * one that is being read and those taken, which are in none. Only the io thread waits without a deadline, for work;
- * destroy() wakes it. */
+ * Invariants: `staged` counts the bytes of reads under way and of those ended that were not given back, and is raised
+ * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is more to
+ * read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one list at a time,
+ * but for those taken, which are in none. Of a source one read is under way; a thread is begun where one of another could be,
+ * and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them, waits for those that are not
+ * in the middle of a read, and leaves the others behind: then `io` is theirs, and the last one frees it. */
 #include "render/io.h"
 
 #include <pthread.h>
@@ -14,21 +16,26 @@
 
 enum state { FREE, WAITS, BEING_READ, ENDED, TAKEN };
 
+enum { SPARES = 4, READS = 4 * SPL_IO_READS };
+static const uint64_t hangs_ns = SPL_NS_PER_S;
+
 TAILQ_HEAD(read_list, spl_io_read);
 
 struct spl_io {
     pthread_mutex_t mutex;
     pthread_cond_t work, ended_one;
-    pthread_t thread;
-    bool started;
     void (*wake)(void *context); // may be NULL
     void *wake_context;
-    bool closing;                         // guarded by: mutex, as all below
-    struct read_list free, waiting, ended;
-    struct spl_io_read *current; /* that is being read; NULL = none */
-    size_t under_way;            /* waiting, current or ended */
-    uint64_t staged, numbers;
-    struct spl_io_read reads[SPL_IO_READS];
+    bool closing, left_behind;            // guarded by: mutex, as all below
+    struct read_list free, waiting, being_read, ended;
+    unsigned threads, idle, reading; /* idle: that look for work, or are about to */
+    size_t used, under_way;          /* not free; of these, waiting, being read or ended */
+    uint64_t staged, numbers, moved_ns;
+    struct {
+        void *data;
+        size_t room;
+    } spares[SPARES]; /* memory for reads to come; NULL = none */
+    struct spl_io_read reads[READS];
 };
 
 static bool goes_before(const struct spl_io_read *a, const struct spl_io_read *b)
@@ -40,24 +47,104 @@ static bool goes_before(const struct spl_io_read *a, const struct spl_io_read *b
     return a->number < b->number;
 }
 
-/* The best that waits, if there is room for it. */
+/* The read under way of a source; NULL = none. */
+static struct spl_io_read *find_being_read(struct spl_io *io, const void *source)
+{
+    struct spl_io_read *read;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    if (read->what.source == source)
+        return read;
+    return NULL;
+}
+
+/* The best that waits for a thread only, if there is room for it. */
 static struct spl_io_read *choose(struct spl_io *io)
 {
-    struct spl_io_read *best = TAILQ_FIRST(&io->waiting), *read;
+    struct spl_io_read *best = NULL, *read;
     TAILQ_FOREACH(read, &io->waiting, link)
-    if (goes_before(read, best))
+    if ((!best || goes_before(read, best)) && !find_being_read(io, read->what.source))
         best = read;
     return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
 }
 
+static void drop_spares(struct spl_io *io)
+{
+    for (int i = 0; i < SPARES; i++) {
+        free(io->spares[i].data);
+        io->spares[i].data = NULL;
+    }
+}
+
+/* NULL where none fits, without much of it lying idle; what is left of the others is no longer counted on then. */
+static void *take_spare(struct spl_io *io, size_t bytes, size_t *room)
+{
+    for (int i = 0; i < SPARES; i++) {
+        void *data = io->spares[i].data;
+        if (!data || io->spares[i].room < bytes || io->spares[i].room - bytes > bytes / 8)
+            continue;
+        *room = io->spares[i].room;
+        io->spares[i].data = NULL;
+        return data;
+    }
+    drop_spares(io);
+    *room = bytes;
+    return NULL;
+}
+
+/* Takes the memory of a read that was given back. */
+static void keep(struct spl_io *io, void *data, size_t room)
+{
+    uint64_t kept = io->staged + room;
+    int at = -1;
+    for (int i = 0; i < SPARES; i++) {
+        at = io->spares[i].data ? at : i;
+        kept += io->spares[i].data ? io->spares[i].room : 0;
+    }
+    if (!io->under_way)
+        drop_spares(io);
+    if (!io->under_way || at < 0 || kept > SPL_IO_BYTES) {
+        free(data);
+        return;
+    }
+    io->spares[at].data = data;
+    io->spares[at].room = room;
+}
+
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
-    if (read->data)
+    if (read->data) {
         io->staged -= read->what.bytes;
-    free(read->data);
+        io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
+        keep(io, read->data, read->room);
+    }
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
-    pthread_cond_signal(&io->work); // there is room again
+    io->used--;
+    pthread_cond_broadcast(&io->work); // there is room again
+}
+
+static void *run(void *argument);
+
+static int start_thread(struct spl_io *io)
+{
+    pthread_t thread;
+    pthread_attr_t detached;
+    pthread_attr_init(&detached);
+    pthread_attr_setdetachstate(&detached, PTHREAD_CREATE_DETACHED);
+    int code = pthread_create(&thread, &detached, run, io);
+    pthread_attr_destroy(&detached);
+    io->threads += !code;
+    io->idle += !code;
+    return code;
+}
+
+/* Is there something to read that nobody turns to? Where no thread can be had, those that there are come to it. */
+static void see_to_waiting(struct spl_io *io)
+{
+    if (io->idle)
+        pthread_cond_broadcast(&io->work);
+    else if (io->threads < SPL_IO_THREADS && choose(io))
+        start_thread(io);
 }
 
 /* Reads one, without the mutex. Called and left with it. */
@@ -66,18 +153,36 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     struct spl_io_what what = read->what;
     struct spl_error err = {0};
     TAILQ_REMOVE(&io->waiting, read, link);
+    TAILQ_INSERT_TAIL(&io->being_read, read, link);
     read->state = BEING_READ;
-    io->current = read;
+    read->began_ns = spl_now_ns();
+    size_t room;
+    void *data = take_spare(io, what.bytes, &room);
+    io->reading++;
     io->staged += what.bytes;
+    io->moved_ns = read->began_ns;
+    see_to_waiting(io);
+    if (what.hold)
+        what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
-    void *data = spl_alloc_raw(what.bytes, 1, &err);
+    if (!data)
+        data = spl_alloc_raw(what.bytes, 1, &err);
     if (data && what.read(what.source, what.index, data, &err)) {
         free(data);
         data = NULL;
     }
+    if (what.let_go)
+        what.let_go(what.source);
     pthread_mutex_lock(&io->mutex);
-    io->current = NULL;
+    io->moved_ns = read->ended_ns = spl_now_ns();
+    io->reading--;
+    TAILQ_REMOVE(&io->being_read, read, link);
+    if (io->closing) { // nobody comes for it
+        free(data);
+        data = NULL;
+    }
     read->data = data;
+    read->room = room;
     read->err = err;
     if (!data)
         io->staged -= what.bytes;
@@ -91,6 +196,18 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     pthread_cond_broadcast(&io->ended_one);
 }
 
+static void release(struct spl_io *io)
+{
+    drop_spares(io);
+    for (size_t i = 0; i < READS; i++)
+        free(io->reads[i].data);
+    pthread_cond_destroy(&io->ended_one);
+    pthread_cond_destroy(&io->work);
+    pthread_mutex_destroy(&io->mutex);
+    free(io);
+}
+
+/* Counted as idle when it begins. One idle thread stays. */
 static void *run(void *argument)
 {
     struct spl_io *io = argument;
@@ -98,16 +215,27 @@ static void *run(void *argument)
     pthread_mutex_lock(&io->mutex);
     while (!io->closing) {
         if (!(next = choose(io))) {
+            if (io->idle > 1)
+                break;
             pthread_cond_wait(&io->work, &io->mutex);
             continue;
         }
+        io->idle--;
         perform(io, next);
-        pthread_mutex_unlock(&io->mutex);
-        if (io->wake)
-            io->wake(io->wake_context);
-        pthread_mutex_lock(&io->mutex);
+        if (io->wake && !io->closing) {
+            pthread_mutex_unlock(&io->mutex);
+            io->wake(io->wake_context); // destroy() waits for this, as nothing is being read
+            pthread_mutex_lock(&io->mutex);
+        }
+        io->idle++;
     }
+    io->idle--;
+    io->threads--;
+    bool last = io->left_behind && !io->threads;
+    pthread_cond_broadcast(&io->ended_one);
     pthread_mutex_unlock(&io->mutex);
+    if (last)
+        release(io);
     return NULL;
 }
 
@@ -121,8 +249,9 @@ int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io
     io->wake_context = wake_context;
     TAILQ_INIT(&io->free);
     TAILQ_INIT(&io->waiting);
+    TAILQ_INIT(&io->being_read);
     TAILQ_INIT(&io->ended);
-    for (size_t i = 0; i < SPL_IO_READS; i++)
+    for (size_t i = 0; i < READS; i++)
         TAILQ_INSERT_TAIL(&io->free, &io->reads[i], link);
     pthread_condattr_t monotonic;
     pthread_condattr_init(&monotonic);
@@ -131,12 +260,13 @@ int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io
     pthread_cond_init(&io->work, NULL);
     pthread_cond_init(&io->ended_one, &monotonic);
     pthread_condattr_destroy(&monotonic);
-    int code = pthread_create(&io->thread, NULL, run, io);
+    pthread_mutex_lock(&io->mutex);
+    int code = start_thread(io);
+    pthread_mutex_unlock(&io->mutex);
     if (code) {
         spl_io_destroy(io);
         return spl_fail_errno(err, code, "cannot start the io thread");
     }
-    io->started = true;
     *out = io;
     return SPL_OK;
 }
@@ -147,16 +277,27 @@ void spl_io_destroy(struct spl_io *io)
         return;
     pthread_mutex_lock(&io->mutex);
     io->closing = true;
-    pthread_cond_signal(&io->work);
-    pthread_mutex_unlock(&io->mutex);
-    if (io->started)
-        pthread_join(io->thread, NULL);
-    for (size_t i = 0; i < SPL_IO_READS; i++)
+    drop_spares(io);
+    for (size_t i = 0; i < READS; i++) {
         free(io->reads[i].data);
-    pthread_cond_destroy(&io->ended_one);
-    pthread_cond_destroy(&io->work);
-    pthread_mutex_destroy(&io->mutex);
-    free(io);
+        io->reads[i].data = NULL;
+    }
+    pthread_cond_broadcast(&io->work);
+    while (io->threads > io->reading)
+        pthread_cond_wait(&io->ended_one, &io->mutex);
+    io->left_behind = io->threads;
+    bool left_behind = io->left_behind;
+    pthread_mutex_unlock(&io->mutex);
+    if (!left_behind)
+        release(io);
+}
+
+static size_t count_of(const struct spl_io *io, const void *source)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < READS; i++)
+        count += io->reads[i].state != FREE && io->reads[i].what.source == source;
+    return count;
 }
 
 struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what *what, struct spl_io_rank rank)
@@ -164,12 +305,17 @@ struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what
     spl_assert(what->bytes > 0);
     pthread_mutex_lock(&io->mutex);
     struct spl_io_read *read = TAILQ_FIRST(&io->free);
+    if (io->used >= SPL_IO_READS && count_of(io, what->source) >= SPL_IO_READS)
+        read = NULL;
     if (read) {
+        io->used++;
         TAILQ_REMOVE(&io->free, read, link);
         *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .state = WAITS};
         TAILQ_INSERT_TAIL(&io->waiting, read, link);
         io->under_way++;
-        pthread_cond_signal(&io->work);
+        if (!find_being_read(io, what->source)) // a thread turns to it
+            io->moved_ns = spl_now_ns();
+        see_to_waiting(io);
     }
     pthread_mutex_unlock(&io->mutex);
     return read;
@@ -197,6 +343,17 @@ struct spl_io_read *spl_io_take(struct spl_io *io)
     }
     pthread_mutex_unlock(&io->mutex);
     return read;
+}
+
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read)
+{
+    pthread_mutex_lock(&io->mutex);
+    void *data = read->data;
+    spl_assert(read->state == TAKEN && data);
+    io->staged -= read->what.bytes;
+    read->data = NULL;
+    pthread_mutex_unlock(&io->mutex);
+    return data;
 }
 
 void spl_io_end(struct spl_io *io, struct spl_io_read *read)
@@ -241,15 +398,38 @@ bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns)
     return ended;
 }
 
-bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns)
+uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source)
 {
     pthread_mutex_lock(&io->mutex);
-    while (io->current && io->current->what.source == source)
-        if (!wait_until(io, deadline_ns))
-            break;
-    bool none = !io->current || io->current->what.source != source;
+    const struct spl_io_read *own = find_being_read(io, source);
+    uint64_t moved_ns = own ? own->began_ns : io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
-    return none;
+    return moved_ns;
+}
+
+static bool hangs(const struct spl_io_read *read)
+{
+    return spl_now_ns() - read->began_ns >= hangs_ns;
+}
+
+bool spl_io_hangs(struct spl_io *io, const void *source)
+{
+    pthread_mutex_lock(&io->mutex);
+    const struct spl_io_read *own = find_being_read(io, source);
+    bool answer = own && hangs(own);
+    pthread_mutex_unlock(&io->mutex);
+    return answer;
+}
+
+size_t spl_io_count_hanging(struct spl_io *io)
+{
+    size_t count = 0;
+    const struct spl_io_read *read;
+    pthread_mutex_lock(&io->mutex);
+    TAILQ_FOREACH(read, &io->being_read, link)
+    count += hangs(read);
+    pthread_mutex_unlock(&io->mutex);
+    return count;
 }
 
 size_t spl_io_count(struct spl_io *io)

@@ -1,10 +1,12 @@
-/* Reads on a thread of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
- * memory that is counted before it is taken.
+/* Reads on threads of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
+ * memory that is counted before it is taken. Each file is read by one thread at a time, and files side by side: one whose
+ * disk does not answer holds up nobody else.
  *
  * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that waits
- * is forgotten, the bytes of one that is being read are dropped when they have come.
+ * is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that does not
+ * end: it holds what it reads from, and its thread goes with it where the rest has gone by then.
  *
- * Threads: every function is called by the one that owns the renderer; `read` and `wake` are called by the io thread. */
+ * Threads: every function is called by the one that owns the renderer; those of spl_io_what, and `wake`, by io threads. */
 #ifndef SPL_RENDER_IO_H
 #define SPL_RENDER_IO_H
 
@@ -15,12 +17,16 @@
 
 #include "base/error.h"
 
-enum { SPL_IO_READS = 256 };       /* that may be under way, ended ones that were not given back among them */
+enum {
+    SPL_IO_READS = 256, /* of a source that may be under way, ended ones that were not given back among them; 4 times of all */
+    SPL_IO_THREADS = 16
+};
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
 
 struct spl_io_what {
     int (*read)(const void *source, uint32_t index, void *out, struct spl_error *err); /* may block */
-    const void *source; /* borrowed until spl_io_wait_for() */
+    void (*hold)(const void *source), (*let_go)(const void *source); // may be NULL; around `read`, and never block
+    const void *source; /* borrowed until the read is ended, and from hold() to let_go() */
     uint32_t index;
     size_t bytes; /* that `read` writes, at least 1 */
     void *owner;  /* of the read; not looked at */
@@ -38,20 +44,23 @@ struct spl_io_read {
     struct spl_io_rank rank;
     uint64_t number; /* among those of its rank, the least goes first */
     int state;       /* enum state of io.c */
+    uint64_t began_ns, ended_ns; /* when its reading did */
     bool unwanted;   /* ended by its owner while it was being read */
     void *data;      /* once taken: what.bytes; NULL: `err` says why not */
+    size_t room;     /* that `data` has */
     struct spl_error err;
 };
 
 struct spl_io;
 
-/* `wake` (may be NULL) is called after each read has ended. */
+/* `wake` (may be NULL) is called after each read has ended, by several threads at once. */
 int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io **out, struct spl_error *err);
 
-/* Forgets all reads; blocks until the one under way has ended. NULL-safe. */
+/* Forgets all reads; `wake` is not called any more. Does not wait for those under way, whose threads end behind it.
+ * NULL-safe. */
 void spl_io_destroy(struct spl_io *io);
 
-/* NULL when as many as may be are under way. */
+/* NULL when as many as may be are under way, of the source or in all. */
 struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what *what, struct spl_io_rank rank);
 
 /* It was asked for again: it moves up to `rank` where that goes before its own. */
@@ -60,14 +69,22 @@ void spl_io_raise(struct spl_io *io, struct spl_io_read *read, struct spl_io_ran
 /* A read that has ended, well or not, in the order that they did; NULL: none. Never blocks. */
 struct spl_io_read *spl_io_take(struct spl_io *io);
 
+/* The data of a read that was taken, which is the caller's from here on. */
+void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read);
+
 /* Gives back a read, with its data; whatever its state. NULL-safe. */
 void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* Blocks until no read of `source` is being read: true; false at `deadline_ns` (0 = never blocks). */
-bool spl_io_wait_for(struct spl_io *io, const void *source, uint64_t deadline_ns);
+/* When the read of the source that is under way was begun; where none is, when one of any source was last begun, has ended or
+ * was given back: what tells a disk that is slow from one that hangs. */
+uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source);
+
+/* Has it been reading of the source for a second, and how many sources are there of which it has? */
+bool spl_io_hangs(struct spl_io *io, const void *source);
+size_t spl_io_count_hanging(struct spl_io *io);
 
 /* Reads that wait, are being read, or were not taken yet. */
 size_t spl_io_count(struct spl_io *io);

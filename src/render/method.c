@@ -34,7 +34,7 @@ const char *spl_visibility_name(enum spl_visibility visibility)
 
 int spl_visibility_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_VISIBILITY_COUNT; i++)
+    for (int i = 0; name && i < SPL_VISIBILITY_COUNT; i++)
         if (!strcmp(name, visibility_names[i]))
             return i;
     return -1;
@@ -51,41 +51,41 @@ SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {
-#define REAL(id, field, low, high, value, shape, text)                                                                 \
+#define REAL(id, field, low, high, value, change, text)                                                                \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_REAL,                                                                                           \
      .least = low,                                                                                                     \
      .most = high,                                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape},
-#define COUNT(id, field, low, high, value, shape, text)                                                                \
+     .changes = change},
+#define COUNT(id, field, low, high, value, change, text)                                                               \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_WHOLE,                                                                                          \
      .least = low,                                                                                                     \
      .most = high,                                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape},
-#define CHOICE(id, field, prefix, value, shape, text)                                                                  \
+     .changes = change},
+#define CHOICE(id, field, prefix, value, change, text)                                                                 \
     {.name = #id,                                                                                                      \
      .help = text,                                                                                                     \
      .kind = SPL_PARAM_CHOICE,                                                                                         \
      .most = CHOICE_MOST_##prefix,                                                                                     \
      .otherwise = value,                                                                                               \
-     .shapes = shape,                                                                                                  \
+     .changes = change,                                                                                                \
      .choice_name = choice_##id,                                                                                       \
      .choice_from_name = spl_##prefix##_from_name},
     SPL_METHOD_PARAMS(REAL, COUNT, CHOICE)};
 
 const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param)
 {
-    return &params[param];
+    return (unsigned)param < SPL_PARAM_COUNT ? &params[param] : NULL;
 }
 
 int spl_method_param_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+    for (int i = 0; name && i < SPL_PARAM_COUNT; i++)
         if (!strcmp(params[i].name, name))
             return i;
     return -1;
@@ -135,6 +135,11 @@ void spl_view_set_param(struct spl_view *view, enum spl_method_param param, doub
     }
 }
 
+static bool exists(enum spl_method method)
+{
+    return (unsigned)method < SPL_METHOD_COUNT;
+}
+
 const struct spl_method_row *spl_method_row(enum spl_method method)
 {
     return rows[method];
@@ -142,17 +147,17 @@ const struct spl_method_row *spl_method_row(enum spl_method method)
 
 const struct spl_method_info *spl_method_get(enum spl_method method)
 {
-    return &rows[method]->info;
+    return exists(method) ? &rows[method]->info : NULL;
 }
 
 const char *spl_method_name(enum spl_method method)
 {
-    return (unsigned)method < SPL_METHOD_COUNT ? rows[method]->info.name : "unknown";
+    return exists(method) ? rows[method]->info.name : "unknown";
 }
 
 int spl_method_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_METHOD_COUNT; i++)
+    for (int i = 0; name && i < SPL_METHOD_COUNT; i++)
         if (!strcmp(name, rows[i]->info.name))
             return i;
     return -1;
@@ -167,22 +172,24 @@ const char *spl_method_names(void)
 
 bool spl_method_has_textures(enum spl_method method)
 {
-    return rows[method]->info.textures;
+    return exists(method) && rows[method]->info.textures;
 }
 
 enum spl_method spl_method_for(enum spl_method method, const struct spl_dataset_info *dataset)
 {
-    const struct spl_method_info *info = &rows[method]->info;
-    return info->needs_surface && !dataset->has_surface ? info->stand_in : method;
+    const struct spl_method_info *info = spl_method_get(method);
+    return info && info->needs_surface && !dataset->has_surface ? info->stand_in : method;
 }
 
 bool spl_method_has_normals(enum spl_method method, const struct spl_dataset_info *dataset)
 {
-    return dataset->has_surface || rows[spl_method_for(method, dataset)]->info.finds_normals;
+    return exists(method) && (dataset->has_surface || rows[spl_method_for(method, dataset)]->info.finds_normals);
 }
 
 uint32_t spl_method_get_params(enum spl_method method)
 {
-    const struct spl_method_info *info = &rows[method]->info;
+    const struct spl_method_info *info = spl_method_get(method);
+    if (!info)
+        return 0;
     return info->params | (info->needs_surface ? rows[info->stand_in]->info.params : 0);
 }

@@ -70,12 +70,7 @@ int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *da
 
 void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
 {
-    spl_residency_remove(&renderer->residency, dataset, SPL_NEVER);
-}
-
-bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
-{
-    return spl_residency_remove(&renderer->residency, dataset, 0);
+    spl_residency_remove(&renderer->residency, dataset);
 }
 
 int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err)
@@ -103,7 +98,7 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
         return rc;
     spl_residency_begin_walk(residency, asker);
     uint32_t next = *page;
-    for (; next < resident->slot_count && next < *page + preload_ahead; next++) {
+    for (; next < resident->device_slots && next < *page + preload_ahead; next++) {
         bool first = next == SPL_FIRST_SLOT;
         struct spl_error why = {0};
         if (!first && !spl_residency_has_room(residency, resident, next))
@@ -120,27 +115,36 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
     return SPL_OK;
 }
 
+/* The same, that ends where pages do not come and neither do others. */
+static int preload_patiently(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_hold *asker,
+                             uint32_t *page, bool *more, struct spl_error *err)
+{
+    uint32_t before = *page;
+    struct spl_io *io = renderer->residency.io;
+    int rc = preload(renderer, dataset, asker, page, more, err);
+    uint64_t moved_ns = spl_io_get_moved_ns(io, dataset);
+    if (rc || !*more || *page != before || !spl_io_count(io) || spl_now_ns() - moved_ns < patience_ns)
+        return rc;
+    *more = false;
+    return spl_fail(err, SPL_E_TIMEOUT, "no page has come for %d s; page %u of the dataset is still to come",
+                    (int)(patience_ns / SPL_NS_PER_S), *page);
+}
+
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err)
 {
-    return preload(renderer, dataset, NULL, page, more, err);
+    return preload_patiently(renderer, dataset, NULL, page, more, err);
 }
 
 int spl_renderer_preload(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_hold asker = {.alone = true};
-    uint64_t moved_ns = spl_now_ns();
     bool more = true;
     int rc = SPL_OK;
     for (uint32_t page = 0, before = 0; more && !rc; before = page) {
-        rc = preload(renderer, dataset, &asker, &page, &more, err);
-        if (page != before)
-            moved_ns = spl_now_ns();
-        else if (!rc && more && spl_now_ns() - moved_ns > patience_ns)
-            rc = spl_fail(err, SPL_E_TIMEOUT, "page %u of the dataset has not come for %d s", page,
-                          (int)(patience_ns / SPL_NS_PER_S));
-        else if (!rc && more)
-            spl_renderer_wait(renderer, moved_ns + patience_ns);
+        rc = preload_patiently(renderer, dataset, &asker, &page, &more, err);
+        if (!rc && more && page == before)
+            spl_renderer_wait(renderer, SPL_NEVER);
     }
     return rc;
 }

@@ -21,7 +21,7 @@ struct spl_scratch {
     struct spl_gpu_buffer *output; /* 4 bytes a sample: pixels of the requested layers; NULL on software devices, which
                                       write where the host reads */
     struct spl_gpu_buffer *readback; /* 4 bytes a sample */
-    struct spl_gpu_buffer *params;   /* slots of SPL_PARAMS_STRIDE: the batches', then one a dispatch */
+    struct spl_gpu_buffer *params;   /* in steps of SPL_PARAMS_STRIDE: the batches' rounds, then one a dispatch */
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
     struct spl_gpu_buffer *bounds;   /* struct spl_chunk_bounds[], grown on demand */
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
@@ -38,7 +38,7 @@ enum spl_area {
     SPL_AREA_COUNT
 };
 
-enum { SPL_PARAMS_STRIDE = 256, SPL_PARAMS_SLOTS = 8192 };
+enum { SPL_PARAMS_STRIDE = 256, SPL_PARAMS_MAX = 8192 };
 
 struct spl_renderer {
     struct spl_gpu *gpu;
@@ -58,7 +58,7 @@ struct spl_tile {
     uint32_t x, y, width, height; /* in the image, pixels */
     uint64_t samples;
     struct spl_frame_params params;              /* common to all dispatches of the tile */
-    uint32_t slots_used;                         /* of scratch.params; first those of the draw list's batches */
+    uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
     uint32_t stamps;                             /* timestamps written */
     uint8_t stamp_stage[SPL_GPU_TIMESTAMPS_MAX]; /* enum spl_stage that ended at each */
@@ -82,8 +82,9 @@ void spl_tile_end_group(struct spl_tile *tile); /* ends what holds until a group
 /* What every dispatch of the tile may see: the draw list, and the areas that hold. */
 void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT]);
 
-/* Gives the draw list's batches their slots of parameters, before anything else of the tile takes one. SPL_E_LIMIT. */
-int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err);
+/* Cuts the draw list's batches into rounds and takes their parameters, before anything else of the tile takes some.
+ * SPL_E_LIMIT. */
+int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 
 /* The kernel of `key`, and where chunks are drawn that have clip lines the one of theirs (constant 2,
  * common/clip.glsl); else NULL. */

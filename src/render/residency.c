@@ -1,5 +1,6 @@
-/* Pages on the device; see residency.h. A software device draws from host-visible memory, which pages are copied to; a
- * GPU's go through a staging buffer, which has its room before they have theirs. */
+/* Which pages are there, asked for and uploaded; see residency.h. A software device draws from host-visible memory, which
+ * pages are copied to; a GPU's go through a staging buffer, which has its room before they have theirs. The renderer's
+ * thread. */
 #include "render/residency.h"
 
 #include <stdlib.h>
@@ -11,8 +12,12 @@
 #include "render/slot.h"
 
 #define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
+static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
-enum { failures_max = 16 }; // that are remembered where nobody waits: each takes a read's place
+enum {
+    failures_max = 16, // that are remembered where nobody waits: each takes a read's place
+    uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
+};
 
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err)
@@ -22,23 +27,15 @@ int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, voi
     return spl_io_create(wake, wake_context, &residency->io, err);
 }
 
-static bool is_software(const struct spl_residency *residency)
-{
-    return spl_gpu_get_device(residency->gpu)->software;
-}
-
-/* What the account of device memory takes for a slot. */
-static uint64_t taken(const struct spl_resident_dataset *resident, uint32_t slot)
-{
-    return (spl_slot_get_bytes(resident->dataset, slot) + 15) / 16 * 16;
-}
-
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page)
 {
     spl_io_end(residency->io, page->read);
     spl_gpu_buffer_destroy(residency->gpu, page->buffer);
+    free(page->tables);
     page->read = NULL;
     page->buffer = NULL;
+    page->tables = NULL;
+    page->host_bytes = 0;
     residency->failures -= page->failed;
     page->filled = page->failed = false;
 }
@@ -93,7 +90,8 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     }
     struct spl_resident_dataset resident = {.dataset = dataset,
                                             .page_count = spl_dataset_get_info(dataset)->pages,
-                                            .slot_count = spl_slot_count(dataset)};
+                                            .slot_count = spl_slot_count(dataset),
+                                            .device_slots = spl_slot_count_resident(dataset)};
     int rc = reserve_asked(residency, resident.slot_count, err);
     resident.pages = rc ? NULL : spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
@@ -102,17 +100,14 @@ int spl_residency_add(struct spl_residency *residency, const struct spl_dataset 
     return SPL_OK;
 }
 
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns)
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset)
 {
     struct spl_resident_dataset *resident = spl_residency_get(residency, dataset);
     if (!resident)
-        return true;
+        return;
     drop_dataset(residency, resident);
-    if (!spl_io_wait_for(residency->io, dataset, deadline_ns))
-        return false;
     free(resident->pages);
     *resident = residency->datasets[--residency->dataset_count];
-    return true;
 }
 
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset)
@@ -128,70 +123,10 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->frame++;
     residency->asker = asker;
     residency->asked_count = 0;
-    residency->pending = residency->crowded = false;
-}
-
-/* Of two pages, those held by nobody first, then the one that was asked for longer ago. */
-static bool gives_way_before(const struct spl_resident_page *a, const struct spl_resident_page *b)
-{
-    return !a->holds != !b->holds ? !a->holds : a->last_frame < b->last_frame;
-}
-
-static bool evict_one(struct spl_residency *residency, bool held)
-{
-    struct spl_resident_page *first = NULL;
-    for (size_t i = 0; i < residency->dataset_count; i++) {
-        struct spl_resident_dataset *resident = &residency->datasets[i];
-        for (uint32_t p = 0; p < resident->slot_count; p++) {
-            struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->last_frame < residency->frame && (held || !page->holds) &&
-                (!first || gives_way_before(page, first)))
-                first = page;
-        }
-    }
-    if (!first)
-        return false;
-    residency->pages_evicted += first->filled;
-    spl_residency_drop_slot(residency, first);
-    return true;
-}
-
-static int make_buffer(struct spl_residency *residency, bool evict_held, enum spl_gpu_buffer_kind kind, uint64_t bytes,
-                       struct spl_gpu_buffer **out, struct spl_error *err)
-{
-    for (;;) {
-        struct spl_error why = {0};
-        int rc = spl_gpu_buffer_create(residency->gpu, kind, bytes, out, &why);
-        if (!rc)
-            return SPL_OK;
-        if ((rc != SPL_E_LIMIT && rc != SPL_E_NOMEM) || !evict_one(residency, evict_held))
-            return spl_fail(err, rc, "%s", why.message);
-    }
-}
-
-int spl_residency_make_buffer(struct spl_residency *residency, enum spl_gpu_buffer_kind kind, uint64_t bytes,
-                              struct spl_gpu_buffer **out, struct spl_error *err)
-{
-    return make_buffer(residency, true, kind, bytes, out, err);
-}
-
-bool spl_residency_has_room(const struct spl_residency *residency, const struct spl_resident_dataset *resident,
-                            uint32_t slot)
-{
-    bool staged = !is_software(residency) && !residency->staging;
-    uint64_t needed = taken(resident, slot) * (staged ? 2 : 1);
-    return resident->pages[slot].buffer ||
-           spl_gpu_get_memory(residency->gpu) + needed <= spl_gpu_get_limits(residency->gpu)->memory_bytes;
-}
-
-uint64_t spl_residency_get_reserve(const struct spl_residency *residency)
-{
-    uint64_t most = 0;
-    for (size_t i = 0; i < residency->dataset_count; i++) {
-        uint64_t bytes = taken(&residency->datasets[i], SPL_FIRST_SLOT);
-        most = bytes > most ? bytes : most;
-    }
-    return most * (is_software(residency) ? 1 : 2);
+    residency->pending = residency->crowded = residency->stalled = residency->later = false;
+    bool any = spl_io_count_hanging(residency->io);
+    for (size_t i = 0; i < residency->dataset_count; i++)
+        residency->datasets[i].hangs = any && spl_io_hangs(residency->io, residency->datasets[i].dataset);
 }
 
 uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
@@ -202,61 +137,12 @@ uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
     return bytes;
 }
 
-/* Has the walk no room for a buffer of so many bytes only because other frames hold theirs? */
-static bool is_held(const struct spl_residency *residency, int rc, uint64_t bytes)
-{
-    uint64_t held = 0, limit = spl_gpu_get_limits(residency->gpu)->memory_bytes;
-    for (size_t i = 0; i < residency->dataset_count; i++) {
-        const struct spl_resident_dataset *resident = &residency->datasets[i];
-        for (uint32_t p = 0; p < resident->slot_count; p++) {
-            const struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->holds && page->last_frame < residency->frame)
-                held += spl_gpu_buffer_get_bytes(page->buffer);
-        }
-    }
-    return held && (rc == SPL_E_NOMEM || spl_gpu_get_memory(residency->gpu) - held + bytes <= limit);
-}
-
-static int grow_staging(struct spl_residency *residency, bool evict_held, size_t bytes, struct spl_error *err)
-{
-    if (residency->staging && spl_gpu_buffer_get_bytes(residency->staging) >= bytes)
-        return SPL_OK;
-    uint64_t had = residency->staging ? spl_gpu_buffer_get_bytes(residency->staging) : 0;
-    spl_gpu_buffer_destroy(residency->gpu, residency->staging);
-    residency->staging = NULL;
-    int rc = make_buffer(residency, evict_held, SPL_GPU_UPLOAD, bytes, &residency->staging, err);
-    if (rc && had) /* reads under way count on it */
-        spl_gpu_buffer_create(residency->gpu, SPL_GPU_UPLOAD, had, &residency->staging, NULL);
-    return rc;
-}
-
-/* Takes the slot's room. */
-static int take_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                     struct spl_error *err)
-{
-    bool software = is_software(residency), alone = residency->asker && residency->asker->alone;
-    if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
-        return SPL_SLOT_CROWDED;
-    struct spl_error why = {0};
-    size_t bytes = spl_slot_get_bytes(resident->dataset, slot);
-    struct spl_gpu_buffer *buffer = NULL;
-    int rc = make_buffer(residency, alone, software ? SPL_GPU_UPLOAD : SPL_GPU_DEVICE, bytes, &buffer, &why);
-    if (!rc && !software)
-        rc = grow_staging(residency, alone, bytes, &why);
-    if (!rc) {
-        resident->pages[slot].buffer = buffer;
-        return SPL_OK;
-    }
-    spl_gpu_buffer_destroy(residency->gpu, buffer);
-    if ((rc == SPL_E_LIMIT || rc == SPL_E_NOMEM) && is_held(residency, rc, taken(resident, slot)))
-        return SPL_SLOT_CROWDED;
-    return spl_fail(err, rc, "%s", why.message);
-}
-
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank)
 {
     struct spl_io_what what = {.read = spl_slot_read,
+                               .hold = spl_slot_hold,
+                               .let_go = spl_slot_let_go,
                                .source = dataset,
                                .index = slot,
                                .bytes = spl_slot_get_bytes(dataset, slot),
@@ -266,6 +152,23 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
     else
         page->read = spl_io_try_begin(residency->io, &what, rank);
     return page->read;
+}
+
+static int take_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                     struct spl_error *err)
+{
+    bool alone = residency->asker && residency->asker->alone;
+    if (residency->first_in_line && residency->first_in_line != residency->asker && !alone)
+        return SPL_SLOT_CROWDED;
+    return slot >= resident->device_slots ? spl_residency_take_host_room(residency, resident, slot, alone, err)
+                                          : spl_residency_take_device_room(residency, resident, slot, alone, err);
+}
+
+/* Is an error the latest word on a slot? It is for who waits with it already, and for a while for who takes what is there and
+ * would never hear of it; whoever comes to wait has it read anew. */
+static bool is_told(const struct spl_resident_page *page, bool awaited)
+{
+    return page->holds || (!awaited && spl_now_ns() - page->read->ended_ns < errors_last_ns);
 }
 
 /* Why its read failed. It is forgotten with the last frame that waits for it; where none does, once for all that failed of
@@ -281,17 +184,24 @@ static int tell_failure(struct spl_residency *residency, struct spl_resident_dat
     return rc;
 }
 
-int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                      bool awaited, struct spl_error *err)
+static int ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot, bool awaited,
+               struct spl_error *err)
 {
     struct spl_resident_page *page = &resident->pages[slot];
     bool first = page->last_frame < residency->frame;
     page->last_frame = residency->frame;
-    if (page->failed)
+    if (page->failed && is_told(page, awaited))
         return tell_failure(residency, resident, page, err);
+    if (page->failed)
+        spl_residency_drop_slot(residency, page);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
-    int rc = page->buffer ? SPL_OK : take_room(residency, resident, slot, err);
+    if (resident->hangs && !spl_resident_has_room(page)) {
+        residency->crowded |= awaited;
+        residency->stalled |= awaited;
+        return awaited ? SPL_SLOT_CROWDED : SPL_SLOT_PENDING;
+    }
+    int rc = spl_resident_has_room(page) ? SPL_OK : take_room(residency, resident, slot, err);
     if (rc) {
         residency->crowded |= awaited && rc == SPL_SLOT_CROWDED;
         return rc;
@@ -307,18 +217,30 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
     return SPL_SLOT_PENDING;
 }
 
+int spl_residency_ask(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                      bool awaited, struct spl_error *err)
+{
+    int answer = ask(residency, resident, slot, awaited, err);
+    residency->later |= !awaited && (answer == SPL_SLOT_PENDING || answer == SPL_SLOT_CROWDED);
+    return answer;
+}
+
 /* Copies what was read to where kernels see it. */
 static int fill(struct spl_residency *residency, struct spl_resident_page *page, const struct spl_io_read *read,
                 struct spl_error *err)
 {
     size_t bytes = read->what.bytes;
     uint64_t ticket;
-    if (is_software(residency)) {
+    if (page->host_bytes) {
+        page->tables = spl_io_take_data(residency->io, page->read);
+        return SPL_OK;
+    }
+    if (spl_gpu_get_device(residency->gpu)->software) {
         memcpy(spl_gpu_buffer_map(page->buffer), read->data, bytes);
         return SPL_OK;
     }
     page->last_frame = residency->frame; // it does not give way to its own staging
-    int rc = grow_staging(residency, true, bytes, err);
+    int rc = spl_residency_grow_staging(residency, bytes, err);
     if (!rc)
         rc = spl_gpu_begin(residency->gpu, err);
     if (rc)
@@ -333,8 +255,11 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
 {
     int rc = SPL_OK;
-    for (struct spl_io_read *read; !rc && (read = spl_io_take(residency->io));) {
+    uint64_t bytes = 0;
+    struct spl_io_read *read;
+    for (int i = 0; !rc && i < uploads_max && bytes < SPL_IO_BYTES && (read = spl_io_take(residency->io)); i++) {
         struct spl_resident_page *page = read->what.owner;
+        bytes += read->what.bytes;
         if (!read->data) {
             page->failed = true;
             if (residency->failures++ > failures_max && !page->holds)
@@ -352,7 +277,7 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
         spl_io_end(residency->io, read);
         page->read = NULL;
         page->filled = true;
-        residency->pages_loaded++;
+        residency->pages_loaded += page->buffer != NULL;
     }
     return rc;
 }

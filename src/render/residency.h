@@ -1,9 +1,13 @@
-/* Which slots of which datasets are on the device. They are read when a view asks for them, on the io thread (io.h), and
+/* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
  * evicted, least recently drawn first, when the device's memory limit refuses another.
  *
- * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read: so what
- * has no room depends on what the walk asks for, and not on what has come by then. A frame that waits holds what it
- * asked for (hold.h). Bookkeeping of the renderer's thread. */
+ * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read; for one
+ * that has no room nothing is evicted. So what has no room depends on what the walk asks for, and not on what has come by
+ * then, and a walk that is made again finds what it has waited for. A frame that waits holds what it asked for (hold.h).
+ *
+ * A disk that has not answered for a second (io.h) costs its own dataset's views only: what it is to bring gives way before all
+ * else, held or not, and whatever else is asked of it takes no room until it answers; the read goes on, unwanted.
+ * Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
@@ -19,19 +23,45 @@
 struct spl_hold;
 
 struct spl_resident_page {
-    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way */
+    struct spl_gpu_buffer *buffer; /* NULL = neither there nor on its way, or tables */
+    size_t host_bytes;             /* of tables that are there or on their way; else 0 */
+    struct spl_tables *tables;     // that have come; may be NULL
     struct spl_io_read *read;      /* that is to fill it, or has failed; may be NULL */
     uint64_t last_frame;           /* when it was last asked for */
     uint32_t holds;                /* frames that wait with it */
     bool filled, failed;
 };
 
+/* Is it there, or on its way? */
+static inline bool spl_resident_has_room(const struct spl_resident_page *page)
+{
+    return page->buffer || page->host_bytes;
+}
+
 /* A dataset's slots; see slot.h. Each comes and goes on its own. */
 struct spl_resident_dataset {
     const struct spl_dataset *dataset;  /* borrowed */
     struct spl_resident_page *pages;    /* slot_count of them */
     uint32_t page_count, slot_count;
+    uint32_t device_slots;              /* those before tables */
+    bool hangs;                         /* its disk does, as the walk under way began */
 };
+
+/* Does a frame that waits keep it? Not what a disk that hangs is to bring. */
+static inline bool spl_resident_is_kept(const struct spl_resident_dataset *resident, const struct spl_resident_page *page)
+{
+    return page->holds && (page->filled || !resident->hangs);
+}
+
+/* What gives way first: the least of what a disk that hangs is to bring, what nobody keeps, the rest; then the one that was
+ * asked for longest ago. */
+static inline bool spl_resident_gives_way_before(const struct spl_resident_dataset *of_a, const struct spl_resident_page *a,
+                                                 const struct spl_resident_dataset *of_b, const struct spl_resident_page *b)
+{
+    int worth_a = (a->filled || !of_a->hangs) + spl_resident_is_kept(of_a, a);
+    int worth_b = (b->filled || !of_b->hangs) + spl_resident_is_kept(of_b, b);
+    return worth_a != worth_b ? worth_a < worth_b : a->last_frame < b->last_frame;
+}
 
 static inline uint32_t spl_textures_slot(const struct spl_resident_dataset *resident, uint32_t page)
 {
@@ -61,19 +91,20 @@ struct spl_residency {
     uint32_t *asked;         /* slots that it waits for or draws, in its order; room for those of any dataset */
     size_t asked_count, asked_capacity;
     bool pending, crowded;   /* some of them are on their way; have no room before another frame lets go */
+    bool stalled;            /* crowded, since their disk hangs */
+    bool later;              /* some that it does without are on their way, or will have room */
 };
 
 /* `wake` as spl_io_create(). */
 int spl_residency_init(struct spl_residency *residency, struct spl_gpu *gpu, void (*wake)(void *context),
                        void *wake_context, struct spl_error *err);
-/* Blocks until the read under way has ended. Holds are let go of. */
+/* Holds are let go of; the read under way is left to end by itself. */
 void spl_residency_finish(struct spl_residency *residency);
 
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err);
 
-/* Lets go of the dataset: true once nothing of it is being read, which is waited for until `deadline_ns` (0 = never
- * blocks). False: it is as if it had just been added. */
-bool spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset, uint64_t deadline_ns);
+/* Lets go of the dataset. A page of it that is being read holds it until it has come, and is dropped. */
+void spl_residency_remove(struct spl_residency *residency, const struct spl_dataset *dataset);
 
 /* NULL when `dataset` was not added. Valid until the next add or remove. */
 struct spl_resident_dataset *spl_residency_get(struct spl_residency *residency, const struct spl_dataset *dataset);
@@ -101,7 +132,7 @@ uint64_t spl_residency_get_reserve(const struct spl_residency *residency);
 enum spl_slot_answer {
     SPL_SLOT_READY,   /* it is there */
     SPL_SLOT_PENDING, /* it has its room and is on its way */
-    SPL_SLOT_CROWDED, /* its room is held by frames that wait; later */
+    SPL_SLOT_CROWDED, /* its room is held by frames that wait, or its disk hangs; later */
 };
 
 /* Asks for a slot of `resident` in the walk under way; `awaited`: the walk is good for nothing without it, its frame
@@ -114,10 +145,23 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
 
+/* device_room.c: makes a slot's buffer, evicting others, those of frames that wait where `evict_held`; none where that would
+ * not do. SPL_SLOT_CROWDED, SPL_E_LIMIT, SPL_E_NOMEM. */
+int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                   bool evict_held, struct spl_error *err);
+
+/* The same of what uploads go through; what it takes is never given back. */
+int spl_residency_grow_staging(struct spl_residency *residency, size_t bytes, struct spl_error *err);
+
+/* host_room.c: the same for a slot of tables, which is counted in, among those of the dataset. */
+int spl_residency_take_host_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
+                                 bool evict_held, struct spl_error *err);
+
 /* Gives up what has room and did not come. */
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
 
-/* Puts on the device what has been read since. Device errors only: a read that failed is told to who asks for it. */
+/* Puts on the device what has been read since, as much as holds up nobody; spl_io_wait() says whether that was all. Device
+ * errors only: a read that failed is told to who asks for it. */
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err);
 
 #endif

@@ -94,7 +94,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->small, SPL_GPU_DEVICE, 4 * (samples > run_texels ? samples : run_texels)},
         {&scratch->output, SPL_GPU_DEVICE, software ? 0 : samples * 4},
         {&scratch->readback, SPL_GPU_READBACK, samples * 4},
-        {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_SLOTS},
+        {&scratch->params, SPL_GPU_UPLOAD, (uint64_t)SPL_PARAMS_STRIDE * SPL_PARAMS_MAX},
         {&scratch->chunks, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_draw_chunk)},
         {&scratch->bounds, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_chunk_bounds)},
         {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "dataset/chunk_clip.h"
+#include "render/children.h"
 #include "render/frustum.h"
 #include "render/occupancy.h"
 
@@ -19,9 +20,7 @@ static const double cluster_radius_share = 0.9;
 struct walk {
     const struct spl_select_params *params;
     struct spl_draw_list *list;
-    const struct spl_node *nodes;
-    const struct spl_chunk *chunks;
-    const uint32_t *textures; /* words of CTEX, NULL = none */
+    const struct spl_tables *tables; /* of the node being drawn */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
@@ -98,14 +97,15 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
     return rc;
 }
 
-/* The chunk's word of CTEX as it is drawn: with as many planes, and interpolated where the finest texels, no part of
+/* The chunk's texture word as it is drawn: with as many planes, and interpolated where the finest texels, no part of
  * the chunk being nearer than `near`, are wider than a sample. 0 where the textures are less than so many samples wide
  * that their mean colours show all there is. */
 static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uint32_t page, double near)
 {
     static const double least = 2.83; // samples: below, the coarsest level that is kept has texels of less than 0.7
     const struct spl_select_params *params = w->params;
-    uint32_t texture = params->atoms && w->textures ? w->textures[chunk - w->chunks] : 0;
+    const uint32_t *textures = w->tables->textures;
+    uint32_t texture = params->atoms && textures ? textures[chunk - w->tables->chunks] : 0;
     double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
     if (!texture || samples < least)
         return 0;
@@ -117,6 +117,25 @@ static uint32_t drawn_texture(struct walk *w, const struct spl_chunk *chunk, uin
     planes = planes < params->atoms ? planes : params->atoms;
     return (texture & ((1u << SPL_CHUNK_TEXTURE_PLANES) - 1)) | planes << SPL_CHUNK_TEXTURE_PLANES |
            (samples > size ? 1u : 0u) << SPL_CHUNK_TEXTURE_SMOOTH;
+}
+
+static struct spl_view_box grown(struct spl_view_box box, double by)
+{
+    for (int i = 0; i < 3; i++)
+        box.half[i] += by;
+    return box;
+}
+
+static double largest_radius(const struct spl_chunk *chunk)
+{
+    double codes = (1u << (chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15u)) - 1;
+    return chunk->radius_min + chunk->radius_step * codes;
+}
+
+/* What pruning adds to most radii of a node, and more. */
+static double typical(const struct spl_node *node)
+{
+    return 2 * node->spacing;
 }
 
 /* The box of the chunk's positions, in view space, and where its origin lies from the eye. */
@@ -180,10 +199,8 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
-    double radius_codes = (1u << (chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15u)) - 1;
-    double radius = (chunk->radius_min + chunk->radius_step * radius_codes) * scale;
-    for (int i = 0; i < 3; i++)
-        box.half[i] += radius;
+    double radius = largest_radius(chunk) * scale;
+    box = grown(box, radius);
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
     if (w->covered) {
@@ -217,15 +234,18 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     return spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &out, &bounds, err);
 }
 
-static int draw_node(struct walk *w, const struct spl_node *node, struct spl_error *err)
+static int draw_node(struct walk *w, const struct spl_found_node *found, struct spl_error *err)
 {
+    const struct spl_node *node = found->node;
+    const struct spl_chunk *chunks = spl_found_get_chunks(found);
+    w->tables = found->tables;
     double node_to_eye[3];
     for (int i = 0; i < 3; i++)
         node_to_eye[i] = node->origin[i] - w->params->camera->eye[i];
     w->list->nodes++;
     double radius_share = node->child_count ? cluster_radius_share : 1;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
-        const struct spl_chunk *chunk = &w->chunks[node->first_chunk + i];
+        const struct spl_chunk *chunk = &chunks[i];
         int rc = spl_chunk_kind(chunk) == SPL_CHUNK_LINES
                      ? draw_lines(w, node_to_eye, chunk, node->page, err)
                      : draw_discs(w, node_to_eye, chunk, node->page, radius_share, err);
@@ -235,7 +255,7 @@ static int draw_node(struct walk *w, const struct spl_node *node, struct spl_err
     return SPL_OK;
 }
 
-/* Everything that the node and its descendants draw, in view space. */
+/* What the node and its descendants draw, in view space, but for discs much larger than most. */
 static struct spl_view_box node_box(const struct walk *w, const struct spl_node *node)
 {
     double least[3], size[3];
@@ -243,27 +263,60 @@ static struct spl_view_box node_box(const struct walk *w, const struct spl_node 
         least[i] = node->origin[i] - w->params->camera->eye[i] + node->box_min[i];
         size[i] = (double)node->box_max[i] - node->box_min[i];
     }
-    struct spl_view_box box = spl_view_box(w->params->camera, least, size);
-    for (int i = 0; i < 3; i++)
-        box.half[i] += 2 * node->spacing; /* pruned splats grow by up to their radius */
-    return box;
+    return grown(spl_view_box(w->params->camera, least, size), typical(node));
 }
 
-/* Pushes the children that are in view, the nearest on top. False, and nothing pushed, when the page of one of them
- * cannot be had: then the node itself is drawn. */
-static bool push_children(struct walk *w, const struct spl_node *node, uint64_t *stack, size_t *depth)
+/* Is the node drawn itself, were it alone to say? */
+static bool is_drawn(const struct walk *w, const struct spl_node *node, const struct spl_view_box *box)
 {
-    uint64_t order[8];
+    double near = fmax(box->center[2] - box->half[2], w->params->camera->near), lod = w->params->lod;
+    return !node->child_count || (lod > 0 && node->spacing * w->focal <= lod * near);
+}
+
+/* Can anything of the node be seen? Pruned discs grow by up to their radius, and that of the largest is at most half of
+ * what is thinnest of the box, which holds all of them whole. Where so much decides, which is seldom, the chunks of a
+ * node that is drawn say how large theirs are; else its children are asked one by one. */
+static bool is_seen(const struct walk *w, const struct spl_found_node *found, const struct spl_view_box *box)
+{
+    const struct spl_node *node = found->node;
+    const struct spl_camera *camera = w->params->camera;
+    double pad = w->params->low_pass, largest = INFINITY;
+    if (spl_view_box_visible(camera, box, pad))
+        return true;
+    if (!(w->params->lod > 0)) /* nothing is pruned */
+        return false;
+    for (int i = 0; i < 3; i++)
+        largest = fmin(largest, ((double)node->box_max[i] - node->box_min[i]) / 2);
+    struct spl_view_box all = grown(*box, largest - typical(node));
+    if (largest <= typical(node) || !spl_view_box_visible(camera, &all, pad))
+        return false;
+    if (!is_drawn(w, node, box))
+        return true;
+    largest = 0;
+    for (uint32_t i = 0; i < node->chunk_count; i++)
+        largest = fmax(largest, largest_radius(spl_found_get_chunks(found) + i));
+    all = grown(*box, largest - typical(node));
+    return largest > typical(node) && spl_view_box_visible(camera, &all, pad);
+}
+
+/* Pushes the children that are in view, the nearest on top. Nothing is pushed, and *pushed false, when the page or the
+ * tables of one of them cannot be had: then the node itself is drawn. */
+static int push_children(struct walk *w, const struct spl_node *node, struct spl_found_node *stack, size_t *depth,
+                         bool *pushed, struct spl_error *err)
+{
+    struct spl_found_node children[8], order[8];
     uint32_t count = 0;
     double depths[8];
-    bool all = true;
-    for (uint64_t child = node->first_child; child < node->first_child + node->child_count; child++) {
-        struct spl_view_box box = node_box(w, &w->nodes[child]);
-        if (!spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
+    enum spl_select_answer found;
+    int rc = spl_children_find(w->params, node, children, &found, err);
+    bool all = !rc && found == SPL_SELECT_YES;
+    for (uint32_t i = 0; i < node->child_count && !rc && found == SPL_SELECT_YES; i++) {
+        struct spl_view_box box = node_box(w, children[i].node);
+        if (!is_seen(w, &children[i], &box))
             continue;
-        enum spl_select_answer answer = w->params->resident(w->params->context, w->nodes[child].page);
+        enum spl_select_answer answer = w->params->resident(w->params->context, children[i].node->page);
         if (answer == SPL_SELECT_NO)
-            return false;
+            return SPL_OK;
         all &= answer == SPL_SELECT_YES;
         uint32_t at = count++;
         for (; at > 0 && depths[at - 1] < box.center[2]; at--) {
@@ -271,61 +324,53 @@ static bool push_children(struct walk *w, const struct spl_node *node, uint64_t 
             order[at] = order[at - 1];
         }
         depths[at] = box.center[2];
-        order[at] = child;
+        order[at] = children[i];
     }
     if (!all)
-        return false;
+        return rc;
     memcpy(stack + *depth, order, count * sizeof *order);
     *depth += count;
-    return true;
+    *pushed = true;
+    return SPL_OK;
 }
 
 static int walk_tree(struct walk *w, struct spl_error *err)
 {
-    const struct spl_camera *camera = w->params->camera;
-    uint64_t stack[stack_max];
+    const struct spl_tables *first = spl_dataset_get_tables(w->params->dataset, 0); // always kept
+    struct spl_found_node stack[stack_max];
     size_t depth = 0;
-    if (w->params->resident(w->params->context, w->nodes[0].page) != SPL_SELECT_YES)
+    if (w->params->resident(w->params->context, 0) != SPL_SELECT_YES)
         return spl_fail(err, SPL_E_LIMIT, "not even the coarsest level fits the device memory limit");
-    stack[depth++] = 0;
+    stack[depth++] = (struct spl_found_node){first->nodes, first};
     while (depth > 0) {
-        const struct spl_node *node = &w->nodes[stack[--depth]];
-        struct spl_view_box box = node_box(w, node);
-        if (!spl_view_box_visible(camera, &box, w->params->low_pass))
+        const struct spl_found_node found = stack[--depth];
+        struct spl_view_box box = node_box(w, found.node);
+        bool pushed = false;
+        int rc = SPL_OK;
+        if (!is_seen(w, &found, &box))
             continue;
-        double near = fmax(box.center[2] - box.half[2], camera->near);
-        bool fine = w->params->lod > 0 && node->spacing * w->focal <= w->params->lod * near;
-        if (!fine && node->child_count && depth + 8 <= stack_max) {
-            if (push_children(w, node, stack, &depth))
-                continue;
-            w->list->complete = false;
+        if (!is_drawn(w, found.node, &box) && depth + 8 <= stack_max) {
+            rc = push_children(w, found.node, stack, &depth, &pushed, err);
+            w->list->complete &= pushed;
         }
-        int rc = draw_node(w, node, err);
+        if (!rc && !pushed)
+            rc = draw_node(w, &found, err);
         if (rc)
             return rc;
     }
     return SPL_OK;
 }
 
-static struct walk begin_walk(const struct spl_select_params *params)
+static double focal_of(const struct spl_select_params *params)
 {
-    uint64_t node_count, chunk_count;
-    return (struct walk){
-        .params = params,
-        .nodes = spl_dataset_get_nodes(params->dataset, &node_count),
-        .chunks = spl_dataset_get_chunks(params->dataset, &chunk_count),
-        .textures = spl_dataset_get_chunk_textures(params->dataset),
-        .focal = fmax(params->camera->fx, params->camera->fy),
-    };
+    return fmax(params->camera->fx, params->camera->fy);
 }
 
 int spl_select_spacing(const struct spl_select_params *params, double *spacing, bool *complete, struct spl_error *err)
 {
     double covered[SPACING_CLASSES] = {0}, sum = 0, sparser = 0;
     struct spl_draw_list counts = {.complete = true}; // its numbers only
-    struct walk w = begin_walk(params);
-    w.list = &counts;
-    w.covered = covered;
+    struct walk w = {.params = params, .list = &counts, .focal = focal_of(params), .covered = covered};
     struct spl_error why = {0};
     int rc = walk_tree(&w, &why), class = SPACING_CLASSES;
     if (rc)
@@ -342,8 +387,7 @@ int spl_select_spacing(const struct spl_select_params *params, double *spacing, 
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err)
 {
     spl_draw_list_clear(list);
-    struct walk w = begin_walk(params);
-    w.list = list;
+    struct walk w = {.params = params, .list = list, .focal = focal_of(params)};
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;

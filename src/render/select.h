@@ -29,6 +29,9 @@ struct spl_select_params {
     double low_pass;                                /* samples */
     bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
     bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
+    /* Tables of a page that the dataset does not keep: of YES in *tables, valid until the selection ends. May ask for
+     * them; may be NULL where all are kept. */
+    enum spl_select_answer (*tables)(void *context, uint32_t page, const struct spl_tables **tables);
     enum spl_select_answer (*resident)(void *context, uint32_t page); /* may the page be drawn? may ask for it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
     enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them; may
@@ -42,7 +45,8 @@ static inline bool spl_view_is_textured(const struct spl_view *view)
     return spl_method_has_textures(view->method) && view->disc.atoms && view->layers >> SPL_LAYER_COLOR & 1;
 }
 
-/* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries. */
+/* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries;
+ * SPL_E_CORRUPT where tables that were read by page have a node that does not fit its parent. */
 int spl_select(const struct spl_select_params *params, struct spl_draw_list *list, struct spl_error *err);
 
 /* How far apart, in samples, the drawn splats lie where they are sparsest: all but a hundredth of what they cover on

@@ -6,15 +6,33 @@
 
 #include "dataset/dictionary.h"
 
-uint32_t spl_slot_count(const struct spl_dataset *dataset)
+uint32_t spl_slot_count_resident(const struct spl_dataset *dataset)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     return info->atoms ? 2 * info->pages + 1 : info->pages;
 }
 
+uint32_t spl_slot_of_tables(const struct spl_dataset *dataset, uint32_t page)
+{
+    return spl_slot_count_resident(dataset) + page;
+}
+
+uint32_t spl_slot_count(const struct spl_dataset *dataset)
+{
+    bool by_page = !spl_dataset_keeps_all(dataset);
+    return spl_slot_of_tables(dataset, by_page ? spl_dataset_get_info(dataset)->pages : 0);
+}
+
+bool spl_slot_is_tables(const struct spl_dataset *dataset, uint32_t slot)
+{
+    return slot >= spl_slot_count_resident(dataset);
+}
+
 size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    if (spl_slot_is_tables(dataset, slot))
+        return spl_dataset_get_tables_bytes(dataset, slot - spl_slot_of_tables(dataset, 0));
     if (slot >= 2 * info->pages)
         return info->dictionary_bytes;
     if (slot >= info->pages)
@@ -26,6 +44,8 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
 {
     const struct spl_dataset *dataset = source;
     uint32_t pages = spl_dataset_get_info(dataset)->pages;
+    if (spl_slot_is_tables(dataset, slot))
+        return spl_dataset_read_tables(dataset, slot - spl_slot_of_tables(dataset, 0), out, err);
     if (slot < pages) {
         memset((char *)out + spl_slot_get_bytes(dataset, slot) - 4, 0, 4);
         return spl_dataset_read_page(dataset, slot, out, err);
@@ -34,4 +54,14 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
         return spl_dataset_read_textures(dataset, slot - pages, out, err);
     spl_dictionary_expand(spl_dataset_get_dictionary(dataset), out);
     return SPL_OK;
+}
+
+void spl_slot_hold(const void *source)
+{
+    spl_dataset_hold(source);
+}
+
+void spl_slot_let_go(const void *source)
+{
+    spl_dataset_let_go(source);
 }

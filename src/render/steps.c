@@ -2,7 +2,8 @@
  *
  * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the place of the
  * next tile and the fill plan, which is the whole image's, are all on the host. So frames may take turns, and a tile
- * is the same whatever was drawn before it. Belongs to the renderer's thread. */
+ * is the same whatever was drawn before it. Images are made when there is a tile to put into them: one that waits for its
+ * first pages has none. Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,10 +51,11 @@ static int check_image(const struct spl_image *image, const struct spl_view *vie
         return spl_fail_field(err, SPL_E_USAGE, "images", "the image of layer %s has another type or size than the view",
                               spl_layer_name(image->layer));
     if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
-        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type))
+        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type) ||
+        image->row_bytes > SIZE_MAX / 2 / image->height)
         return spl_fail_field(err, SPL_E_USAGE, "images",
                               "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, or "
-                              "rows that overlap",
+                              "rows that overlap or do not fit into memory",
                               spl_layer_name(image->layer), unit);
     return SPL_OK;
 }
@@ -61,6 +63,9 @@ static int check_image(const struct spl_image *image, const struct spl_view *vie
 static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
                          struct spl_error *err)
 {
+    if (options->image_count && !options->images)
+        return spl_fail_field(err, SPL_E_USAGE, "images", "there are %zu images, but images is NULL",
+                              options->image_count);
     for (size_t i = 0; i < options->image_count; i++) {
         const struct spl_image *image = &options->images[i];
         int rc = check_image(image, &steps->wanted, err);
@@ -80,23 +85,6 @@ static void give_images_back(struct spl_frame_steps *steps)
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
         if (steps->borrowed >> layer & 1)
             get_made(steps)->images[layer] = (struct spl_image){0};
-}
-
-static int make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
-{
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-        struct spl_image *image = &frame->images[layer];
-        if (!(view->layers >> layer & 1) || image->pixels) /* the caller's */
-            continue;
-        *image = (struct spl_image){.layer = layer,
-                                    .type = spl_readback_type(layer),
-                                    .width = view->camera.width,
-                                    .height = view->camera.height};
-        image->pixels = spl_alloc_raw((size_t)image->width * image->height, spl_pixel_bytes(image->type), err);
-        if (!image->pixels)
-            return SPL_E_NOMEM;
-    }
-    return SPL_OK;
 }
 
 /* A share of the size, to be enlarged; a pixel's centre stays where it is in the world. */
@@ -128,16 +116,14 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
         rc = method->prepare(job, err);
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
-    if (!rc)
-        rc = make_images(&steps->frame, view, err);
-    if (!rc && steps->wanted.supersample < 1)
-        rc = make_images(&steps->enlarged, &steps->wanted, err);
     steps->prepared = !rc;
     return rc;
 }
 
+/* What can be refused is, before the device or a page is touched. `options` NULL: a frame in steps, of which all layers are
+ * handed out; `handed_out`: those that have no image of the caller's are. */
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                 bool alone, const struct spl_render_options *options, struct spl_frame_steps **out,
+                 const struct spl_render_options *options, bool handed_out, struct spl_frame_steps **out,
                  struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
@@ -147,8 +133,6 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     int rc = spl_view_read(view, &known, err);
     if (!rc)
         rc = spl_view_check_layers(&known, info, err);
-    if (!rc)
-        rc = spl_residency_upload(&renderer->residency, err);
     if (rc)
         return rc;
     view = &known;
@@ -163,10 +147,15 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
         make_coarse(&steps->view);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
-    steps->job.hold.alone = alone;
+    steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
     if (options)
         rc = borrow_images(steps, options, err);
+    if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
+        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
+                            steps->wanted.layers & ~steps->borrowed);
+    if (!rc)
+        rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
         return rc;
@@ -179,7 +168,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err)
 {
-    return begin(renderer, dataset, view, false, NULL, out, err);
+    return begin(renderer, dataset, view, NULL, true, out, err);
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -201,9 +190,12 @@ static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
     return SPL_OK;
 }
 
-static void enlarge(struct spl_frame_steps *steps)
+static int enlarge(struct spl_frame_steps *steps, struct spl_error *err)
 {
     const struct spl_camera *camera = &steps->wanted.camera;
+    int rc = spl_frame_make_images(&steps->enlarged, &steps->wanted, err);
+    if (rc)
+        return rc;
     uint32_t rows = enlarged_pixels / camera->width + 1, left = camera->height - steps->row;
     uint32_t end = steps->row + (rows < left ? rows : left);
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
@@ -211,6 +203,7 @@ static void enlarge(struct spl_frame_steps *steps)
             spl_image_enlarge(&steps->frame.images[layer], steps->wanted.supersample, &steps->enlarged.images[layer],
                               steps->row, end);
     steps->row = end;
+    return SPL_OK;
 }
 
 /* SPL_SLOT_PENDING: it waits. */
@@ -233,9 +226,9 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
     if (steps->y < steps->view.camera.height)
         return make_tile(steps, err);
     clock = spl_now_ns();
-    enlarge(steps);
+    rc = enlarge(steps, err);
     steps->frame.stats.readback_ms += spl_since_ms(&clock);
-    return SPL_OK;
+    return rc;
 }
 
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
@@ -297,10 +290,7 @@ int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dat
     bool more = true;
     int rc = spl_sized_read(options, &known, sizeof known, "spl_render_options", err);
     if (!rc)
-        rc = begin(renderer, dataset, view, true, &known, &steps, err);
-    if (!rc && !frame && steps->borrowed != steps->wanted.layers)
-        rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
-                            steps->wanted.layers & ~steps->borrowed);
+        rc = begin(renderer, dataset, view, &known, frame, &steps, err);
     while (!rc && more) {
         rc = spl_frame_step(steps, steps->wanted.deadline_ns, &more, err);
         if (!rc && more && spl_frame_is_waiting(steps))

@@ -21,14 +21,14 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
 static int too_many(struct spl_error *err)
 {
     return spl_fail_field(err, SPL_E_LIMIT, "lod",
-                          "a view takes more than %d dispatches, as of so many pages; raise lod", SPL_PARAMS_SLOTS);
+                          "a view takes more than %d dispatches, as of so many pages; raise lod", SPL_PARAMS_MAX);
 }
 
-static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t slot,
+static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t index,
                                          const struct spl_frame_params *params)
 {
     struct spl_gpu_buffer *buffer = tile->renderer->scratch.params;
-    uint64_t offset = (uint64_t)slot * SPL_PARAMS_STRIDE;
+    uint64_t offset = (uint64_t)index * SPL_PARAMS_STRIDE;
     memcpy((char *)spl_gpu_buffer_map(buffer) + offset, params, sizeof *params);
     return (struct spl_gpu_binding){.buffer = buffer, .offset = offset, .bytes = SPL_PARAMS_STRIDE};
 }
@@ -36,16 +36,16 @@ static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t s
 static int next_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
                        struct spl_error *err)
 {
-    if (tile->slots_used == SPL_PARAMS_SLOTS)
+    if (tile->params_used == SPL_PARAMS_MAX)
         return too_many(err);
-    *binding = put_params(tile, tile->slots_used++, params);
+    *binding = put_params(tile, tile->params_used++, params);
     return SPL_OK;
 }
 
 /* A piece may be as long as the image, so that each has an invocation of its own. */
 enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES, line_entries_per_workgroup = SPL_WORKGROUP / SPL_RUN_SPLATS };
 
-int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
+int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
 {
     uint64_t workgroups = spl_gpu_get_limits(tile->renderer->gpu)->workgroups, size = tile->params.texture_size;
     uint64_t words = spl_gpu_buffer_get_bytes(tile->renderer->scratch.small) / sizeof(uint32_t);
@@ -53,11 +53,11 @@ int spl_tile_take_slots(struct spl_tile *tile, struct spl_error *err)
              summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
         summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
-    uint64_t slots = spl_draw_list_count_slots(&tile->renderer->list, most, summed,
-                                               workgroups * line_entries_per_workgroup);
-    if (slots > SPL_PARAMS_SLOTS)
+    uint64_t rounds =
+        spl_draw_list_count_rounds(&tile->renderer->list, most, summed, workgroups * line_entries_per_workgroup);
+    if (rounds > SPL_PARAMS_MAX)
         return too_many(err);
-    tile->slots_used = (uint32_t)slots;
+    tile->params_used = (uint32_t)rounds;
     return SPL_OK;
 }
 
@@ -81,8 +81,7 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
     spl_tile_bind(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) ||
-            what->kind != batch->key.kind ||
+        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || what->kind != batch->key.kind ||
             (what->by_texture && (what->planes != batch->key.planes || what->smooth != batch->key.smooth)))
             continue;
         bindings[SPL_RESOURCE_PAGE].buffer = resident->pages[batch->key.page].buffer;
@@ -91,13 +90,13 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_RESOURCE_TEXTURES].buffer = resident->pages[textures].buffer;
             bindings[SPL_RESOURCE_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
         }
-        uint32_t slot = batch->first_slot;
-        for (uint32_t done = 0; done < batch->entries; done += batch->slot_entries) {
+        uint32_t round = batch->first_round;
+        for (uint32_t done = 0; done < batch->entries; done += batch->round_entries) {
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
-            params.entries = left < batch->slot_entries ? left : batch->slot_entries;
-            bindings[SPL_RESOURCE_FRAME] = put_params(tile, slot++, &params);
+            params.entries = left < batch->round_entries ? left : batch->round_entries;
+            bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
             spl_gpu_dispatch(tile->renderer->gpu, batch->key.apart && what->clipped ? what->clipped : kernel, bindings,

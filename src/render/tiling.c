@@ -1,7 +1,7 @@
-/* Tiles of whole pixels, as wide as the image where they fit. A tile is the image's camera shifted: the same sample has
- * the same place in the world in every tile, and cells of the fill pyramid begin at multiples of their size from
- * the guard's corner, so a pixel has the same bytes however the image is cut. Supersampling is a larger tile that the
- * resolve pass averages. */
+/* Tiles of whole pixels, as wide as the image where they fit. A tile is the image's camera shifted by whole samples.
+ * Kernels are told the image's camera and where the tile begins, so that nothing is rounded from a tile's own corner;
+ * cells of the fill pyramid begin at multiples of their size from the guard's corner. So a pixel has the same bytes
+ * however the image is cut. Supersampling is a larger tile that the resolve pass averages. */
 #include "render/tiling.h"
 
 #include <math.h>
@@ -62,8 +62,6 @@ static void set_params(struct spl_tile *tile)
     tile->params = (struct spl_frame_params){
         .fx = (float)camera->fx,
         .fy = (float)camera->fy,
-        .cx = (float)camera->cx,
-        .cy = (float)camera->cy,
         .near = (float)camera->near,
         .far = isfinite(camera->far) ? (float)camera->far : 3.4e38f,
         .low_pass = SPL_LOW_PASS,
@@ -97,12 +95,17 @@ void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, s
     widen(&tiling->reach, side, whole->width, x, x + tile->width, &from[0], &to[0]);
     widen(&tiling->reach, side, whole->height, y, y + tile->height, &from[1], &to[1]);
     spl_tiling_get_camera(tile->view, &tile->camera);
+    const double cx = tile->camera.cx + tiling->reach.guard, cy = tile->camera.cy + tiling->reach.guard;
     tile->camera.width = (uint32_t)(to[0] - from[0]);
     tile->camera.height = (uint32_t)(to[1] - from[1]);
     tile->camera.cx -= (double)from[0];
     tile->camera.cy -= (double)from[1];
     tile->samples = (uint64_t)tile->camera.width * tile->camera.height;
     set_params(tile);
+    tile->params.cx = (float)cx;
+    tile->params.cy = (float)cy;
+    tile->params.tile_x = (uint32_t)(from[0] + tiling->reach.guard);
+    tile->params.tile_y = (uint32_t)(from[1] + tiling->reach.guard);
     tile->params.crop_x = (uint32_t)((int64_t)x * side - from[0]);
     tile->params.crop_y = (uint32_t)((int64_t)y * side - from[1]);
     const struct spl_method_row *method = spl_method_row(tile->view->method);

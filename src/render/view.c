@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/sized.h"
+#include "geom/size.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
@@ -14,6 +15,7 @@ enum { side_max = 32768 };
 void spl_view_init_sized(struct spl_view *view, size_t size)
 {
     struct spl_view known = {
+        .camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY},
         .method = SPL_METHOD_DEFAULT,
         .layers = 1u << SPL_LAYER_COLOR,
         .lod = 1,

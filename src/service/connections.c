@@ -31,6 +31,17 @@ void spl_connection_enter(struct connection *connection, enum phase phase)
     connection->since_ns = spl_now_ns();
 }
 
+/* libmicrohttpd closes the socket next. What is unread then (the next request of a pipeline behind "Connection: close", the
+ * rest of a body that was refused) would have the kernel send a reset and drop what it still has to send of our last reply.
+ * Never blocks: what comes later still resets the connection, but behind the reply. */
+static void read_to_the_end(const struct connection *connection)
+{
+    enum { reads_max = 64 };
+    char unread[16 * 1024];
+    for (int i = 0; i < reads_max && recv(connection->fd, unread, sizeof unread, MSG_DONTWAIT) > 0; i++)
+        ;
+}
+
 void spl_connection_notify(void *context, struct MHD_Connection *handle, void **socket_context,
                            enum MHD_ConnectionNotificationCode code)
 {
@@ -39,6 +50,7 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
     if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
         if (!connection)
             return;
+        read_to_the_end(connection);
         // libmicrohttpd 0.9.75 forgets a request with two errors (its parameters, then its headers do not fit the pool)
         if (connection->request)
             spl_request_finish(connection->request, MHD_REQUEST_TERMINATED_WITH_ERROR);

@@ -22,6 +22,7 @@ struct request {
     const char *cache; /* for the log: "hit", "miss", …; NULL where no cache was asked */
     char *uri;         /* path, cut at '?'; NULL when the URI was too long */
     const char *query; /* inside uri, "" when there is none */
+    const char *target_begin, *target_end; // of libmicrohttpd's own text; for framing.c alone
     char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed

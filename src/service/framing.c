@@ -1,9 +1,9 @@
 /* Where a request ends. A proxy in front and libmicrohttpd 0.9.75 behind it must not see two ends, or the rest of one
  * client's request becomes the beginning of another's (RFC 9112, 5.2, 6.3 and 11.2). libmicrohttpd takes the first of
  * several lengths and a coding before a length, takes a name with a space in it for one it has never heard of, makes
- * one name of a name and the line that is folded behind it, cuts a value at a NUL, and takes a line that begins with a
- * colon for the end of the headers. Such a request is refused once its headers are there, and the connection ends, so
- * that nothing behind them is read.
+ * one name of a name and the line that is folded behind it, cuts a value and each part of the first line at a NUL, and
+ * takes a line that begins with a colon for the end of the headers. Such a request is refused once its headers are
+ * there, and the connection ends, so that nothing behind them is read.
  *
  * What cannot be done here, since libmicrohttpd acts before it asks: a single length that is no number gets its own
  * 400, an HTML page after two heads, and then the connection ends; a bare LF ends a line, also one that is a colon
@@ -74,7 +74,7 @@ static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *
     if (!follows(framing, name, name_length, value, value_length)) {
         framing->field = "headers";
         snprintf(framing->fault, sizeof framing->fault,
-                 "a header is folded, holds a NUL, or stands behind a line that has no name");
+                 "a header is folded, holds a NUL, or stands behind a line that has no name or a NUL");
     } else if (!is_token(name, name_length)) {
         framing->field = "headers";
         snprintf(framing->fault, sizeof framing->fault,
@@ -90,6 +90,20 @@ static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *
         framing->coding = value;
     }
     return framing->fault[0] ? MHD_NO : MHD_YES;
+}
+
+/* The first line lies in the buffer as method, target and version, a NUL behind each: what stands between the end of
+ * one and the next, and is no blank, is what a NUL of the client's has cut off. The target's end was seen before it was
+ * decoded in place. What stands behind the version is found before the first header. */
+static bool is_cut(struct framing *framing, const struct request *request, const char *version)
+{
+    const char *behind = framing->begin + strlen(framing->begin) + 1;
+    if (version < framing->begin || version >= framing->end)
+        return false; // none was there: HTTP/0.9
+    framing->at = version + strlen(version);
+    while (behind < request->target_begin && *behind == ' ')
+        behind++;
+    return behind != request->target_begin || request->target_end + 1 != version;
 }
 
 static void judge(struct framing *framing, const char *version)
@@ -122,11 +136,17 @@ bool spl_check_framing(struct request *request, const char *line, const char *ve
         framing.begin = line;
         framing.end = line + info->header_size;
     }
-    MHD_get_connection_values_n(request->handle, MHD_HEADER_KIND, look, &framing);
+    if (framing.begin && is_cut(&framing, request, version)) {
+        framing.field = "request";
+        snprintf(framing.fault, sizeof framing.fault, "the first line of the request holds a NUL");
+    }
+    if (!framing.fault[0])
+        MHD_get_connection_values_n(request->handle, MHD_HEADER_KIND, look, &framing);
     // behind the last value: its line's end and an empty line; with another character a name of none was there
     if (!framing.fault[0] && framing.at && (framing.end > framing.at + 4 || !is_blank(framing.at, framing.end, ""))) {
         framing.field = "headers";
-        snprintf(framing.fault, sizeof framing.fault, "a line of the headers has no name");
+        snprintf(framing.fault, sizeof framing.fault,
+                 "a line of the headers has no name, or the first one holds a NUL");
     }
     if (!framing.fault[0])
         judge(&framing, version);

@@ -41,6 +41,8 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *handl
     request->connection->request = request;
     request->began_ns = spl_now_ns();
     request->query = "";
+    request->target_begin = uri;
+    request->target_end = uri + strlen(uri);
     size_t length = strnlen(uri, uri_max + 1);
     if (length <= uri_max && !(request->uri = strdup(uri))) {
         request->connection->request = NULL;

@@ -1,5 +1,5 @@
 /* What lies in the program itself: the page, its modules and the clients (page_route.c), the interface's own document
- * (openapi_route.c). Handlers of routes; owned by the loop's thread. */
+ * (openapi_route.c), the table of methods (methods_route.c). Handlers of routes; owned by the loop's thread. */
 #ifndef SPL_SERVICE_PAGES_H
 #define SPL_SERVICE_PAGES_H
 
@@ -16,5 +16,6 @@ void spl_list_clients(struct request *request, const struct spl_call *call);
 void spl_show_client(struct request *request, const struct spl_call *call);
 void spl_show_openapi_yaml(struct request *request, const struct spl_call *call);
 void spl_show_openapi_json(struct request *request, const struct spl_call *call);
+void spl_show_methods(struct request *request, const struct spl_call *call);
 
 #endif

@@ -38,9 +38,10 @@ static void index_page(struct request *request, const struct spl_call *call)
     for (size_t i = 0; i < catalog->count; i++)
         if (catalog->slots[i].current && spl_access_may_see(request, catalog->slots[i].id))
             json_array_append_new(views, json_sprintf("%s/view", catalog->slots[i].current->uri));
-    spl_reply_json(request, json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version",
-                                      SPLATD_VERSION, "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets",
-                                      "/v1/datasets", "status", "/v1/status", "views", views));
+    spl_reply_json(request,
+                   json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "name", "splatd", "version", SPLATD_VERSION,
+                             "openapi", "/v1/openapi.json", "clients", "/clients/", "datasets", "/v1/datasets",
+                             "methods", "/v1/methods", "status", "/v1/status", "views", views));
     if (request->response)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT);
 }
@@ -86,6 +87,7 @@ static const struct route {
     {"/clients/{name}", GET, SPL_SCOPE_NONE, false, spl_show_client},
     {"/v1/openapi.yaml", GET, SPL_SCOPE_NONE, false, spl_show_openapi_yaml},
     {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},
+    {"/v1/methods", GET, SPL_SCOPE_NONE, false, spl_show_methods},
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
     {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
     {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, false, show_dataset},

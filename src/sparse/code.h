@@ -39,7 +39,7 @@ struct spl_chunk_code {
     struct spl_splat_code splat[SPL_CHUNK_SPLATS];
 };
 
-/* What a chunk with any plane costs beside its planes' headers, masks and codes: its word in CTEX. */
+/* What a chunk with any plane costs beside its planes' headers, masks and codes: its word in the head of its page. */
 #define SPL_CODE_CHUNK_BITS 32
 
 enum { SPL_CODE_STEPS = 64, SPL_CODE_GAPS = 4 };

@@ -108,9 +108,10 @@ class Browser:
 
 
 class Page:
-    """One tab of `size` CSS pixels. `complaints`: errors of the console, exceptions and violations of policy."""
+    """One tab of `size` CSS pixels. `complaints`: errors of the console, exceptions and violations of policy. `before`: a
+    script that runs before the page's own."""
 
-    def __init__(self, browser, url, size=(900, 600), phone=False, dark=False):
+    def __init__(self, browser, url, size=(900, 600), phone=False, dark=False, before=""):
         self.browser, self.complaints = browser, []
         self.target = browser.send("Target.createTarget", url="about:blank")["targetId"]
         self.session = browser.send("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
@@ -122,6 +123,7 @@ class Page:
             "Emulation.setEmulatedMedia",
             features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
         )
+        self.send("Page.addScriptToEvaluateOnNewDocument", source=before)
         self.go(url)
 
     def _hear(self, method, params):

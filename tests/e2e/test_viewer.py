@@ -448,7 +448,7 @@ def test_the_service_renders_tours():
             tab.choose("#tour-height", "180")
             tab.choose("#method", "fill")
             for name, value in (("visibility", "none"), ("kernel", "9")):
-                tab.choose(f"#{name}", value)
+                tab.choose(f"#parameter-{name}", value)
             tab.run(
                 """(usual => window.fetch = (path, how) => { if (how?.body) window.asked = JSON.parse(how.body);
                 return usual(path, how); })(fetch)"""
@@ -515,14 +515,14 @@ def test_the_chart_has_the_frame_on_it():
 
 
 def test_atoms_are_offered_where_there_are_textures():
-    hidden = "document.querySelector('#atoms').hidden"
+    hidden = "document.querySelector('#parameter-atoms').hidden"
     with page() as tab:
         assert tab.run(hidden) and "atoms" not in tab.run("location.hash")
     close = FACING.replace("dataset=wall", "dataset=wall-textured").replace("eye=3", "eye=1")
     with Daemon(REAL, datasets=[WALL, TEXTURED]) as other, page(f"http://127.0.0.1:{other.port}/{close}") as tab:
-        assert not tab.run(hidden) and tab.run("document.querySelector('[for=atoms]').offsetHeight > 0")
+        assert not tab.run(hidden) and tab.run("document.querySelector('[for=parameter-atoms]').offsetHeight > 0")
         whole = tab.run(DIGEST)
-        tab.choose("#atoms", "0")
+        tab.choose("#parameter-atoms", "0")
         tab.until(f"location.hash.includes('atoms=0') && {REST}")
         mean = tab.run(DIGEST)
         assert mean[0] != whole[0], "the textures are on screen"
@@ -532,9 +532,9 @@ def test_atoms_are_offered_where_there_are_textures():
         tab.until(f"!{hidden} && location.hash.includes('atoms=0') && {REST}")
         tab.run(f"location.hash = '{close}&budget=30s'")  # enough for the best, however slow the machine
         tab.until(f"/^Chosen: splat.* \\d atoms/.test(document.querySelector('#chosen').textContent) && {REST}")
-        assert tab.run("document.querySelector('#atoms').disabled")
+        assert tab.run("document.querySelector('#parameter-atoms').disabled")
         tab.choose("#budget", "")
-        tab.choose("#atoms", "")
+        tab.choose("#parameter-atoms", "")
         tab.until(f"!location.hash.includes('atoms') && {REST}")
         assert tab.run(DIGEST)[0] == whole[0]
     with Daemon(REAL, datasets=[TEXTURED]) as other:
@@ -548,7 +548,7 @@ FILL = ("visibility", "kernel", "threshold", "pyramid")
 
 
 def test_fill_has_its_own_controls():
-    offered = f"""{json.dumps(FILL)}.map(id => [document.getElementById(id), document.querySelector(`[for=${{id}}]`)]).flat()
+    offered = f"""{json.dumps(FILL)}.map(id => [`#parameter-${{id}}`, `[for=parameter-${{id}}]`].map(q => document.querySelector(q))).flat()
         .filter(e => e.offsetHeight).length"""
     with page() as tab:
         digest = settled(tab)
@@ -556,21 +556,22 @@ def test_fill_has_its_own_controls():
         tab.choose("#method", "fill")
         digest = automatic = settled(tab, digest)
         assert tab.run(offered) == 8 and link(tab)["method"] == "fill" and not set(FILL) & set(link(tab))
-        tab.choose("#kernel", "3")  # smaller than the holes
+        assert tab.run("document.querySelector('#method-help').textContent.includes('holes filled')")
+        tab.choose("#parameter-kernel", "3")  # smaller than the holes
         digest = settled(tab, digest)
-        tab.choose("#kernel", "2")  # the browser's own check keeps it from being asked, also when something else changes
+        tab.choose("#parameter-kernel", "2")  # the browser's own check keeps it from being asked, also when something else changes
         assert "3" in tab.text("#said")
         wanted = {"kernel": "3", "threshold": "0.25", "pyramid": "5", "visibility": "none"}
         for name in ("threshold", "pyramid", "visibility"):
-            tab.choose(f"#{name}", wanted[name])
+            tab.choose(f"#parameter-{name}", wanted[name])
         next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
-        tab.choose("#kernel", "3")
+        tab.choose("#parameter-kernel", "3")
         next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
         digest, url = settled(tab), tab.run("location.href")
         assert digest != automatic
         tab.choose("#budget", "500ms")
         next_link(tab, lambda now: "budget" in now and not set(FILL) & set(now))
-        assert tab.run(f"{json.dumps(FILL)}.every(id => document.getElementById(id).disabled)")
+        assert tab.run(f"{json.dumps(FILL)}.every(id => document.getElementById('parameter-' + id).disabled)")
         tab.choose("#budget", "")
         next_link(tab, lambda now: {name: now.get(name) for name in FILL} == wanted)
         tab.choose("#method", "points")
@@ -578,9 +579,9 @@ def test_fill_has_its_own_controls():
         assert tab.run(offered) == 0
     with page(url) as tab:
         assert settled(tab) == digest and tab.run(offered) == 8
-        assert {name: tab.run(f"document.getElementById('{name}').value") for name in FILL} == wanted
+        assert {name: tab.run(f"document.getElementById('parameter-{name}').value") for name in FILL} == wanted
         for name in FILL:
-            tab.choose(f"#{name}", "")
+            tab.choose(f"#parameter-{name}", "")
         assert settled(tab, digest) == automatic
     with page(url) as tab:
         digest = settled(tab)
@@ -592,6 +593,72 @@ def test_fill_has_its_own_controls():
     with page(url.replace("/#", "/embed/wall#")) as tab:
         view = urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])
         assert {name: view[name][0] for name in FILL} == wanted
+
+
+def shown(tab):
+    """The controls of methods that are on screen, by name."""
+    return set(tab.run("[...document.querySelectorAll('[id^=parameter-]')].filter(e => e.offsetHeight)"
+                       ".map(e => e.id.slice(10)).filter(name => !name.endsWith('-help'))"))
+
+
+def test_controls_are_those_of_the_table():
+    """Each method that the service has is offered, with what it takes, its range and what it is for."""
+    table = daemon.ask("/v1/methods").json()
+    parameters = {parameter["name"]: parameter for parameter in table["parameters"]}
+    with page() as tab:
+        assert tab.run("[...document.querySelector('#method').options].map(o => o.value)") == \
+            [method["name"] for method in table["methods"]]
+        assert tab.run("document.querySelector('#method').value") == table["default"]
+        for method in table["methods"]:
+            tab.choose("#method", method["name"])
+            names = {name for name in method["parameters"] if not parameters[name]["textures"]}  # the wall has none
+            assert shown(tab) == names, method["name"]
+            assert tab.text("#method-help") == method["description"]
+            for parameter in (parameters[name] for name in names):
+                control = f"document.querySelector('#parameter-{parameter['name']}')"
+                assert tab.text(f"#parameter-{parameter['name']}-help") == parameter["description"]
+                assert tab.run(f"{control}.value") == "", "the default"
+                if "enum" in parameter:
+                    assert tab.run(f"[...{control}.options].map(o => o.text)") == parameter["enum"]
+                else:
+                    assert tab.run(f"[{control}.min, {control}.max].map(Number)") == [parameter["minimum"], parameter["maximum"]]
+                    assert tab.run(f"{control}.step") == ("1" if parameter["type"] == "integer" else "any")
+
+
+NEW_METHOD = {"name": "fog", "description": "clouds that nobody has seen yet", "textures": False, "stand_in": "fill",
+              "parameters": ["thickness", "shade"]}
+NEW_PARAMETERS = [
+    {"name": "thickness", "description": "of the fog, metres", "type": "number", "minimum": 1, "maximum": 9, "default": 2,
+     "textures": False},
+    {"name": "shade", "description": "what it is made of", "type": "string", "enum": ["grey", "white"], "default": "grey",
+     "textures": False}]
+
+
+def test_a_method_that_the_page_has_never_heard_of():
+    """The page builds its controls from what the service says: here from a table with one method more."""
+    table, dataset = (daemon.ask(path).json() for path in ("/v1/methods", "/v1/datasets/wall"))
+    table["methods"].append(NEW_METHOD)
+    table["parameters"] += NEW_PARAMETERS
+    dataset["methods"].append("fog")
+    told = json.dumps({"/v1/methods": table, "/v1/datasets/wall": dataset})
+    # Views are asked of the daemon, which draws what it knows: points, from the same camera.
+    script = f"""(usual => {{ const told = {told}; window.asked = [];
+        window.fetch = (path, how) => {{
+            asked.push(path);
+            if (path in told) return Promise.resolve(new Response(JSON.stringify(told[path])));
+            return usual(path.replace('method=fog', 'method=points').replace(/&(thickness|shade)=[^&]*/g, ''), how);
+        }}; }})(fetch)"""
+    with page(f"{SITE}/{FACING}&method=fog&thickness=3", before=script) as tab:
+        assert shown(tab) == {"thickness", "shade"} and link(tab)["thickness"] == "3"
+        assert tab.run("document.querySelector('#parameter-thickness').value") == "3"
+        tab.choose("#parameter-shade", "white")
+        next_link(tab, lambda now: now.get("shade") == "white" and now["thickness"] == "3")
+        assert any("method=fog" in path and "thickness=3" in path and "shade=white" in path for path in tab.run("asked"))
+        tab.choose("#parameter-thickness", "10")
+        assert "9" in tab.text("#said"), "the browser's own check"
+        assert all(name for _, name in tab.names())
+        tab.choose("#method", "points")
+        next_link(tab, lambda now: now["method"] == "points" and not {"thickness", "shade"} & set(now))
 
 
 def refuse(tab, status, problem, retry):
@@ -713,7 +780,7 @@ def elsewhere(site, element):
 
 
 def test_splat_view_on_another_origin():
-    element = '<splat-view dataset="wall" eye="3,0,1" target="0,0,1" layer="color"></splat-view>'
+    element = '<splat-view dataset="wall" eye="3,0,1" target="0,0,1" method="fill" kernel="9" class="wide"></splat-view>'
     with elsewhere(SITE, element) as url:
         with page(url, ready="document.querySelector('splat-view')?.camera", size=(500, 400)) as tab:
             assert tab.run("document.querySelector('splat-view').camera.eye") == [3, 0, 1]
@@ -722,6 +789,8 @@ def test_splat_view_on_another_origin():
             tab.run("document.querySelector('splat-view').setAttribute('eye', '3,1,1')")
             tab.until("document.querySelector('splat-view').camera.eye[1] === 1")
             assert tab.run("history.length") == length
+            frame = tab.run("document.querySelector('splat-view').shadowRoot.querySelector('iframe').src")
+            assert frame.endswith("#eye=3%2C0%2C1&target=0%2C0%2C1&method=fill&kernel=9"), "the element's own stay with it"
             tab.drag((250, 150), (320, 150))
             tab.until("document.querySelector('splat-view').camera.eye[1] !== 1")
 

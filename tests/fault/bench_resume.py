@@ -76,6 +76,7 @@ def test_outputs_and_resume(folder, dataset):
     assert chart.count("<circle") == 13 and "<other>" not in chart
     assert len(re.findall('"/9j/', page)) == 3 * (1 + 2 * 12), "pictures inside the page"
     assert not re.search(r'(src|href)="?(http|//|file)', page), "needs no network"
+    assert f'<body data-method="{all_methods()[0]}" data-atoms="8">' in page and not re.search("@[A-Z]+@", page), "begins there"
     assert not list(folder.glob("*.profile.json"))
     share = int(re.search(r"(\d+) % of it rendering", said.stderr)[1])
     print(f"{share} % rendering at 160x90")

@@ -2,10 +2,10 @@
  * does in a block of memory, computes every hash, patches header and table, and opens the result. What opens is decoded
  * to the last splat, from pages copied to blocks of their exact size.
  *
- * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures, 8 = attributes), one byte n, n
- * patches of three bytes (offset low, high; xor) into header and table, a little-endian 32 bit size for each section,
- * then the sections: META, NODE, CHNK and PAGE, with attributes two STRM, with textures ATOM, CTEX and TEXP, of those
- * sizes (shortened or missing as the input ends; the page keeps its size up to 64 KiB, with zeroes). */
+ * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures, 8 = tables are read by page, 16 =
+ * two pages), one byte n, n patches of three bytes (offset low, high; xor) into header and table, a little-endian 32 bit
+ * size for each section, then the sections, of those sizes (shortened or missing as the input ends; pages keep their size
+ * up to 64 KiB, with zeroes): META, PDIR, each page's HEAD, each PAGE, with textures ATOM and each page's TEXP. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -22,11 +22,18 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, flag_streams = 8, plain_sections = 4, section_count = 9 };
+enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, flag_by_page = 8, flag_two_pages = 16 };
+enum { sections_max = 9, page_room = 1 << 16 };
+
+struct part {
+    uint32_t type, index;
+    const uint8_t *bytes;
+    uint32_t size;
+};
 
 struct head {
     struct spl_file_header header;
-    struct spl_section table[section_count];
+    struct spl_section table[sections_max];
 };
 
 static void rehash(struct head *head, size_t table_bytes)
@@ -35,60 +42,78 @@ static void rehash(struct head *head, size_t table_bytes)
     head->header.header_hash = XXH3_64bits(&head->header, offsetof(struct spl_file_header, header_hash));
 }
 
-/* The page first, as the writer has it; then META, NODE, CHNK, textures, the table. The block, of *length bytes, is the
- * caller's. */
+/* The sections of the input, in its order. */
+static int take_parts(const uint8_t *data, size_t size, unsigned flags, struct part parts[sections_max])
+{
+    static uint8_t pages[2][page_room];
+    const uint32_t page_count = flags & flag_two_pages ? 2 : 1;
+    int count = 0;
+    parts[count++] = (struct part){.type = SPL_SECTION_META};
+    parts[count++] = (struct part){.type = SPL_SECTION_DIRECTORY};
+    for (uint32_t p = 0; p < page_count; p++)
+        parts[count++] = (struct part){.type = SPL_SECTION_HEAD, .index = p};
+    for (uint32_t p = 0; p < page_count; p++)
+        parts[count++] = (struct part){.type = SPL_SECTION_PAGE, .index = p};
+    if (flags & flag_textures)
+        parts[count++] = (struct part){.type = SPL_SECTION_ATOMS};
+    for (uint32_t p = 0; p < page_count && flags & flag_textures; p++)
+        parts[count++] = (struct part){.type = SPL_SECTION_TEXTURES, .index = p};
+    for (int i = 0; i < count; i++, data += size < 4 ? size : 4, size -= size < 4 ? size : 4)
+        memcpy(&parts[i].size, data, size < 4 ? size : 4);
+    for (int i = 0; i < count; i++) {
+        uint32_t wanted = parts[i].size, left = wanted < size ? wanted : (uint32_t)size;
+        parts[i].bytes = data;
+        parts[i].size = left;
+        data += left;
+        size -= left;
+        if (parts[i].type != SPL_SECTION_PAGE)
+            continue;
+        uint8_t *page = pages[parts[i].index];
+        memset(page, 0, page_room);
+        memcpy(page, parts[i].bytes, left < page_room ? left : page_room);
+        parts[i].bytes = page;
+        parts[i].size = wanted < page_room ? wanted : page_room;
+    }
+    return count;
+}
+
+static int pages_first(const void *a, const void *b)
+{
+    const struct part *x = a, *y = b;
+    bool x_page = x->type == SPL_SECTION_PAGE, y_page = y->type == SPL_SECTION_PAGE;
+    return x_page != y_page ? y_page - x_page : x->bytes < y->bytes ? -1 : 1;
+}
+
+/* The pages first, as the writer has them; then the rest, the table. The block, of *length bytes, is the caller's. */
 static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const uint8_t *patches, unsigned patch_count,
                         size_t *length)
 {
-    static const uint32_t all[section_count] = {SPL_SECTION_PAGE,   SPL_SECTION_META,           SPL_SECTION_NODES,
-                                                SPL_SECTION_CHUNKS, SPL_SECTION_STREAM,         SPL_SECTION_STREAM,
-                                                SPL_SECTION_ATOMS,  SPL_SECTION_CHUNK_TEXTURES, SPL_SECTION_TEXTURES};
-    uint32_t types[section_count];
-    int count = 0;
-    for (int i = 0; i < section_count; i++)
-        if (i < plain_sections || (i < plain_sections + 2 ? flags & flag_streams : flags & flag_textures))
-            types[count++] = all[i];
+    struct part parts[sections_max] = {0};
+    int count = take_parts(data, size, flags, parts);
+    qsort(parts, (size_t)count, sizeof *parts, pages_first);
     const size_t table_bytes = (size_t)count * sizeof(struct spl_section);
-    uint32_t wanted[section_count] = {0};
-    const uint8_t *part[section_count];
-    size_t sizes = (size_t)count * 4, header_bytes = size < sizes ? size : sizes;
-    memcpy(wanted, data, header_bytes);
-    data += header_bytes;
-    size -= header_bytes;
-    static uint8_t page[1 << 16];
-    uint32_t page_bytes = wanted[3];
-    memset(page, 0, sizeof page);
-    for (int i = 0; i < count; i++) {
-        part[i] = data;
-        wanted[i] = wanted[i] < size ? wanted[i] : (uint32_t)size;
-        data += wanted[i];
-        size -= wanted[i];
-    }
-    memcpy(page, part[3], wanted[3] < sizeof page ? wanted[3] : sizeof page);
-    part[3] = page;
-    wanted[3] = page_bytes < sizeof page ? page_bytes : sizeof page;
     struct head head = {.header = {.magic = SPL_FILE_MAGIC,
                                    .version = SPL_FILE_VERSION,
                                    .header_bytes = sizeof(struct spl_file_header),
                                    .section_count = (uint32_t)count}};
     uint64_t offset = SPL_FILE_ALIGNMENT;
     for (int i = 0; i < count; i++) {
-        int from = i < plain_sections ? (i + 3) % plain_sections : i; /* the input has the page behind CHNK */
-        head.table[i] = (struct spl_section){.type = types[i],
-                                             .index = i > 0 && types[i] == types[i - 1],
+        uint64_t alignment = parts[i].type == SPL_SECTION_PAGE ? SPL_FILE_ALIGNMENT : 64;
+        offset = (offset + alignment - 1) / alignment * alignment;
+        head.table[i] = (struct spl_section){.type = parts[i].type,
+                                             .index = parts[i].index,
                                              .offset = offset,
-                                             .bytes = wanted[from],
-                                             .hash = XXH3_64bits(part[from], wanted[from])};
-        offset = (offset + wanted[from] + 63) / 64 * 64;
+                                             .bytes = parts[i].size,
+                                             .hash = XXH3_64bits(parts[i].bytes, parts[i].size)};
+        offset += parts[i].size;
     }
+    offset = (offset + 63) / 64 * 64;
     head.header.table_offset = offset;
     head.header.file_bytes = *length = offset + table_bytes;
     uint8_t *file = calloc(1, *length); /* of its exact size, so that a sanitiser sees one byte too many */
     spl_assert(file);
-    for (int i = 0; i < count; i++) {
-        int from = i < plain_sections ? (i + 3) % plain_sections : i;
-        memcpy(file + head.table[i].offset, part[from], wanted[from]);
-    }
+    for (int i = 0; i < count; i++)
+        memcpy(file + head.table[i].offset, parts[i].bytes, parts[i].size);
     rehash(&head, table_bytes);
     for (unsigned i = 0; i < patch_count; i++) {
         size_t at = patches[3 * i] | (size_t)patches[3 * i + 1] << 8;
@@ -102,43 +127,40 @@ static uint8_t *lay_out(const uint8_t *data, size_t size, unsigned flags, const 
 }
 
 /* Of every page that may be read: codes within the dictionary, whose expansion fits its place. */
-static void decode_textures(const struct spl_dataset *dataset)
+static void decode_textures(const struct spl_dataset *dataset, const struct spl_tables *tables)
 {
-    uint64_t node_count, chunk_count;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(dataset);
     if (!dictionary->count)
         return;
     uint32_t *atoms = malloc(spl_dataset_get_info(dataset)->dictionary_bytes);
     spl_dictionary_expand(dictionary, atoms);
     free(atoms);
-    for (uint64_t n = 0; n < node_count; n++) {
-        uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, nodes[n].page));
-        bool readable = !spl_dataset_read_textures(dataset, nodes[n].page, words, NULL);
-        for (uint64_t c = nodes[n].first_chunk; readable && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
-            struct spl_chunk_code code;
-            uint32_t texture = spl_dataset_get_chunk_textures(dataset)[c];
-            spl_texture_decode(words + spl_texture_word(texture), spl_texture_planes(texture), chunks[c].count, &code);
-            for (uint32_t i = 0; i < code.splats; i++)
-                for (uint32_t t = 0; t < code.splat[i].count; t++)
-                    spl_assert(code.splat[i].atom[t] < dictionary->count && isfinite(code.plane[t].step));
-        }
-        free(words);
+    uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, tables->page));
+    bool readable = !spl_dataset_read_textures(dataset, tables->page, words, NULL);
+    for (uint32_t c = 0; readable && c < tables->chunk_count; c++) {
+        struct spl_chunk_code code;
+        uint32_t texture = tables->textures[c];
+        spl_texture_decode(words + spl_texture_word(texture), spl_texture_planes(texture), tables->chunks[c].count,
+                           &code);
+        for (uint32_t i = 0; i < code.splats; i++)
+            for (uint32_t t = 0; t < code.splat[i].count; t++)
+                spl_assert(code.splat[i].atom[t] < dictionary->count && isfinite(code.plane[t].step));
     }
+    free(words);
 }
 
 /* Every code of every stream, and the same by the splat's id. */
-static void decode_streams(const struct spl_dataset *dataset, const struct spl_chunk *chunk, uint64_t index,
+static void decode_streams(const struct spl_dataset *dataset, const struct spl_tables *tables, uint32_t index,
                            const uint32_t *page)
 {
     uint32_t count;
     const struct spl_stream *streams = spl_dataset_get_streams(dataset, &count);
+    const struct spl_chunk *chunk = &tables->chunks[index];
     for (uint32_t s = 0; s < count; s++) {
-        struct spl_stream_code code = {streams[s].base[index], streams[s].width[index]};
+        struct spl_stream_code code = {tables->base[s][index], tables->width[s][index]};
         enum spl_stream_type type = spl_stream_type_from_name(streams[s].type);
         const uint32_t *words =
-            page + chunk->geometry_word + spl_chunk_words(chunk) + spl_dataset_get_stream_words(dataset, s, index);
+            page + chunk->geometry_word + spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, s, index);
         for (uint32_t i = 0; i < chunk->count; i++) {
             double value = spl_stream_decode(type, code, words, i), found = -1;
             spl_assert(type == SPL_STREAM_UNKNOWN ? isnan(value) : value >= 0 && isfinite(value));
@@ -150,35 +172,58 @@ static void decode_streams(const struct spl_dataset *dataset, const struct spl_c
     }
 }
 
+static void decode_chunk(const struct spl_chunk *chunk, const uint32_t *page, bool leaf, uint64_t *linear)
+{
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        struct spl_splat s;
+        spl_chunk_decode(chunk, page, i, &s);
+        *linear += s.linear && leaf && spl_chunk_kind(chunk) == SPL_CHUNK_DISCS;
+        spl_assert(isfinite(s.position[0]) && isfinite(s.position[1]) && isfinite(s.position[2]));
+        spl_assert(s.radius > 0 && isfinite(s.radius));
+        float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];
+        spl_assert(fabsf(length - 1) < 1e-5f);
+        spl_assert(isfinite(s.clip.direction[0] + s.clip.direction[1] + s.clip.direction[2]));
+        spl_assert(s.clip.offset >= 0 && s.clip.offset <= 1);
+    }
+}
+
+/* A page whose tables can be read. Children, on whatever page, have larger numbers than their parent. */
+static void decode_page(const struct spl_dataset *dataset, const struct spl_tables *tables, uint64_t *linear)
+{
+    size_t bytes = spl_dataset_get_page_bytes(dataset, tables->page);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    uint32_t *page = malloc(bytes);
+    spl_assert(!spl_dataset_read_page(dataset, tables->page, page, NULL));
+    for (uint32_t n = 0; n < tables->node_count; n++) {
+        const struct spl_node *node = &tables->nodes[n];
+        uint64_t number = tables->first_node + n;
+        spl_assert(!node->child_count || (node->first_child > number && node->child_count <= info->nodes &&
+                                          node->first_child <= info->nodes - node->child_count));
+        spl_assert(node->page == tables->page && spl_dataset_find_page_of_node(dataset, number) == tables->page);
+        uint32_t first = (uint32_t)(node->first_chunk - tables->first_chunk);
+        spl_assert(node->first_chunk >= tables->first_chunk && first + node->chunk_count <= tables->chunk_count);
+        for (uint32_t c = first; c < first + node->chunk_count; c++) {
+            decode_streams(dataset, tables, c, page);
+            decode_chunk(&tables->chunks[c], page, !node->child_count, linear);
+        }
+    }
+    free(page);
+    decode_textures(dataset, tables);
+}
+
 static void decode_all(const struct spl_dataset *dataset)
 {
     uint64_t linear = 0, decoded = 0;
-    uint64_t node_count, chunk_count;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    for (uint64_t n = 0; n < node_count; n++) {
-        size_t bytes;
-        const uint32_t *mapped = spl_dataset_get_page(dataset, nodes[n].page, &bytes);
-        uint32_t *page = malloc(bytes);
-        memcpy(page, mapped, bytes);
-        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
-            decode_streams(dataset, &chunks[c], c, page);
-            for (uint32_t i = 0; i < chunks[c].count; i++) {
-                struct spl_splat s;
-                spl_chunk_decode(&chunks[c], page, i, &s);
-                decoded += s.linear && !nodes[n].child_count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS;
-                spl_assert(isfinite(s.position[0]) && isfinite(s.position[1]) && isfinite(s.position[2]));
-                spl_assert(s.radius > 0 && isfinite(s.radius));
-                float length = s.normal[0] * s.normal[0] + s.normal[1] * s.normal[1] + s.normal[2] * s.normal[2];
-                spl_assert(fabsf(length - 1) < 1e-5f);
-                spl_assert(isfinite(s.clip.direction[0] + s.clip.direction[1] + s.clip.direction[2]));
-                spl_assert(s.clip.offset >= 0 && s.clip.offset <= 1);
-            }
-        }
-        free(page);
+    bool all = true;
+    for (uint32_t page = 0; page < spl_dataset_get_info(dataset)->pages; page++) {
+        struct spl_tables *read;
+        const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, page, &read, NULL);
+        if (tables)
+            decode_page(dataset, tables, &decoded);
+        all &= tables != NULL;
+        free(read);
     }
-    spl_assert(!spl_dataset_count_linear(dataset, &linear, NULL) && linear == decoded);
-    decode_textures(dataset);
+    spl_assert(!spl_dataset_count_linear(dataset, &linear, NULL) == all && (!all || linear == decoded));
     struct spl_camera camera;
     spl_assert(!spl_dataset_get_default_camera(dataset, 640, 480, &camera, NULL));
 }
@@ -192,7 +237,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct spl_dataset_source source = spl_dataset_source_of_memory(file, length);
     struct spl_dataset *dataset;
     struct spl_error err = {0};
-    int rc = spl_dataset_open_source(&source, "container", data[0] & flag_verify, NULL, &dataset, &err);
+    const struct spl_dataset_opening how = {.verify = data[0] & flag_verify,
+                                            .tables_bytes = data[0] & flag_by_page ? 0 : SPL_TABLES_BYTES};
+    int rc = spl_dataset_open_source_as(&source, "container", &how, &dataset, &err);
     spl_assert((rc == SPL_OK) == (dataset != NULL) && (rc == SPL_OK) == (err.message[0] == 0));
     spl_assert(rc == SPL_OK || rc == SPL_E_CORRUPT || rc == SPL_E_UNSUPPORTED || rc == SPL_E_INPUT);
     if (dataset)

@@ -123,8 +123,8 @@ static void images_that_do_not_fit_are_refused(void **state)
     struct spl_view view = looking(1);
     static uint32_t pixels[width * height + 1];
     const struct spl_image good = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, width, height, pixels};
-    struct spl_image bad[9];
-    for (int i = 0; i < 9; i++)
+    struct spl_image bad[10];
+    for (int i = 0; i < 10; i++)
         bad[i] = good;
     bad[0].layer = SPL_LAYER_COUNT;
     bad[1].layer = SPL_LAYER_DEPTH; // whose pixels are floats
@@ -136,11 +136,12 @@ static void images_that_do_not_fit_are_refused(void **state)
     bad[7].row_bytes = 4 * width + 2;
     bad[8].layer = SPL_LAYER_ID; // which the view below lacks
     bad[8].type = SPL_PIXEL_U32;
+    bad[9].row_bytes = SIZE_MAX / 4 + 1; // whose fourth row would be the first again
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH;
-    for (int i = 0; i < 9; i++) {
+    for (int i = 0; i <= 10; i++) {
         struct spl_error err = {0};
         struct spl_frame frame;
-        struct spl_render_options options = {.size = sizeof options, .images = &bad[i], .image_count = 1};
+        struct spl_render_options options = {.size = sizeof options, .images = i < 10 ? &bad[i] : NULL, .image_count = 1};
         assert_int_equal(spl_renderer_render_with(renderer, dataset, &view, &options, &frame, &err), SPL_E_USAGE);
         assert_string_equal(err.field, "images");
         assert_null(frame.images[SPL_LAYER_DEPTH].pixels);

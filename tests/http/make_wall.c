@@ -1,6 +1,7 @@
-/* make_wall [--small | --large | --textured | --knot] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
+/* make_wall [--small | --large | --textured | --knot | --tree] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
  * half; --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16
- * atoms. --knot makes what once took long to open. */
+ * atoms. --knot makes what once took long to open, --tree a ground of
+ * several levels on many small pages. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 #include "support/make_dataset.h"
 #include "support/make_knot.h"
 #include "support/make_textures.h"
+#include "support/make_tree.h"
 
 enum { side_usual = 40, side_large = 600 };
 
@@ -41,6 +43,11 @@ int main(int argc, char **argv)
     }
     if (argc > 2 && !strcmp(kind, "--knot")) {
         make_knot_file(argv[2], 500000);
+        free(splats);
+        return 0;
+    }
+    if (argc > 2 && !strcmp(kind, "--tree")) {
+        make_tree_file(argv[2], 200000, 20000);
         free(splats);
         return 0;
     }

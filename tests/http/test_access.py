@@ -111,6 +111,11 @@ def test_a_signed_url_is_good_for_what_it_says():
             reply = d.ask(path)
             assert reply.status in (401, 403), (path, reply.status)
             assert reply.status == 401 or reply.json()["field"] in ("sig", "exp"), reply.body
+        for path in (url + "&x=1", url.replace("&exp", "&x=1&exp") + "&", url + "&x=1&y=2"):
+            reply = d.ask(path)
+            assert reply.status == 401 and reply.json()["field"] == "sig", (path, reply.body)
+            assert "signature does not match" in reply.json()["detail"], reply.body
+        assert "signature" not in d.ask(SMALL).json()["detail"]
         assert d.ask(url, "POST", "{}").status == 401
         assert d.ask(sign(d, "/v1/datasets/none")).status == 404
         short = sign(d, SMALL, "1s")

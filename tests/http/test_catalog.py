@@ -42,6 +42,14 @@ def small(d, name, **kw):
     return d.ask(fresh(f"/v1/datasets/{name}/view?width=16&height=16"), **kw)
 
 
+def test_what_its_disk_did_not_give_in_time_is_tried_again():
+    with folder() as home, Daemon(FAKE, *WATCH, datasets=[home], FAKE_LOAD_LATE=2) as d:
+        put(home, "a", wall())
+        eventually(lambda: "no page has come" in listed(d).get("a", {}).get("reason", ""))
+        eventually(lambda: listed(d)["a"]["state"] == "ready")
+        assert small(d, "a").status == 200
+
+
 def test_an_empty_directory_fills_up():
     with folder() as home, Daemon(REAL, *WATCH, datasets=[home]) as d:
         assert listed(d) == {} and d.ask("/").json()["views"] == []

@@ -239,4 +239,45 @@ def test_headers_that_are_not_what_they_seem():
             assert wire.reply()[0] == 200 and wire.ended()
 
 
+def test_a_nul_in_the_first_line_is_refused():
+    """libmicrohttpd gives its parts as C strings, which end at the first NUL: the rest of a path, of a query, of a method."""
+    with with_tours() as d:
+        lines = [b"GET " + target + b" HTTP/1.1" for target in (
+            b"/v1/status\0junk", b"/v1/status\0", b"\0/v1/status", b"/v1/datasets/wall\0/../x", b"/v1/status?\0",
+            VIEW.encode() + b"?width=16&height=9&layer=id\0&bogus=1", VIEW.encode() + b"?width=16&height=9\0",
+            b"/v1/status?wid\0=1", b"/v1/status%00\0")]
+        lines += [b"GET\0junk /v1/status HTTP/1.1", b"GET\0 /v1/status HTTP/1.1", b"GET /v1/status HTTP/1.1\0junk"]
+        for line in lines:
+            for header in (b"Host: localhost\r\nX: 1\r\n", b"Host: localhost\r\n"):
+                with Wire(d) as wire:
+                    wire.send(line + b"\r\n" + header + b"\r\n", b"GET /v1/status HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    with contextlib.suppress(ConnectionResetError):
+                        while wire.more():
+                            pass
+                    assert re.match(rb"HTTP/1.[01] 4\d\d ", wire.buffer) and b" 200 " not in wire.buffer, (line, wire.buffer)
+        for plain in (b"GET /v1/status HTTP/1.1", b"GET  /v1/status HTTP/1.1", b"GET /v1/status?a=%00%41 HTTP/1.1"):
+            with Wire(d) as wire:
+                wire.send(plain + b"\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                status, _, text = wire.reply()
+                assert (status == 200 or b"'a'" in text or b"parameter" in text) and b"NUL" not in text, (plain, status, text)
+
+
+def test_a_last_reply_arrives_whole_whatever_is_sent_behind_it():
+    """Closing a socket with bytes unread resets it, and what it still had to send is lost."""
+    with Daemon(FAKE) as d:
+        expected = d.ask("/v1/openapi.json").body
+        assert len(expected) > 50000
+        for _ in range(3):
+            s = socket.socket()
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that much of the reply has still to be sent
+            s.settimeout(30)
+            s.connect(("127.0.0.1", d.port))
+            s.sendall(b"GET /v1/openapi.json HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" + b"x" * 40000)
+            received = b""
+            while got := s.recv(512):
+                received += got
+            s.close()
+            assert received.endswith(expected), len(received)
+
+
 run(globals())

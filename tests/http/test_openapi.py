@@ -57,7 +57,7 @@ def test_what_is_not_documented_is_found():
             return str(fault)
         return ""
     image, camera, used = {"Content-Type": "image/png"}, '{"eye": [0, 0]}', set(openapi.used)
-    index = b'{"name": "splatd", "version": "1", "openapi": "", "clients": "", "datasets": "", "status": "", "views": []}'
+    index = b'{"name": "splatd", "version": "1", "openapi": "", "clients": "", "datasets": "", "methods": "", "status": "", "views": []}'
     for request, said in [
         (("GET", "/", 200, {}, index), ""), (("HEAD", "/", 200), ""), (("GET", "/", 200, {}, b"{}"), "name"),
         (("GET", "/", 200, {}, index.replace(b"[]", b"5")), "views: 5 is not of type 'array'"),

@@ -186,6 +186,7 @@ def test_bare_points():
             fill = d.ask(f"{at}/pick?{camera}&x=32&y=24").json()
             assert abs(fill["depth"] - 3) < 0.05, fill
             assert d.ask(f"{at}/view?{camera}&layer=normal&method=points").json()["field"] == "layer"
+            assert d.ask(f"{at}/view?{camera}&layer=normal&method=points", method="HEAD").status == 400  # nothing is rendered for it
             assert d.ask(f"{at}/view?{camera}&layer=normal&budget=1ms").status == 200
             tags = {d.ask(f"{at}/view?{camera}&{extra}").headers["ETag"] for extra in ("", "kernel=9", "visibility=none")}
             assert len(tags) == 3, tags

@@ -48,7 +48,7 @@ def test_index_lists_what_there_is():
     with Daemon(REAL) as d:
         index = d.ask("/").json()
         assert index["name"] == "splatd" and VIEW in index["views"]
-        assert d.ask(index["datasets"]).status == 200 and d.ask(index["status"]).status == 200
+        assert all(d.ask(index[what]).status == 200 for what in ("datasets", "methods", "status"))
 
 
 def test_datasets_are_described():
@@ -65,6 +65,35 @@ def test_datasets_are_described():
         assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill", "nearest"]
         assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
+
+
+def test_methods_are_those_of_the_document():
+    """Names, ranges and defaults, as OpenAPI has them of a view."""
+    with Daemon(REAL) as d:
+        table = d.ask("/v1/methods").json()
+        view = openapi.resolve(openapi.DOCUMENT["components"]["schemas"]["ViewRequest"])["properties"]
+        document = {name: openapi.resolve(schema) for name, schema in view.items()}
+        names = [method["name"] for method in table["methods"]]
+        assert names == document["method"]["enum"] and table["default"] == document["method"]["default"] == names[0]
+        assert names == d.ask("/v1/datasets/wall").json()["methods"]
+        methods = {method["name"]: method for method in table["methods"]}
+        assert methods["splat"]["textures"] and not methods["points"]["textures"]
+        assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
+        assert methods["splat"]["parameters"] == ["margin", "atoms"] and methods["points"]["parameters"] == []
+        for parameter in table["parameters"]:
+            name, schema = parameter["name"], document[parameter["name"]]
+            assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \
+                {k: schema.get(k) for k in ("default", "maximum", "enum")}, parameter
+            assert parameter["type"] == schema.get("type", "string") and len(parameter["description"]) > 20, parameter
+            assert min(parameter.get("minimum", 0), parameter["default"]) == schema["minimum"] \
+                if "minimum" in schema else "enum" in parameter, parameter
+            assert any(name in method["parameters"] for method in table["methods"]), f"nothing takes {name}"
+            for value in parameter.get("enum", [parameter.get("minimum"), parameter.get("maximum"), parameter["default"]]):
+                assert d.view(method="points", width=8, height=8, **{name: value}).status == 200, (name, value)
+            beyond = "nothing" if "enum" in parameter else parameter["maximum"] + 1
+            assert d.view(width=8, height=8, **{name: beyond}).status == 400, (name, beyond)
+        assert {p["name"] for p in table["parameters"]} == {n for m in table["methods"] for n in m["parameters"]}
+        assert [p["name"] for p in table["parameters"] if p["textures"]] == ["atoms"]
 
 
 def test_status_says_how_it_is():
@@ -344,13 +373,7 @@ def test_openapi_knows_every_parameter_and_route():
     params = [[cell.strip() for cell in row.replace("\\\n", " ").split(",")] for row in
               re.findall(r"^    (?:REAL|COUNT|CHOICE)\(([^\"]+?),[\s\\\\]*\"", methods, re.M)]
     assert len(params) >= 6
-    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] == "1" else "")) for row in params]
-    document = openapi.DOCUMENT["components"]["schemas"]
-    assert document["Method"]["enum"] == re.findall(r"^    METHOD\(\w+, (\w+)\)", methods, re.M)
-    for name, *_, least, most, value, _ in (row for row in params if len(row) == 6 and row[3][0].isdigit()):
-        schema = document[name.capitalize()]
-        assert schema["default"] == float(value) and schema["maximum"] == float(most), name
-        assert schema["minimum"] == min(float(least), float(value)), name
+    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] == "SPL_CHANGES_SHAPES" else "")) for row in params]
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
     camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in

@@ -1,4 +1,5 @@
 """Views whose pages have still to be read: they wait, without holding up others, or do with what is there."""
+import contextlib
 import os
 import re
 import shutil
@@ -71,7 +72,9 @@ def test_a_view_that_waits_keeps_its_deadline_and_those_who_leave_give_up():
         assert d.stop() == 0
 
 
-def test_what_is_there_now():
+@contextlib.contextmanager
+def room_for_one_of_two():
+    """A daemon, its gate, a view of the one and of the other, and what takes the place of the first."""
     with tempfile.TemporaryDirectory() as home:
         textured = os.path.join(home, "a.spld")
         shutil.copy(TEXTURED, textured)
@@ -86,23 +89,46 @@ def test_what_is_there_now():
                 assert d.ask(f"{large}&near={1e-6 * next(fresh_near):.6f}").headers["Splatd-Complete"] == "true"
             fresh_near = iter(range(1, 100))
             drive_out()
-            reads.allow(1)  # the first page, which is waited for; its textures hang
-            body = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0, 1], "fov": 8}, "width": 64, "wait": False}
-            replies = [d.ask(f"{view}&wait=0"), d.ask(f"{view}&wait=0"), d.post(body, "/v1/datasets/a/view")]
-            for reply in replies:
-                assert reply.status == 200 and reply.headers["Splatd-Complete"] == "false", reply.headers
-                assert reply.headers["Splatd-Cache"] == "miss"
-                assert reply.headers["Cache-Control"] == "no-store" and "ETag" not in reply.headers
-            late = d.ask(view)
-            assert late.status == 503 and late.json()["type"].endswith(":timeout"), late.body
-            reads.allow_all()
-            eventually(lambda: d.ask(f"{view}&wait=0").headers["Splatd-Complete"] == "true")
-            whole = d.ask(f"{view}&wait=0")
-            waited = d.ask(view)
-            assert waited.headers["Splatd-Cache"] == whole.headers["Splatd-Cache"] == "hit"
-            assert waited.headers["ETag"] == whole.headers["ETag"] and waited.body == whole.body != replies[0].body
-            drive_out()
-            assert d.ask(f"{view}&near=0.5&wait=1").headers["Splatd-Complete"] == "true"
+            yield d, reads, view, drive_out
+
+
+def test_what_is_there_now():
+    with room_for_one_of_two() as (d, reads, view, drive_out):
+        reads.allow(1)  # the first page, which is waited for; its textures hang
+        body = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0, 1], "fov": 8}, "width": 64, "wait": False}
+        replies = [d.ask(f"{view}&wait=0"), d.ask(f"{view}&wait=0"), d.post(body, "/v1/datasets/a/view")]
+        for reply in replies:
+            assert reply.status == 200 and reply.headers["Splatd-Complete"] == "false", reply.headers
+            assert reply.headers["Splatd-Pending"] == "true"
+            assert reply.headers["Splatd-Cache"] == "miss"
+            assert reply.headers["Cache-Control"] == "no-store" and "ETag" not in reply.headers
+        late = d.ask(view)
+        assert late.status == 503 and late.json()["type"].endswith(":timeout"), late.body
+        reads.allow_all()
+        eventually(lambda: d.ask(f"{view}&wait=0").headers["Splatd-Pending"] == "false")
+        whole = d.ask(f"{view}&wait=0")
+        waited = d.ask(view)
+        assert waited.headers["Splatd-Cache"] == whole.headers["Splatd-Cache"] == "hit"
+        assert waited.headers["ETag"] == whole.headers["ETag"] and waited.body == whole.body != replies[0].body
+        drive_out()
+        assert d.ask(f"{view}&near=0.5&wait=1").headers["Splatd-Complete"] == "true"
+
+
+def test_a_daemon_ends_though_a_read_hangs():
+    with room_for_one_of_two() as (d, reads, view, _):
+        reads.allow(0)
+        assert d.ask(view).json()["type"].endswith(":timeout")
+        began = time.monotonic()
+        assert d.stop() == 0
+        assert time.monotonic() - began < 20
+
+
+def test_head_of_what_is_there_now_promises_nothing():
+    with Daemon(FAKE) as d:
+        for query, promised in (("", True), ("&wait=1", True), ("&wait=0", False)):
+            reply = d.ask(f"{VIEW}?{LOOK}{query}", method="HEAD")
+            assert reply.status == 200 and ("ETag" in reply.headers) == promised, (query, reply.headers)
+            assert (reply.headers["Cache-Control"] == "no-store") != promised, (query, reply.headers)
 
 
 def test_what_wait_may_be():

@@ -66,6 +66,18 @@ def the_python_example(lib, dataset, folder):
     print(said, end="")
 
 
+def the_reader_example(lib, dataset):
+    """Cancelled before the end, then opened whole, by the same reads."""
+    said = lib.run(sys.executable, EXAMPLES / "reader.py", dataset)
+    stopped = re.search(r"^cancelled after (\d+) of (\d+) bytes$", said, re.M)
+    assert stopped and 0 < int(stopped[1]) < int(stopped[2]) == dataset.stat().st_size, said
+    assert re.search(r"^courtyard: \d+ splats of \d+ points, through our own reads$", said, re.M), said
+    wrong = subprocess.run([sys.executable, EXAMPLES / "reader.py", EXAMPLES / "view.py"], env=lib.environment,
+                           capture_output=True, text=True)
+    assert wrong.returncode == 1 and wrong.stderr.startswith("reader: view.py"), wrong
+    print(said, end="")
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -78,6 +90,7 @@ def main():
         lib = Installed(folder / "installed")
         for check in (the_c_example, the_python_example):
             check(lib, dataset, folder)
+        the_reader_example(lib, dataset)
     return 0
 
 

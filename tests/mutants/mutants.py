@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Faults of one line that a test must notice: tests/mutants/ROOM.toml lists them, each with the file, the text that
 stands there once, the text of the fault, and the tests that fail with it. A fault that lives is a test that is missing.
 
@@ -114,6 +115,7 @@ class Copy:
 
     def __init__(self, root, folder):
         self.tree, self.build = folder / "tree", folder / "build"
+        self.took, self.limits = {}, {}  # seconds of each test without a fault; its time limit
         names = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root,
                                stdout=subprocess.PIPE, check=True, text=True).stdout.split("\0")
         for name in filter(None, names):
@@ -127,15 +129,28 @@ class Copy:
         if not (self.build / "build.ninja").is_file():
             subprocess.run(["meson", "setup", str(self.build), str(self.tree)], check=True, stdout=subprocess.DEVNULL)
 
+    def patience(self, tests):
+        """Multiple of the tests' time limits that is waited for: 4 at first, then a minute and ten times what they took
+        without a fault, since many a fault hangs and some limits are minutes."""
+        if not all(test in self.took for test in tests):
+            return 4
+        if not self.limits:
+            told = subprocess.run(["meson", "introspect", "--tests", str(self.build)], stdout=subprocess.PIPE, check=True)
+            self.limits = {test["name"]: test["timeout"] for test in json.loads(told.stdout)}
+        return min(4, max((60 + 10 * self.took[test]) / (self.limits.get(test) or 30) for test in tests))
+
     def run(self, tests):
         """Builds what the tests need and runs them: their results by name, or None where that does not build."""
         log = self.build / "meson-logs" / "testlog.json"
         log.unlink(missing_ok=True)
-        subprocess.run(["meson", "test", "-C", str(self.build), "--timeout-multiplier", "4", *tests], stdout=subprocess.DEVNULL,
+        subprocess.run(["meson", "test", "-C", str(self.build), "--timeout-multiplier",
+                        str(self.patience(tests)), *tests], stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL, check=False)
         if not log.is_file():
             return None
         rows = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+        for row in rows:
+            self.took.setdefault(row["name"].split(" / ")[-1], row["duration"])
         return {row["name"].split(" / ")[-1]: row["result"] for row in rows}
 
 

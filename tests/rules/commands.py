@@ -27,6 +27,8 @@ if sorted(commands) != sorted("serve pack render tour info synth bench compare d
     wrong.append(f"splatd --help lists {commands}")
 for command in commands:
     text = check([command, "--help"], 0, "stdout")
+    if re.search(r" $", text, re.MULTILINE):
+        wrong.append(f"splatd {command} --help has lines that end in blanks")
     if len(re.findall(rf"^\s+(?:\S+ )*splatd {command}\b", text, re.MULTILINE)) < 2:
         wrong.append(f"splatd {command} --help shows fewer than two examples")
     check([command, "--no-such-option"], 2, "stderr")
@@ -54,7 +56,16 @@ for words, wanted in {
     "render a.spld --format png -o b.spld": r"ends in \.png", "render a.spld --format png -o b.jpg": r"ends in \.png",
     "render a.spld --memory-limit 1X -o b.png": "K, M, G or T",
     "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
-    "render a.spld -o": "requires an argument.*\n.*splatd render --help",
+    "render a.spld -o": "requires an argument, FILE.*splatd render --help",
+    "tour a.spld --pth b -o c": "did you mean --path", "render a.spld --superample 2 -o b.png": "did you mean --supersample",
+    "render a.spld --layer colour -o b.png": "--layer takes color, depth.* or coverage, not 'colour'",
+    "tour a.spld --path b --format gif -o c": "--format takes jpeg, png.*, not 'gif'",
+    "render a.spld --visibility x -o b.png": "--visibility takes adaptive, constant or none, not 'x'",
+    "tour a.spld --path b --ease up -o c": "--ease takes none, in, out or in-out, not 'up'",
+    "render a.spld --eye 1,2 -o b.png": "--eye takes three numbers X,Y,Z, not '1,2'",
+    "tour a.spld --require-gpu=no --path b -o c": "--require-gpu takes no argument",
+    "serve nosuch": r"nosuch: there is no such file or directory of datasets.*splatd pack",
+    "sign /v1/datasets/a/view --key nosuch": "nosuch.*openssl rand -hex 32",
 }.items():
     said = check(words.split(), 2, "stderr")
     if not re.search(wanted, said):

@@ -1,4 +1,5 @@
-"""The documents of the tree: no table is cut or ragged, what is linked exists, JSON in them is JSON.
+"""The documents of the tree: no table is cut or ragged, what is linked exists, JSON in them is JSON, tests that a table
+says fail (column "what fails without it") exist: `meson test` leaves out a name that it does not know.
 
 usage: documents.py ROOT        prints each violation as FILE:LINE: what, exit 1 if there are any
        documents.py --self-test plants every kind of violation and checks that it is found
@@ -69,12 +70,43 @@ def fences(text):
             yield text[: found.start()].count("\n") + 1 + getattr(error, "lineno", 0), f"no JSON: {error}"
 
 
+def tests_of(root):
+    """Words that tests' meson files spell out, of which names are made, and the functions of C tests."""
+    files = [path for path in root.rglob("tests/**/*") if path.name == "meson.build" or path.suffix == ".c"]
+    text = {path: path.read_text(encoding="utf-8", errors="replace") for path in files}
+    words = {word.strip("-") for path in files if path.name == "meson.build"
+             for word in re.findall(r"'([\w./-]+)'", text[path])}
+    functions = {name for path in files for name in re.findall(r"^static void (\w+)\(", text[path], re.M)}
+    return words | {"vulkan", "egl"}, functions
+
+
+def is_test(name, words):
+    """Spelled out, or PREFIX-REST of words that are."""
+    parts = name.split("-")
+    return name in words or any("-".join(parts[:i]) in words and "-".join(parts[i:]) in words
+                                for i in range(1, len(parts)))
+
+
+def named_tests(lines, words, functions):
+    inside = False
+    for number, line in prose(lines):
+        if not line.startswith("|"):
+            inside = False
+        elif line.rstrip().endswith("| what fails without it |"):
+            inside = True
+        elif inside:
+            for name in re.findall(r"`([\w-]+)`", line.rstrip().rstrip("|").rpartition("|")[2]):
+                if not is_test(name, words) and name not in functions:
+                    yield number, f"no test '{name}'"
+
+
 def violations(root):
+    known = tests_of(root)
     files = sorted(file for file in root.rglob("*.md") if not re.match(r"build|\.", file.relative_to(root).parts[0]))
     for path in files:
         text = path.read_text(encoding="utf-8")
         lines = text.splitlines()
-        for number, what in [*tables(lines), *links(path, lines), *fences(text)]:
+        for number, what in [*tables(lines), *links(path, lines), *fences(text), *named_tests(lines, *known)]:
             yield f"{path.relative_to(root)}:{number}: {what}"
 
 
@@ -88,11 +120,15 @@ def self_test():
         "leads nowhere": "[x](c.md)\n",
         "has no heading": "[x](b.md#c)\n",
         "this file has no heading": "[x](#c)\n",
+        "no test 'units'": "| a | what fails without it |\n|---|---|\n| `x` | `unit-b`, `units` (`holds`) |\n",
         "no JSON": "```json\n{1}\n```\n",
     }
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         (root / "b.md").write_text("# B\n")
+        (root / "tests").mkdir()
+        (root / "tests/meson.build").write_text("test('unit-' + name, {'b': files('b.c')})\n")
+        (root / "tests/b.c").write_text("static void holds(void **state)\n")
         (root / "a.md").write_text(good)
         found = list(violations(root))
         assert not found, found

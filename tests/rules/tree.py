@@ -18,9 +18,20 @@ OUTSIDE = [(re.compile(r"^(vulkan|GL|GLES\d?|EGL|KHR)/"), "gpu"), (re.compile(r"
 # A public header includes public headers and these.
 PLAIN_C = {"stdbool.h", "stddef.h", "stdint.h", "stdio.h", "math.h"}
 LONGEST = 800
-# A method's name stands in its own file, in the table and in tests; everyone else asks the table.
+# A method's name stands in its own file, in the table, beside its kernels, in documents and in tests; everyone else asks the
+# table, the page and scripts that are shipped among them.
 METHODS = pathlib.PurePath("include/splatd/method.h")
 METHOD_FILES = pathlib.PurePath("src/render/methods")
+METHOD_PLACES = (METHODS, pathlib.PurePath("shaders/meson.build"))
+METHOD_TOPS = ("src", "include", "shaders", "api", "deploy", ".ci")
+DOCUMENTS = (".md", ".ipynb", ".svg", ".css")
+INTERFACE = pathlib.PurePath("api/openapi.yaml")
+# Words that mean something else where nothing speaks of methods: a scan's points, one splat.
+HOMONYMS = {"points", "splat"}
+CODE = (".c", ".h", ".def")
+COMMENTS = {**dict.fromkeys((".c", ".h", ".def", ".glsl", ".comp", ".js"), r"/\*.*?\*/|(?<!:)//[^\n]*"), ".html": r"<!--.*?-->",
+            **dict.fromkeys((".py", ".sh", ".yaml", ".yml", ".conf", ".build", ".txt", ""), r"(?m)(?:^|(?<=\s))#.*$")}
+EXAMPLE = re.compile(r'"\s*splatd \w+ ')  # a line of --help that shows a command; tests/e2e runs those
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX)\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
@@ -46,29 +57,78 @@ def check_include(path, parts, bracket, header):
     return None
 
 
-def check_methods(relative, line, names):
-    """The method that `line` names where nobody but its own file and the table may, or None."""
-    if relative == METHODS or relative.parent == METHOD_FILES or relative.parts[0] not in ("src", "include", "shaders"):
+def without_comments(text, suffix):
+    """The same lines, without what is said about them."""
+    return re.sub(COMMENTS.get(suffix, r"(?!)"), lambda found: "\n" * found[0].count("\n"), text, flags=re.S)
+
+
+def method_patterns(names):
+    """What names a method: (the suffixes of files that it counts in, None for all; a pattern with the group "name")."""
+    every, rare = "|".join(names) or "(?!)", "|".join(name for name in names if name not in HOMONYMS) or "(?!)"
+    no_file_or_call = r"\b(?!\.\w|\()"
+    any_name, own = rf"(?P<name>{every}){no_file_or_call}", rf"(?P<name>{rare}){no_file_or_call}"
+    upper = rf"(?P<name>{every.upper()})\b"
+    web, quote, inside = (".js", ".html"), "[\"'`]", "[^\"'`]*"
+    return [(suffixes, re.compile(pattern)) for suffixes, pattern in (
+        (None, rf"\bSPL_METHOD_{upper}"),
+        (None, rf"\bspl_method_{any_name}"),
+        # method=NAME, method: "NAME", method === 'NAME', ["method", "NAME"], method NAME
+        (None, rf"(?<![a-zA-Z])(?i:methods?)\b[\"'\])]*\s*(?:[!=]?==?|:|,|\?\?|\+=|\bis\b)?\s*[\[({{]*{quote}?{any_name}"),
+        # a string that is the name, or has it where methods are spoken of
+        (None, rf"{quote}{own}{quote}"),
+        (None, rf"(?i:methods?)\b.*{quote}(?:{inside}\W)?{any_name}{inside}{quote}"),
+        (None, rf"{quote}(?:{inside}\W)?{any_name}{inside}{quote}.*(?i:\bmethods?)\b"),
+        # NAME, NAME
+        (None, rf"\b{any_name}{quote}?,\s*{quote}?(?:{rare})\b{quote}?(?:,|$|[\])}}\s;])"),
+        (None, rf"\b{own}{quote}?,\s*{quote}?(?:{every})\b{quote}?(?:,|$|[\])}}\s;])"),
+        (web, rf">\s*{any_name}\s*<"),
+        (web, rf"\b(?:const|let|var)\s+{upper}"),
+        (web, rf"[{{,]\s*{own}\s*:"),
+        (web, rf"\.{own}"),
+        (CODE, rf"^\s*#\s*define\s+{upper}"),
+        (CODE, rf"(?:->|\.)(?P<name>{rare})\.\w"),  # a parameter of its own
+    )]
+
+
+def check_methods(relative, line, patterns):
+    """What is wrong with `line`, without its comments: it names a method where nobody but the table may; or None."""
+    if EXAMPLE.search(line):
         return None
-    found = re.search(r"\bSPL_METHOD_(%s)\b" % "|".join(names), line) if names else None
-    return f"names method {found[1].lower()}; ask its row (include/splatd/method.h)" if found else None
+    for suffixes, pattern in patterns:
+        drawing = suffixes == CODE and relative.parts[:2] == ("src", "render")  # what methods share lies beside them
+        found = pattern.search(line) if not suffixes or relative.suffix in suffixes and not drawing else None
+        if found:
+            return f"names method {found['name'].lower()}; ask its row (include/splatd/method.h; over HTTP /v1/methods)"
+    return None
+
+
+def names_methods(relative, names):
+    """May the file name methods, or is it none that is shipped?"""
+    own = relative.parts[0] == "shaders" and any(relative.name.startswith(name) for name in names)
+    return relative.parts[0] not in METHOD_TOPS or relative in METHOD_PLACES or relative.parent == METHOD_FILES or own or \
+        relative == INTERFACE or relative.suffix in DOCUMENTS
 
 
 def violations(root):
     table = root / METHODS
     rows = re.findall(r"^    METHOD\((\w+), (\w+)\)", table.read_text(encoding="utf-8"), re.M) if table.exists() else []
-    for _, name in rows:
+    names = [name for _, name in rows]
+    patterns, any_method = method_patterns(names), re.compile("|".join(names) or "(?!)", re.I)
+    for name in names:
         if not (root / METHOD_FILES / f"{name}.c").exists():
             yield f"{METHODS}:1: method {name} has no file {METHOD_FILES}/{name}.c"
-    for path in sorted(p for top in ("include", "src", "shaders", "tests", "deploy") for p in (root / top).rglob("*")):
+    for path in sorted(p for top in (*METHOD_TOPS, "tests") for p in (root / top).rglob("*")):
         relative = path.relative_to(root)
         parts = relative.parts
         if not path.is_file() or parts[:2] == ("tests", "rules") or parts[:3] == ("tests", "fuzz", "corpus"):
             continue
         try:
-            lines = path.read_text(encoding="utf-8").splitlines()
+            text = path.read_text(encoding="utf-8")
         except UnicodeDecodeError:
             continue  # an image or a recorded scan
+        lines = text.splitlines()
+        said = [] if names_methods(relative, names) else without_comments(text, path.suffix).splitlines()
+        named = {number for number, line in enumerate(said, 1) if any_method.search(line)}
         source = path.suffix in (".c", ".h", ".def", ".glsl", ".comp")
         code = source or path.suffix in (".sh", ".py", ".build")
         if source and len(lines) > LONGEST:
@@ -78,7 +138,7 @@ def violations(root):
                 yield f"{relative}:{number}: left open: {line.strip()}"
             found = INCLUDE.match(line) if source else None
             wrong = check_include(relative, parts, *found.groups()) if found else None
-            wrong = wrong or (check_methods(relative, line, [name for name, _ in rows]) if source else None)
+            wrong = wrong or (check_methods(relative, said[number - 1], patterns) if number in named else None)
             if wrong:
                 yield f"{relative}:{number}: {wrong}"
 
@@ -100,6 +160,33 @@ PLANTED = {  # file: (content, the start of what must be said; None = nothing)
                                 "method fog has no file"),
     "src/render/methods/dots.c": ("enum spl_method own = SPL_METHOD_DOTS;\n", None),
     "src/measure/dots.c": ("bool is = method == SPL_METHOD_DOTS || SPL_METHOD_COUNT;\n", "names method dots"),
+    "src/measure/row.c": ("return &spl_method_dots;\n", "names method dots"),
+    "src/measure/own.c": ("double d = view.dots.density;\n", "names method dots"),
+    "src/cmd/list.c": ('{"method", "LIST", "such as fog,dots"},\n', "names method dots"),
+    "src/cmd/default.c": ('{"method", .otherwise = "dots; all with -o"},\n', "names method dots"),
+    "src/cmd/told.c": ('puts("no normals; method dots draws it");\n', "names method dots"),
+    "src/service/compare.c": ('if (!strcmp(text, "dots"))\n', "names method dots"),
+    "src/service/macro.h": ("#define DOTS 1\n", "names method dots"),
+    "src/measure/start.html": ("<script>\nconst i = all.findIndex(p => p.method === 'dots' && p.lod === 1);\n", "names method dots"),
+    "api/viewer/option.html": ("<select><option>dots</option></select>\n", "names method dots"),
+    "api/viewer/chosen.js": ('const used = frame.chosen ?? {method: "dots", lod: 1};\n', "names method dots"),
+    "api/viewer/constant.js": ('export const DOTS = ["density"];\n', "names method dots"),
+    "api/viewer/bare.js": ("choices(names.includes(m) ? m : 'dots');\n", "names method dots"),
+    "api/viewer/key.js": ("const colours = {fog: 1};\n", "names method fog"),
+    "api/viewer/member.js": ("offer(table.dots);\n", "names method dots"),
+    "api/clients/draw.py": ('hall.view(method="dots")\n', "names method dots"),
+    "api/clients/draw.sh": ('curl "$url/view?lod=1&method=dots"\n', "names method dots"),
+    "deploy/warm.sh": ("splatd render hall.spld --method dots\n", "names method dots"),
+    "deploy/warm.yaml": ("bench:\n  draws: [fog, dots]\n", "names method fog"),
+    "deploy/board.json": ('{"method": "dots"}\n', "names method dots"),
+    "deploy/splatd.env": ("SPLATD_METHOD=dots\n", "names method dots"),
+    "shaders/common/pick.glsl": ("if (method == SPL_METHOD_DOTS) discard;\n", "names method dots"),
+    "shaders/meson.build": ("kernels += {'dots_depth': 'splats', 'dots': 'splats'}\n", None),
+    "shaders/dots_depth.comp": ("// of method dots\n", None),
+    "api/methods.md": ("Method dots draws dots.\n", None),
+    "api/viewer/other.js": ("// method dots is like this\nrow.fog(); array.dots(0); open('dots.js');\n", None),
+    "src/cmd/example.c": ('"  splatd render hall.spld --method dots -o view.png\\n"\n', None),
+    "tests/unit/dots.c": ("assert(SPL_METHOD_DOTS);\n", None),
     "src/service/good.c": ('#include <uv.h>\n#include <splatd/render.h>\n#include "render/frame.h"\n', None),
     "src/gpu/vulkan/good.c": ('#include <vulkan/vulkan.h>\n#include "gpu/gpu.h"\n#include "shared.h"\n', None),
     "src/cloud/good.c": ('#include "geom/morton.h"\n#include "base/error.h"\n', None),

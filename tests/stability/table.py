@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """The stability table for people: what table.json holds, as Markdown between two marks in tests/bench/RESULTS.md.
 
 usage: table.py --update STABILITY [NAME] [--method METHOD] [--whole]   measures anew with that program, then writes both

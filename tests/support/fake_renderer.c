@@ -1,8 +1,8 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
  * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), in steps of a
  * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
- * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_READS_ON times
- * that a dataset cannot be removed as a page of it is being read, and FAKE_HANG_MS that the first frame
+ * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
+ * takes to put them on the device, and FAKE_HANG_MS that the first frame
  * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
  * its own code. */
 #include <splatd/render.h>
@@ -19,9 +19,7 @@
 struct spl_renderer {
     struct spl_device_info device;
     bool lose_next, lost, hung;
-    void (*wake)(void *context);
-    void *wake_context;
-    long read_on; /* how often a dataset could not be removed */
+    long uploads;
 };
 
 static long setting(const char *name, long otherwise)
@@ -40,8 +38,6 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
         return SPL_E_NOMEM;
     (*out)->device =
         (struct spl_device_info){.backend = "fake", .name = "flat colour", .driver = "tests", .software = true};
-    (*out)->wake = options->wake;
-    (*out)->wake_context = options->wake_context;
     return 0;
 }
 
@@ -69,35 +65,29 @@ void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset
     (void)dataset;
 }
 
-bool spl_renderer_try_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset)
-{
-    spl_renderer_remove(renderer, dataset);
-    if (renderer->read_on++ >= setting("FAKE_READS_ON", 0))
-        return true;
-    usleep(1000);
-    renderer->wake(renderer->wake_context); // as after each read
-    return false;
-}
-
 int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err)
 {
-    (void)renderer;
     (void)err;
+    renderer->uploads++;
     return 0;
 }
 
 bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns)
 {
-    (void)renderer;
-    (void)deadline_ns;
-    usleep(1000);
+    if (renderer->uploads < setting("FAKE_UPLOADS", 0))
+        return true;
+    if (spl_remaining_ns(deadline_ns))
+        usleep(1000);
     return false;
 }
 
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err)
 {
+    static long late;
     *more = false;
+    if (late++ < setting("FAKE_LOAD_LATE", 0))
+        return spl_fail(err, SPL_E_TIMEOUT, "no page has come for 10 s");
     *page = 1;
     return spl_renderer_add(renderer, dataset, err);
 }
@@ -175,12 +165,14 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
             fill(&steps->frame.images[layer], (enum spl_layer)layer, &steps->view, err))
             return SPL_E_NOMEM;
     steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
+    steps->frame.stats.pending = !steps->frame.stats.complete;
     return 0;
 }
 
 bool spl_frame_is_waiting(struct spl_frame_steps *steps)
 {
-    return !steps->view.partial && spl_remaining_ns(steps->there_ns);
+    return !steps->view.partial &&
+           (spl_remaining_ns(steps->there_ns) || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
@@ -189,7 +181,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     uint64_t tile = steps->left < SPL_TILE_SAMPLES ? steps->left : SPL_TILE_SAMPLES;
     double share = (double)tile / (double)spl_view_get_samples(&steps->view);
     *more = false;
-    if (renderer->lose_next || renderer->lost || setting("FAKE_LOSE", 0)) {
+    if (renderer->lose_next || renderer->lost) {
         renderer->lost = true;
         return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
     }

@@ -42,6 +42,7 @@ static void *must_have(void *p)
 }
 
 double make_dataset_normal_error = M_PI / 180;
+size_t make_dataset_page_bytes = SPL_PAGE_BYTES;
 
 /* Class and uncertainty of chunk `index`; returns the words that they take. */
 static uint32_t add_streams(struct build *b, size_t index, const struct make_splat *splats, uint32_t count,
@@ -195,6 +196,7 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
     memcpy(b.nodes[0].origin, low, sizeof low);
     struct spl_error err = {0};
     must(spl_dataset_writer_create(path, &b.writer, &err), &err);
+    spl_dataset_writer_set_page_bytes(b.writer, make_dataset_page_bytes);
     if (levels == 1)
         add_node(&b, &b.nodes[0], splats, count);
     else

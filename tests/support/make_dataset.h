@@ -30,6 +30,9 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
 /* Mean error of the normals that follow, radians; default 1 degree. */
 extern double make_dataset_normal_error;
 
+/* Bytes of the pages of files that follow; default SPL_PAGE_BYTES. 0 = a page for each node. */
+extern size_t make_dataset_page_bytes;
+
 /* The same as an open dataset of id "made" whose file is gone already; one level where that holds all splats. */
 struct spl_dataset *make_dataset(const struct make_splat *splats, size_t count);
 struct spl_dataset *make_dataset_levels(const struct make_splat *splats, size_t count, int levels);

@@ -68,6 +68,11 @@ static bool is_beside(const struct spl_camera *camera, double corners[8][3], dou
     return false;
 }
 
+static double largest_radius(const struct spl_chunk *chunk)
+{
+    return chunk->radius_min + chunk->radius_step * (pow(2, chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15) - 1);
+}
+
 static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, bool beside)
 {
     const struct spl_camera *camera = s->options->camera;
@@ -100,8 +105,7 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
     }
     out->scale = sqrt((double)chunk->count / out->count) * (node->child_count ? cluster_share : 1);
     out->spacing = apart * out->scale;
-    double largest = chunk->radius_min +
-                     chunk->radius_step * (pow(2, chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15) - 1);
+    double largest = largest_radius(chunk);
     out->near -= largest * out->scale;
     out->beside = beside || is_beside(camera, corners, largest * out->scale);
 
@@ -115,11 +119,11 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
     out->smooth = samples > spl_dataset_get_info(s->options->dataset)->texture_size;
 }
 
-static void add_node(struct selection *s, uint32_t index, bool beside)
+static void add_node(struct selection *s, uint32_t index)
 {
     const struct spl_camera *camera = s->options->camera;
     const struct spl_node *node = &s->nodes[index];
-    double least[3], size[3], corners[8][3], near = INFINITY;
+    double least[3], size[3], corners[8][3], near = INFINITY, growth = 2 * node->spacing;
     for (int a = 0; a < 3; a++) {
         least[a] = node->origin[a] - camera->eye[a] + node->box_min[a];
         size[a] = (double)node->box_max[a] - node->box_min[a];
@@ -127,15 +131,17 @@ static void add_node(struct selection *s, uint32_t index, bool beside)
     corners_of(camera, least, size, corners);
     for (int k = 0; k < 8; k++)
         near = fmin(near, corners[k][2] - 2 * node->spacing); /* what is pruned grows by as much */
-    beside = beside || is_beside(camera, corners, 2 * node->spacing);
     bool fine = s->options->lod > 0 && node->spacing * focal_of(camera) / fmax(near, camera->near) <= s->options->lod;
     if (!fine && node->child_count) {
         for (uint32_t child = 0; child < node->child_count; child++)
-            add_node(s, node->first_child + child, beside);
+            add_node(s, node->first_child + child);
         return;
     }
+    /* The box holds its discs whole; one that is pruned has twice its radius at most. */
+    for (uint32_t c = 0; c < node->chunk_count && s->options->lod > 0; c++)
+        growth = fmax(growth, largest_radius(&s->chunks[node->first_chunk + c]));
     for (uint32_t c = 0; c < node->chunk_count; c++)
-        add_chunk(s, index, node->first_chunk + c, beside);
+        add_chunk(s, index, node->first_chunk + c, is_beside(camera, corners, growth));
 }
 
 struct naive_chunk *naive_select(const struct naive_options *options, size_t *count)
@@ -146,7 +152,7 @@ struct naive_chunk *naive_select(const struct naive_options *options, size_t *co
     s.chunks = spl_dataset_get_chunks(options->dataset, &chunks);
     s.out = calloc(chunks, sizeof *s.out);
     spl_assert(s.out);
-    add_node(&s, 0, false);
+    add_node(&s, 0);
     *count = s.count;
     return s.out;
 }

@@ -44,7 +44,7 @@ static void gather_run(struct gathered *g, const struct spl_points *p, size_t be
     }
 }
 
-static int gather(struct gathered *g, const struct spl_points *p, struct spl_error *err)
+static int gather(struct gathered *g, const struct spl_points *p, const struct spl_stage *stage, struct spl_error *err)
 {
     size_t linear = 0;
     for (size_t i = 0; i < p->count; i++)
@@ -53,16 +53,16 @@ static int gather(struct gathered *g, const struct spl_points *p, struct spl_err
     g->index = spl_alloc_raw(linear + 1, sizeof *g->index, err);
     if (!g->points || !g->index)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->count; i += SPL_CHUNK_SPLATS)
+    for (size_t i = 0; i < p->count && !spl_stage_is_cancelled(stage); i += SPL_CHUNK_SPLATS)
         gather_run(g, p, i, p->count - i < SPL_CHUNK_SPLATS ? p->count : i + SPL_CHUNK_SPLATS);
-    return SPL_OK;
+    return spl_stage_check(stage, err);
 }
 
 /* The way from the middle of the straight line between two points to that of the arc on which both and what they are
  * joined with lie: over `length` between stretches of `base` on average, whose directions an end lies `aside` of, its
  * curvature is 2 aside / (length (length + base)), its height length^2 / 8 times that. */
 static void find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, double length, double rise[3],
-                     struct spl_work *work)
+                     struct spl_wires_work *work)
 {
     double base = 0, aside[3] = {0};
     uint32_t ends[2] = {a, b};
@@ -82,18 +82,49 @@ static void find_arc(const struct spl_wire_point *p, uint32_t a, uint32_t b, dou
         rise[c] = -aside[c] * length / (4 * (length + base));
 }
 
-/* Adds a vertex that looks like wire point `like`. */
-static int add_vertex(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t like,
-                      const double position[3], float length, struct spl_error *err)
+/* Of how many pieces a join is, and how long. */
+static int count_pieces(const struct spl_wire_point *a, const struct spl_wire_point *b, double *length)
 {
-    if (w->count == w->capacity) {
-        size_t larger = 2 * w->capacity + 1024;
-        struct spl_wire_vertex *vertices = spl_realloc(w->vertices, larger, sizeof *vertices, err);
-        if (!vertices)
-            return SPL_E_NOMEM;
-        w->vertices = vertices;
-        w->capacity = larger;
+    double squared = 0;
+    for (int c = 0; c < 3; c++)
+        squared += (b->position[c] - a->position[c]) * (b->position[c] - a->position[c]);
+    *length = sqrt(squared);
+    return (int)fmin(ceil(*length / (straight * fmax(a->spacing, b->spacing))), pieces_most) | 1;
+}
+
+/* Does a chain begin at point `i`? At the lower of its ends. */
+static bool is_begin(const struct spl_wire_point *p, uint32_t i)
+{
+    return p[i].next[0] != SPL_WIRE_END && p[i].next[1] == SPL_WIRE_END && p[i].other >= i;
+}
+
+/* Room for all vertices: one for each piece, and one more for each chain. */
+static int reserve(struct spl_wires *w, const struct gathered *g, struct spl_error *err)
+{
+    const struct spl_wire_point *p = g->points;
+    uint64_t vertices = 0;
+    for (uint32_t i = 0; i < g->count; i++) {
+        double length;
+        for (int k = 0; k < 2; k++) /* each join at one of its points */
+            if (p[i].next[k] != SPL_WIRE_END && p[i].next[k] > i)
+                vertices += (unsigned)count_pieces(&p[i], &p[p[i].next[k]], &length);
+        vertices += is_begin(p, i);
     }
+    if (vertices >= SPL_WIRE_END)
+        return spl_fail(err, SPL_E_LIMIT,
+                        "wires, poles and cables of %llu vertices; at most %u can be joined: pack the scans as several "
+                        "datasets, or with --no-linear",
+                        (unsigned long long)vertices, SPL_WIRE_END - 1);
+    w->vertices = spl_alloc_raw(vertices + 1, sizeof *w->vertices, err);
+    w->capacity = vertices;
+    return w->vertices ? SPL_OK : SPL_E_NOMEM;
+}
+
+/* Adds a vertex that looks like wire point `like`. */
+static void add_vertex(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t like,
+                       const double position[3], float length)
+{
+    spl_assert(w->count < w->capacity);
     uint32_t index = g->index[like];
     struct spl_wire_vertex *vertex = &w->vertices[w->count++];
     *vertex = (struct spl_wire_vertex){.radius = (float)g->points[like].spacing,
@@ -102,45 +133,45 @@ static int add_vertex(struct spl_wires *w, const struct spl_points *p, const str
                                        .point = SPL_WIRE_END};
     memcpy(vertex->position, position, sizeof vertex->position);
     memcpy(vertex->normal, p->normal[index], sizeof vertex->normal);
-    return SPL_OK;
 }
 
 /* From the last vertex, which is that of point `a`, to one of point `b`. */
-static int add_join(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t a, uint32_t b,
-                    float chain, struct spl_work *work, struct spl_error *err)
+static void add_join(struct spl_wires *w, const struct spl_points *p, const struct gathered *g, uint32_t a, uint32_t b,
+                     float chain, struct spl_wires_work *work)
 {
     const double *from = g->points[a].position, *to = g->points[b].position;
-    double rise[3] = {0}, spacing = fmax(g->points[a].spacing, g->points[b].spacing);
-    double length = sqrt((to[0] - from[0]) * (to[0] - from[0]) + (to[1] - from[1]) * (to[1] - from[1]) +
-                         (to[2] - from[2]) * (to[2] - from[2]));
-    int pieces = (int)fmin(ceil(length / (straight * spacing)), pieces_most) | 1, rc = SPL_OK;
+    double rise[3] = {0}, length;
+    int pieces = count_pieces(&g->points[a], &g->points[b], &length);
     if (pieces > 1)
         find_arc(g->points, a, b, length, rise, work);
-    for (int i = 1; i <= pieces && !rc; i++) {
+    for (int i = 1; i <= pieces; i++) {
         double t = (double)i / pieces, at[3];
         for (int c = 0; c < 3; c++)
             at[c] = i < pieces ? from[c] + t * (to[c] - from[c]) + 4 * t * (1 - t) * rise[c] : to[c];
         w->vertices[w->count - 1].point = g->index[2 * i <= pieces + 1 ? a : b];
-        rc = add_vertex(w, p, g, 2 * i < pieces ? a : b, at, chain, err);
+        add_vertex(w, p, g, 2 * i < pieces ? a : b, at, chain);
     }
-    return rc;
 }
 
+/* Adds up to as many items as there are points to the stage. */
 static int add_chains(struct spl_wires *w, const struct spl_points *points, const struct gathered *g,
-                      struct spl_work *work, struct spl_error *err)
+                      struct spl_wires_work *work, struct spl_error *err)
 {
     const struct spl_wire_point *p = g->points;
-    int rc = SPL_OK;
+    uint64_t done = 0;
+    int rc = reserve(w, g, err);
     for (uint32_t i = 0; i < g->count && !rc; i++) {
-        if (p[i].next[0] == SPL_WIRE_END || p[i].next[1] != SPL_WIRE_END || p[i].other < i)
+        if (!is_begin(p, i))
             continue;
         float length = (float)p[i].length;
-        rc = add_vertex(w, points, g, i, p[i].position, length, err);
-        for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc;) {
+        add_vertex(w, points, g, i, p[i].position, length);
+        for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc; done++) {
             uint32_t next = p[at].next[p[at].next[0] == before];
-            rc = add_join(w, points, g, at, next, length, work, err);
+            add_join(w, points, g, at, next, length, work);
             before = at;
             at = next;
+            spl_wires_advance(work, done, g->count, g->count);
+            rc = spl_stage_check(work->stage, err);
         }
     }
     return rc;
@@ -172,20 +203,25 @@ int spl_wires_find(struct spl_wires *wires, const struct spl_points *points, str
     *wires = (struct spl_wires){0};
     if (!points->linear)
         return SPL_OK;
-    spl_stage_begin(stage, "joining wires", NULL, 2);
-    int rc = gather(&g, points, err);
-    struct spl_work joining = {point_steps * ((uint64_t)g.count + 128)}, cutting = joining;
+    spl_stage_begin(stage, "joining wires", NULL, 0);
+    int rc = gather(&g, points, stage, err);
+    stage->total = 3 * (uint64_t)g.count;
+    struct spl_wires_work joining = {point_steps * ((uint64_t)g.count + 128), stage}, cutting = joining;
     if (!rc)
         rc = spl_wires_join(g.points, (uint32_t)g.count, &joining, err);
     wires->cut_short = rc == SPL_E_LIMIT; /* the links hold */
-    spl_stage_add(stage, 1, 0);
-    if (!rc || rc == SPL_E_LIMIT)
+    if (rc == SPL_E_CANCELLED)
+        rc = spl_stage_check(stage, err);
+    if (!rc || wires->cut_short)
         rc = add_chains(wires, points, &g, &cutting, err);
-    if (!rc)
-        rc = sort_pieces(wires, err);
-    spl_stage_finish(stage);
     free(g.points);
     free(g.index);
+    if (!rc)
+        rc = sort_pieces(wires, err);
+    if (!rc)
+        rc = spl_stage_check(stage, err);
+    if (!rc)
+        spl_stage_finish(stage);
     return rc;
 }
 

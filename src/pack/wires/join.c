@@ -5,7 +5,8 @@
  * wires beside each other). Distances count in the points' own spacing; there is no length in metres.
  *
  * Points that are only taken for a wire's, as of noise, may be looked at by all others and walked along for ever, so
- * each look and each point on a walk is a step of `work`, and where they end, so does joining. */
+ * each look and each point on a walk is a step of `work`, and where they end, so does joining. Whoever cancels waits for
+ * a sort at most. */
 #include "pack/wires/join.h"
 
 #include <math.h>
@@ -32,6 +33,18 @@ struct pair {
     uint32_t a, b;
 };
 
+/* Takes a step; false when none is left. */
+static bool step(struct spl_wires_work *work)
+{
+    return work->left && work->left--;
+}
+
+/* Takes as many of `steps` as are left. */
+static void take(struct spl_wires_work *work, uint64_t steps)
+{
+    work->left -= steps < work->left ? steps : work->left;
+}
+
 struct join {
     struct spl_wire_point *points;
     struct cell *cells; /* sorted */
@@ -39,7 +52,7 @@ struct join {
     double low[3], edge;
     struct pair *pairs;
     size_t pair_count, pair_capacity;
-    struct spl_work *work;
+    struct spl_wires_work *work;
 };
 
 static int compare_cells(const void *a, const void *b)
@@ -92,11 +105,11 @@ static void lay_grid(struct join *j, uint32_t count, double edge, const uint8_t 
 {
     j->edge = edge;
     j->cell_count = 0;
-    for (uint32_t i = 0; i < count && spl_work_step(j->work); i++)
+    for (uint32_t i = 0; i < count && step(j->work); i++)
         if (j->points[i].next[1] == SPL_WIRE_END &&
             (!kept || (kept[i] && edge <= fmax(shortest * j->points[i].length, 2 * near * j->points[i].spacing))))
             j->cells[j->cell_count++] = (struct cell){key_of(j, j->points[i].position, (int[3]){0}), i};
-    spl_work_take(j->work, cell_steps * j->cell_count);
+    take(j->work, cell_steps * j->cell_count);
     qsort(j->cells, j->cell_count, sizeof *j->cells, compare_cells);
 }
 
@@ -106,11 +119,11 @@ static double distance(const double a[3], const double b[3])
 }
 
 double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
-                         double heading[3], struct spl_work *work)
+                         double heading[3], struct spl_wires_work *work)
 {
     uint32_t before = point, at = points[point].next[points[point].next[0] == avoid];
     double length = 0;
-    while (at != SPL_WIRE_END && spl_work_step(work)) {
+    while (at != SPL_WIRE_END && step(work)) {
         length = distance(points[point].position, points[at].position);
         for (int c = 0; c < 3; c++)
             heading[c] = (points[point].position[c] - points[at].position[c]) / length;
@@ -162,20 +175,22 @@ static double cost_of(const struct join *j, uint32_t a, uint32_t b)
     return sqrt(differ) > spacing + bend * length ? INFINITY : length + 4 * sqrt(differ) + sqrt(out);
 }
 
-static int find_pairs(struct join *j, double reach, struct spl_error *err)
+/* `share` as of spl_wires_advance(). */
+static int find_pairs(struct join *j, double reach, uint64_t share, struct spl_error *err)
 {
     j->pair_count = 0;
     for (size_t i = 0; i < j->cell_count; i++) {
         uint32_t a = j->cells[i].point;
-        int rc = spl_work_check(j->work);
+        int rc = spl_wires_check(j->work);
         if (rc)
             return rc;
+        spl_wires_advance(j->work, i, j->cell_count, share);
         for (int k = 0; k < 27; k++) {
             uint64_t key = key_of(j, j->points[a].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1});
             size_t first = find_cell(j, key);
             for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
-                spl_work_step(j->work);
+                step(j->work);
                 if (b <= a || distance(j->points[a].position, j->points[b].position) > reach)
                     continue;
                 double cost = cost_of(j, a, b);
@@ -190,7 +205,7 @@ static int find_pairs(struct join *j, double reach, struct spl_error *err)
                     j->pair_capacity = larger;
                 }
                 j->pairs[j->pair_count++] = (struct pair){cost, a, b};
-                spl_work_take(j->work, pair_steps);
+                take(j->work, pair_steps);
             }
         }
     }
@@ -205,7 +220,7 @@ static int join_pairs(struct join *j)
     struct spl_wire_point *p = j->points;
     for (size_t i = 0; i < j->pair_count; i++) {
         uint32_t a = j->pairs[i].a, b = j->pairs[i].b, ends[2] = {p[a].other, p[b].other};
-        int rc = spl_work_check(j->work);
+        int rc = spl_wires_check(j->work);
         if (rc)
             return rc;
         if (p[a].next[1] != SPL_WIRE_END || p[b].next[1] != SPL_WIRE_END || cost_of(j, a, b) == INFINITY)
@@ -228,16 +243,17 @@ static int thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
     lay_grid(j, count, edge, NULL);
     for (uint32_t i = 0; i < count; i++) {
         double limit = fmin(p[i].spacing, edge);
-        int rc = spl_work_check(j->work);
+        int rc = spl_wires_check(j->work);
         if (rc)
             return rc;
+        spl_wires_advance(j->work, i, count, count);
         kept[i] = 1;
         for (int k = 0; k < 27 && kept[i]; k++) {
             uint64_t key = key_of(j, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1});
             size_t first = find_cell(j, key);
             for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
-                spl_work_step(j->work);
+                step(j->work);
                 if (b >= i)
                     break;
                 if (kept[b] && distance(p[i].position, p[b].position) < limit) {
@@ -250,7 +266,7 @@ static int thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
     return SPL_OK;
 }
 
-int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_work *work, struct spl_error *err)
+int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work, struct spl_error *err)
 {
     struct join j = {.points = points, .work = work};
     double *spacings = spl_alloc_raw(count + 1, sizeof *spacings, err);
@@ -271,10 +287,12 @@ int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wor
         goto done;
     qsort(spacings, count, sizeof *spacings, compare_doubles);
     double reach = spacings[count / 2];
+    free(spacings);
+    spacings = NULL;
     rc = thin_out(&j, count, 2 * reach, kept);
-    for (; reach <= 2 * far * longest && !rc; reach *= 2) {
+    for (uint64_t share = count / 2; reach <= 2 * far * longest && !rc; reach *= 2, share /= 2) { /* fewer ends each time */
         lay_grid(&j, count, reach, kept);
-        rc = find_pairs(&j, reach, err);
+        rc = find_pairs(&j, reach, share, err);
         if (!rc)
             rc = join_pairs(&j);
     }

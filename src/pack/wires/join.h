@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "base/error.h"
-#include "base/work.h"
+#include "pack/stage.h"
 
 #define SPL_WIRE_END UINT32_MAX
 
@@ -17,15 +17,36 @@ struct spl_wire_point {
     double length;    /* of an end: from there to the other */
 };
 
+/* How far joining may go: what steps are left of those that the number of points allows, and the stage that it is. */
+struct spl_wires_work { // owned by: the thread that joins
+    uint64_t left;
+    struct spl_stage *stage;
+};
+
+/* SPL_E_CANCELLED, SPL_E_LIMIT when no step is left, or 0. Without a message: what stops is for the caller to say. */
+static inline int spl_wires_check(const struct spl_wires_work *work)
+{
+    return spl_stage_is_cancelled(work->stage) ? SPL_E_CANCELLED : work->left ? SPL_OK : SPL_E_LIMIT;
+}
+
+/* Item `i` of `count`, which together are `share` items of the stage: adds a piece of it every thousand items. */
+static inline void spl_wires_advance(const struct spl_wires_work *work, uint64_t i, uint64_t count, uint64_t share)
+{
+    enum { every = 1000 };
+    uint64_t left = count - i;
+    if (i % every == 0)
+        spl_stage_add(work->stage, (uint64_t)((double)share * (double)(left < every ? left : every) / (double)count), 0);
+}
+
 /* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or
- * loops. Points that lie beside another one are left alone. SPL_E_NOMEM; as spl_work_check() when no step is left: the
- * links hold then, but are not all. Pure function but for `work`; any thread. */
-int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_work *work, struct spl_error *err);
+ * loops. Points that lie beside another one are left alone. Adds up to 2 `count` items to the stage. SPL_E_NOMEM; else
+ * as spl_wires_check(): the links hold then, but are not all. Pure function but for `work`; any thread. */
+int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work, struct spl_error *err);
 
 /* How `point` lies off what it is joined with on the other side of `avoid` (one of its links; SPL_WIRE_END at an end):
  * the unit vector to it from the chain's point that lies `reach` behind, or its end. Returns the distance of those two,
  * or 0 where nothing is there. Takes a step of `work` for each point on the way, and goes no farther than they last. */
 double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
-                         double heading[3], struct spl_work *work);
+                         double heading[3], struct spl_wires_work *work);
 
 #endif

@@ -12,18 +12,31 @@
 
 enum { stretch = 1024 }; /* vertices that are simplified together */
 
-static bool reserve(struct spl_node_lines *out, size_t pieces)
+static bool reserve_pieces(struct spl_node_lines *out, size_t pieces)
 {
     if (pieces <= out->piece_capacity)
         return true;
-    spl_node_lines_finish(out);
+    free(out->pieces);
+    free(out->kept);
+    out->piece_capacity = 0;
     out->pieces = spl_alloc_raw(pieces, sizeof *out->pieces, NULL);
     out->kept = spl_alloc_raw(pieces + 1, sizeof *out->kept, NULL);
-    out->vertices = spl_alloc_raw(2 * pieces, sizeof *out->vertices, NULL); /* at worst lines of one piece each */
-    if (!out->pieces || !out->kept || !out->vertices)
+    if (!out->pieces || !out->kept)
         return false;
     out->piece_capacity = pieces;
-    out->capacity = 2 * pieces;
+    return true;
+}
+
+static bool reserve_vertices(struct spl_node_lines *out, size_t vertices)
+{
+    if (vertices <= out->capacity)
+        return true;
+    free(out->vertices);
+    out->capacity = 0;
+    out->vertices = spl_alloc_raw(vertices, sizeof *out->vertices, NULL);
+    if (!out->vertices)
+        return false;
+    out->capacity = vertices;
     return true;
 }
 
@@ -114,8 +127,8 @@ static struct spl_wire_vertex mean_vertex(const struct spl_wire_vertex *v, size_
     return out;
 }
 
-/* Appends the line of vertices [0, count), simplified; the last one ends it. */
-static void add_simplified(struct spl_node_lines *out, const struct spl_wire_vertex *v, size_t count, double spacing,
+/* Appends the line of vertices [0, count), simplified; the last one ends it. False: a node has no room for all of it. */
+static bool add_simplified(struct spl_node_lines *out, const struct spl_wire_vertex *v, size_t count, double spacing,
                            double error)
 {
     for (size_t first = 0; first + 1 < count; first += stretch - 1) {
@@ -127,32 +140,54 @@ static void add_simplified(struct spl_node_lines *out, const struct spl_wire_ver
         while (next < count && !out->kept[next])
             next++;
         size_t last = next < count ? at + (next - at) / 2 : at;
+        if (out->count == SPL_NODE_VERTICES)
+            return false;
         out->vertices[out->count++] = mean_vertex(v, at, before, last, spacing);
         before = last + 1;
         at = next;
     }
     out->vertices[out->count - 1].point = SPL_WIRE_END;
+    return true;
 }
 
-/* The lines that runs of `pieces` consecutive pieces make. */
-static void add_lines(const struct spl_wires *w, size_t pieces, double spacing, double coarse,
-                      struct spl_node_lines *out)
+/* Where the run of consecutive pieces that begins at `i` ends: a line of one vertex more than it has pieces. */
+static size_t end_of_run(const struct spl_node_lines *out, size_t i, size_t pieces)
+{
+    for (i++; i < pieces && out->pieces[i] == out->pieces[i - 1] + 1;)
+        i++;
+    return i;
+}
+
+/* The lines as they were joined. False: no memory. */
+static bool copy_lines(const struct spl_wires *w, size_t pieces, struct spl_node_lines *out)
+{
+    size_t runs = 0;
+    for (size_t i = 0; i < pieces; i = end_of_run(out, i, pieces))
+        runs++;
+    if (!reserve_vertices(out, pieces + runs))
+        return false;
+    for (size_t i = 0, end; i < pieces; i = end) {
+        end = end_of_run(out, i, pieces);
+        memcpy(out->vertices + out->count, &w->vertices[out->pieces[i]], (end - i + 1) * sizeof *out->vertices);
+        out->count += end - i + 1;
+        out->vertices[out->count - 1].point = SPL_WIRE_END;
+    }
+    return true;
+}
+
+/* The lines of a level; false where a node has no room for all of their vertices. */
+static bool simplify_lines(const struct spl_wires *w, size_t pieces, double spacing, double coarse,
+                           struct spl_node_lines *out)
 {
     out->count = 0;
     for (size_t i = 0, end; i < pieces; i = end) {
         const struct spl_wire_vertex *v = &w->vertices[out->pieces[i]];
-        for (end = i + 1; end < pieces && out->pieces[end] == out->pieces[end - 1] + 1;)
-            end++;
-        if (spacing > 0 && v->length < SPL_WIRES_SHORTEST * coarse)
-            continue;
-        if (spacing > 0) {
-            add_simplified(out, v, end - i + 1, spacing, SPL_WIRES_ERROR * coarse);
-            continue;
-        }
-        memcpy(out->vertices + out->count, v, (end - i + 1) * sizeof *v);
-        out->count += end - i + 1;
-        out->vertices[out->count - 1].point = SPL_WIRE_END;
+        end = end_of_run(out, i, pieces);
+        if (v->length >= SPL_WIRES_SHORTEST * coarse &&
+            !add_simplified(out, v, end - i + 1, spacing, SPL_WIRES_ERROR * coarse))
+            return false;
     }
+    return true;
 }
 
 bool spl_wires_get_node(const struct spl_wires *wires, size_t begin, size_t end, double spacing,
@@ -162,15 +197,17 @@ bool spl_wires_get_node(const struct spl_wires *wires, size_t begin, size_t end,
     out->count = 0;
     if (!pieces)
         return true;
-    if (!reserve(out, pieces))
+    if (!reserve_pieces(out, pieces))
         return false;
     memcpy(out->pieces, wires->pieces + first, pieces * sizeof *out->pieces);
     qsort(out->pieces, pieces, sizeof *out->pieces, compare_indices);
-    for (double coarse = spacing;; coarse *= 2) {
-        add_lines(wires, pieces, spacing, coarse, out);
-        if (spacing <= 0 || out->count <= SPL_NODE_VERTICES)
-            return true;
-    }
+    if (spacing <= 0)
+        return copy_lines(wires, pieces, out);
+    if (!reserve_vertices(out, 2 * pieces < SPL_NODE_VERTICES ? 2 * pieces : SPL_NODE_VERTICES))
+        return false;
+    for (double coarse = spacing; !simplify_lines(wires, pieces, spacing, coarse, out);)
+        coarse *= 2;
+    return true;
 }
 
 void spl_node_lines_finish(struct spl_node_lines *lines)

@@ -227,6 +227,27 @@ static bool has_token_in_query(const char *query)
     return false;
 }
 
+/* Also where it does not stand at the end, as it has to. */
+static bool has_signature_in_query(const char *query)
+{
+    for (const char *pair = query; *pair; pair += strcspn(pair, "&"), pair += *pair == '&')
+        if (!strncmp(pair, "sig=", 4) || !strncmp(pair, "embed=", 6))
+            return true;
+    return false;
+}
+
+/* Neither a token nor a signature that counts. */
+static bool refuse_unknown(struct request *request)
+{
+    static const char challenge[] = "Bearer realm=\"splatd\"";
+    if (request->service->access->key.bytes && has_signature_in_query(request->query))
+        return refuse(request, MHD_HTTP_UNAUTHORIZED, "sig", challenge,
+                      "the signature does not match: it allows the GET that was signed, to which nothing is added and in "
+                      "which nothing changes its place; anything else needs a token");
+    return refuse(request, MHD_HTTP_UNAUTHORIZED, "", challenge,
+                  "this needs a token; send it as 'Authorization: Bearer TOKEN'");
+}
+
 /* The token that the request shows, NULL when there is none or it is unknown; *shown says which. */
 static const struct spl_token *find_token(struct request *request, bool *shown)
 {
@@ -261,9 +282,7 @@ bool spl_access_check(struct request *request, enum spl_scope scope, const struc
         spl_sign_covers(request->uri, strlen(request->uri)))
         return check_signature(request);
     if (!shown)
-        return (request->service->options->allow_anonymous && scope != SPL_SCOPE_ADMIN) ||
-               refuse(request, MHD_HTTP_UNAUTHORIZED, "", "Bearer realm=\"splatd\"",
-                      "this needs a token; send it as 'Authorization: Bearer TOKEN'");
+        return (request->service->options->allow_anonymous && scope != SPL_SCOPE_ADMIN) || refuse_unknown(request);
     if (!request->token)
         return refuse(request, MHD_HTTP_UNAUTHORIZED, "", "Bearer realm=\"splatd\", error=\"invalid_token\"",
                       "the token is not known here");

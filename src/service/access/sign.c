@@ -5,10 +5,12 @@
  */
 #include "service/access/sign.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/memory.h"
 #include "service/access/secret.h"
@@ -21,6 +23,8 @@ static const char datasets[] = "/v1/datasets/", pages[] = "/embed/";
 int spl_sign_key_read(const char *path, struct spl_sign_key *out, struct spl_error *err)
 {
     *out = (struct spl_sign_key){0};
+    if (access(path, F_OK) && errno == ENOENT)
+        return spl_fail(err, SPL_E_USAGE, "there is no key '%s'; openssl rand -hex 32 makes one", path);
     int rc = spl_secret_read(path, key_most + 2, &out->bytes, &out->length, err);
     if (rc)
         return rc;
@@ -163,20 +167,21 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
     if (!path || strpbrk(url, " \t\r\n"))
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' is no URL such as https://HOST/v1/datasets/ID/view?width=640 or its path, without "
-                        "blanks; https://HOST/embed/ID is one as well", url);
+                        "blanks; https://HOST/embed/ID is one as well",
+                        url);
     size_t length = strcspn(path, "?#");
     bool page = find_id(path, pages);
     if (!spl_sign_covers(path, length))
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick and "
-                        "/profile, and the page /embed/ID; anything else needs a token", url);
+                        "/profile, and the page /embed/ID; anything else needs a token",
+                        url);
     if (page && path[length] == '?')
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: /embed/ID takes camera and settings behind '#', not behind '?'",
                         url);
     if (!page && strchr(path, '#'))
-        return spl_fail(err, SPL_E_USAGE,
-                        "'%.200s' cannot be signed: only /embed/ID has something behind '#'", url);
+        return spl_fail(err, SPL_E_USAGE, "'%.200s' cannot be signed: only /embed/ID has something behind '#'", url);
     return 0;
 }
 

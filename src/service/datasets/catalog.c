@@ -148,8 +148,7 @@ void spl_catalog_finish(struct spl_catalog *catalog)
 
 struct opening {
     const struct spl_catalog_files *files;
-    bool verify;
-    const atomic_bool *cancelled;
+    const struct spl_dataset_opening *how;
     struct spl_catalog_entry **entries; /* one a file, as are the errors, so that nothing depends on who was first */
     struct spl_error *errors;
 };
@@ -159,8 +158,8 @@ static void open_range(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     struct opening *opening = context;
     for (size_t i = begin; i < end; i++)
-        spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->verify,
-                               opening->cancelled, &opening->entries[i], &opening->errors[i]);
+        spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->how,
+                               &opening->entries[i], &opening->errors[i]);
 }
 
 /* Puts one opened file into its slot; takes the entry. */
@@ -204,17 +203,21 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
     for (size_t i = 0; i < path_count; i++) {
         struct stat status;
         if (stat(paths[i], &status))
-            return spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
+            return errno == ENOENT ? spl_fail(err, SPL_E_USAGE,
+                                              "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
+                                              "-o NAME.spld' makes one from a scan",
+                                              paths[i])
+                                   : spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
     }
     return 0;
 }
 
-int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count, bool verify,
-                     const atomic_bool *cancelled, struct spl_error *err)
+int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count,
+                     const struct spl_dataset_opening *how, struct spl_error *err)
 {
     *catalog = (struct spl_catalog){0};
     struct spl_catalog_files files = {0};
-    struct opening opening = {.files = &files, .verify = verify, .cancelled = cancelled};
+    struct opening opening = {.files = &files, .how = how};
     int rc = check_paths(paths, path_count, err);
     if (rc || (rc = spl_catalog_list(paths, path_count, &files, err)))
         goto done;

@@ -95,12 +95,14 @@ static void run_step(uv_work_t *work)
     struct change *change = work->data;
     struct spl_incoming *incoming = &change->incoming;
     struct spl_error *err = &change->err;
+    struct spl_dataset_opening how = spl_library_get_opening(change->service);
+    how.verify = true; // whatever the operator says: it comes from outside
     switch (change->step) {
     case SPL_CHANGE_APPEND:
     case SPL_CHANGE_CHECK:
         if ((incoming->path || !spl_incoming_begin(incoming, change->target, err)) &&
             !spl_incoming_append(incoming, change->buffer, change->filled, err) && change->step == SPL_CHANGE_CHECK)
-            spl_incoming_check(incoming, change->target, &change->service->library->cancelled, &change->entry, err);
+            spl_incoming_check(incoming, change->target, &how, &change->entry, err);
         change->filled = 0;
         break;
     case SPL_CHANGE_PLACE:

@@ -19,7 +19,7 @@ static void encode_uri(char *out, size_t capacity, const char *id)
         used += (size_t)snprintf(out + used, capacity - used, strchr(plain, *id) ? "%c" : "%%%02X", (unsigned char)*id);
 }
 
-int spl_catalog_entry_open(const char *path, const char *place, bool verify, const atomic_bool *cancelled,
+int spl_catalog_entry_open(const char *path, const char *place, const struct spl_dataset_opening *how,
                            struct spl_catalog_entry **out, struct spl_error *err)
 {
     struct spl_catalog_entry *entry = *out = NULL;
@@ -28,7 +28,7 @@ int spl_catalog_entry_open(const char *path, const char *place, bool verify, con
     if (!(entry = spl_alloc(1, sizeof *entry, err)))
         return rc;
     atomic_init(&entry->references, 1);
-    if ((rc = spl_dataset_open_until(path, verify, cancelled, &entry->dataset, err)))
+    if ((rc = spl_dataset_open_as(path, how, &entry->dataset, err)))
         goto done;
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))

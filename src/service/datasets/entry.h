@@ -12,6 +12,7 @@
 #include <splatd/dataset.h>
 
 #include "base/error.h"
+#include "dataset/dataset.h"
 #include "geom/camera_json.h"
 #include "service/view/plan.h"
 
@@ -45,10 +46,9 @@ struct spl_catalog_entry {
     bool loading;                            // owned by: gpu
 };
 
-/* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. `verify`
- * hashes every section. Ends with SPL_E_CANCELLED soon after *cancelled (borrowed for the entry's life; may be NULL) is
- * set. Blocks on disk, any thread. The caller owns the one reference to *out. */
-int spl_catalog_entry_open(const char *path, const char *place, bool verify, const atomic_bool *cancelled,
+/* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. Ends with
+ * SPL_E_CANCELLED soon after *how->cancelled (borrowed for the entry's life; may be NULL) is set. Blocks on disk, any thread. The caller owns the one reference to *out. */
+int spl_catalog_entry_open(const char *path, const char *place, const struct spl_dataset_opening *how,
                            struct spl_catalog_entry **out, struct spl_error *err);
 
 /* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */

@@ -33,7 +33,7 @@ struct opening {
     struct spl_service *service;
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     char *path;
-    bool verify;
+    struct spl_dataset_opening how;
     struct spl_file_mark mark;
     struct spl_catalog_entry *entry; // may be NULL
     struct spl_error err;
@@ -52,6 +52,12 @@ static void refuse(struct spl_catalog_slot *slot, const struct spl_error *err)
                      err->message);
 }
 
+/* It is opened anew, after ever longer rests. */
+static void rest(struct spl_catalog_slot *slot)
+{
+    slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
+}
+
 static void free_opening(struct opening *opening)
 {
     free(opening->path);
@@ -61,8 +67,7 @@ static void free_opening(struct opening *opening)
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
-    spl_catalog_entry_open(opening->path, opening->path, opening->verify, &opening->service->library->cancelled,
-                           &opening->entry, &opening->err);
+    spl_catalog_entry_open(opening->path, opening->path, &opening->how, &opening->entry, &opening->err);
 }
 
 static void after_opening(uv_work_t *work, int status)
@@ -74,7 +79,7 @@ static void after_opening(uv_work_t *work, int status)
     service->library->tasks--;
     if (slot && opening->err.code && !service->library->stopped) {
         if (spl_catalog_may_pass(&opening->err))
-            slot->rest = 1u << (slot->failures < rests_most ? slot->failures++ : rests_most);
+            rest(slot);
         else
             slot->opened = opening->mark;
         refuse(slot, &opening->err);
@@ -88,6 +93,13 @@ static void after_opening(uv_work_t *work, int status)
     free_opening(opening);
 }
 
+struct spl_dataset_opening spl_library_get_opening(struct spl_service *service)
+{
+    return (struct spl_dataset_opening){.verify = service->options->verify,
+                                        .tables_bytes = service->options->tables_bytes,
+                                        .cancelled = &service->library->cancelled};
+}
+
 static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot)
 {
     struct opening *opening = spl_alloc(1, sizeof *opening, NULL);
@@ -97,7 +109,7 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
     }
     opening->work.data = opening;
     opening->service = service;
-    opening->verify = service->options->verify;
+    opening->how = spl_library_get_opening(service);
     opening->mark = slot->seen;
     snprintf(opening->id, sizeof opening->id, "%s", slot->id);
     if (uv_queue_work(&service->loop, &opening->work, run_opening, after_opening)) {
@@ -170,6 +182,10 @@ void spl_library_take_changes(struct spl_service *service)
         if (slot && (slot->next == entry || slot->current == entry)) {
             if (slot->current == entry) // at start: there is no version before it
                 slot->current = NULL;
+            if (entry->err.code == SPL_E_TIMEOUT) { // its disk did not answer
+                slot->opened = (struct spl_file_mark){0};
+                rest(slot);
+            }
             refuse(slot, &entry->err);
         }
         spl_catalog_entry_unref(entry);

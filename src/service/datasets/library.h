@@ -38,6 +38,7 @@ void spl_library_init(struct spl_service *service);
 void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
 void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry); /* takes the resident `entry` */
+struct spl_dataset_opening spl_library_get_opening(struct spl_service *service); /* as the operator says; any thread */
 void spl_library_stop(struct spl_service *service); /* waits for the thread pool; idempotent */
 
 /* change_route.c, change.c: PUT and DELETE of a dataset. */

@@ -29,8 +29,9 @@ static void run(uv_work_t *work)
     loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
     if (loading->directory)
         spl_store_sweep(loading->directory);
-    if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, options->verify,
-                          &loading->service->library->cancelled, &loading->err) &&
+    const struct spl_dataset_opening how = spl_library_get_opening(loading->service);
+    if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, &how,
+                          &loading->err) &&
         loading->tours)
         spl_tours_load(loading->tours, &loading->catalog, &loading->err);
 }

@@ -147,13 +147,13 @@ int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t 
     return 0;
 }
 
-int spl_incoming_check(struct spl_incoming *incoming, const char *target, const atomic_bool *cancelled,
+int spl_incoming_check(struct spl_incoming *incoming, const char *target, const struct spl_dataset_opening *how,
                        struct spl_catalog_entry **entry, struct spl_error *err)
 {
     if (fsync(incoming->fd))
         return fail(incoming, err, "sync");
     struct spl_error why = {0};
-    int rc = spl_catalog_entry_open(incoming->path, target, true, cancelled, entry, &why);
+    int rc = spl_catalog_entry_open(incoming->path, target, how, entry, &why);
     if (!rc)
         return 0;
     char message[sizeof why.message];

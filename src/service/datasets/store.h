@@ -24,9 +24,9 @@ void spl_store_sweep(const char *directory);
 int spl_incoming_begin(struct spl_incoming *incoming, const char *target, struct spl_error *err);
 int spl_incoming_append(struct spl_incoming *incoming, const void *data, size_t length, struct spl_error *err);
 
-/* Syncs, verifies and opens the file as what will lie at `target`: the caller owns *entry. SPL_E_INPUT or SPL_E_CORRUPT
- * for what is no dataset, SPL_E_CANCELLED once *cancelled (for the entry's life) is set. */
-int spl_incoming_check(struct spl_incoming *incoming, const char *target, const atomic_bool *cancelled,
+/* Syncs and opens the file as what will lie at `target`: the caller owns *entry. SPL_E_INPUT or SPL_E_CORRUPT
+ * for what is no dataset, SPL_E_CANCELLED once *how->cancelled (for the entry's life) is set. */
+int spl_incoming_check(struct spl_incoming *incoming, const char *target, const struct spl_dataset_opening *how,
                        struct spl_catalog_entry **entry, struct spl_error *err);
 
 /* Renames the file to `target`, whatever lies there, and ends `incoming`. After a failure `target` is as it was, but

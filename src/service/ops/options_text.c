@@ -53,20 +53,18 @@ static const char *placeholder(const struct spl_parameter *p)
 /* Words of `text`, broken before `width`, each line from `column` on. */
 static void print_wrapped(FILE *out, const char *text, int at)
 {
-    while (*text) {
+    bool first = true;
+    while (*(text += strspn(text, " "))) {
         int length = (int)strcspn(text, " ");
-        if (at + length + 1 > width) {
+        if (!first && at + 1 + length > width) {
             fprintf(out, "\n%*s", column, "");
             at = column;
+            first = true;
         }
-        fprintf(out, "%.*s", length, text);
-        at += length;
+        fprintf(out, "%s%.*s", first ? "" : " ", length, text);
+        at += length + !first;
+        first = false;
         text += length;
-        if (*text == ' ') {
-            fputc(' ', out);
-            at++;
-            text++;
-        }
     }
 }
 

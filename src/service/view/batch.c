@@ -221,15 +221,6 @@ void spl_batch_abandon(struct batch *batch)
         destroy(batch);
 }
 
-static int check_versions(const struct spl_views_request *views, const struct spl_dataset_info *info,
-                          struct spl_error *err)
-{
-    int rc = 0;
-    for (size_t i = 0; !rc && i < views->count; i++)
-        rc = spl_view_check_version(&views->views[i], info, err);
-    return rc;
-}
-
 void spl_make_views(struct request *request, const struct spl_call *call)
 {
     struct spl_service *service = request->service;
@@ -242,10 +233,11 @@ void spl_make_views(struct request *request, const struct spl_call *call)
                                          &batch->views, &err);
     if (rc && rc != SPL_E_NOMEM)
         err.code = SPL_E_INPUT;
-    if (rc || check_versions(&batch->views, call->entry->info, &err))
+    if (rc)
         goto refuse;
     for (size_t i = 0; i < batch->views.count; i++)
-        if (spl_view_has_no_room(service, &batch->views.views[i], &err))
+        if (spl_view_check_dataset(&batch->views.views[i], call->entry->info, &err) ||
+            spl_view_has_no_room(service, &batch->views.views[i], &err))
             goto refuse;
     if (!(batch->items = spl_alloc(batch->views.count, sizeof *batch->items, &err)))
         goto refuse;

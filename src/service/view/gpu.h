@@ -17,9 +17,9 @@ struct gpu {
     struct spl_turns turns;                  /* large views */
     struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
     TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
-    STAILQ_HEAD(, spl_catalog_entry) leaving; /* of these, that a page is still being read of */
     uint64_t pages_loaded, pages_evicted;    /* of this renderer, as published */
     bool loading_waits;                      /* for a page to be read */
+    bool uploads_left;                       /* pages that have been read and are not on the device yet */
 };
 
 /* A renderer with the entries, and their pages on the device. What has no room is refused at start, when nobody has
@@ -43,7 +43,7 @@ void spl_gpu_refuse_loading(struct gpu *gpu);
 /* Publishes what is on the device; a page that came may have driven out those of any dataset. */
 void spl_gpu_publish_residency(struct gpu *gpu);
 
-/* Puts on the device what has been read since, and publishes it. SPL_E_DEVICE_LOST. */
+/* Puts on the device what has been read since, or some of it, and publishes it. SPL_E_DEVICE_LOST. */
 int spl_gpu_upload(struct gpu *gpu, struct spl_error *err);
 
 #endif

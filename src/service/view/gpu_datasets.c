@@ -32,6 +32,7 @@ int spl_gpu_upload(struct gpu *gpu, struct spl_error *err)
     int rc = spl_renderer_upload(gpu->renderer, err);
     if (rc)
         return rc;
+    gpu->uploads_left = spl_renderer_wait(gpu->renderer, 0);
     spl_renderer_get_residency(gpu->renderer, NULL, &info);
     atomic_store(&gpu->pipeline->pages_pending, info.pages_pending);
     if (info.pages_loaded != gpu->pages_loaded || info.pages_evicted != gpu->pages_evicted)
@@ -46,8 +47,8 @@ static void on_page_read(void *context)
     spl_queue_interrupt(pipeline->render);
 }
 
-/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place costs its own
- * views only. */
+/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place, or whose disk
+ * does not answer, costs its own views only. */
 static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
 {
     struct spl_error why = {0};
@@ -60,37 +61,19 @@ static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struc
         else if (more)
             spl_renderer_wait(gpu->renderer, spl_now_ns() + look_around_ns);
     }
-    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO) {
+    if (rc == SPL_E_CORRUPT || rc == SPL_E_IO || rc == SPL_E_TIMEOUT) {
         spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, why.message);
         return 0;
     }
     return rc ? spl_fail(err, rc, "%s", why.message) : 0;
 }
 
-/* Waits for the page that is being read of it, if there is one. */
+/* A page that is being read of it ends by itself: nobody waits for a disk here. */
 static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
 {
     spl_renderer_remove(gpu->renderer, entry->dataset);
     TAILQ_REMOVE(&gpu->entries, entry, resident);
     spl_gpu_publish_residency(gpu);
-}
-
-/* Lets go of those that nothing is being read of. */
-static void let_leaving_go(struct gpu *gpu)
-{
-    STAILQ_HEAD(, spl_catalog_entry) looked_at = STAILQ_HEAD_INITIALIZER(looked_at);
-    STAILQ_CONCAT(&looked_at, &gpu->leaving);
-    for (struct spl_catalog_entry *entry; (entry = STAILQ_FIRST(&looked_at));) {
-        STAILQ_REMOVE_HEAD(&looked_at, link);
-        if (gpu->renderer && !spl_renderer_try_remove(gpu->renderer, entry->dataset)) {
-            STAILQ_INSERT_TAIL(&gpu->leaving, entry, link);
-            continue;
-        }
-        TAILQ_REMOVE(&gpu->entries, entry, resident);
-        if (gpu->renderer)
-            spl_gpu_publish_residency(gpu);
-        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
-    }
 }
 
 /* Gives back an entry that was to be added; the last unref() need not come here any more. */
@@ -118,16 +101,6 @@ static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int r
     return 0;
 }
 
-static uint32_t count_first_page_chunks(const struct spl_dataset *dataset)
-{
-    uint64_t count;
-    uint32_t chunks = 0;
-    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &count);
-    for (uint64_t i = 0; i < count; i++)
-        chunks += nodes[i].page == 0 ? nodes[i].chunk_count : 0; // every chunk is of one node
-    return chunks;
-}
-
 int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -140,7 +113,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
         size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
-        uint32_t chunks = count_first_page_chunks(entry->dataset);
+        uint32_t chunks = spl_dataset_get_tables(entry->dataset, 0)->chunk_count; // which are always kept
         if (options.first_page_chunks < chunks)
             options.first_page_chunks = chunks;
     }
@@ -171,23 +144,20 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
 
 void spl_gpu_tear_down(struct gpu *gpu)
 {
-    struct spl_catalog_entry *entry;
     if (!gpu->renderer)
         return;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    spl_renderer_remove(gpu->renderer, entry->dataset);
     spl_renderer_destroy(gpu->renderer);
     gpu->renderer = NULL;
     atomic_store(&gpu->pipeline->device_bytes, 0);
     atomic_store(&gpu->pipeline->pages_pending, 0);
-    let_leaving_go(gpu);
 }
 
 void spl_gpu_take_orders(struct gpu *gpu)
 {
     for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
         if (entry->state == SPL_ENTRY_LEAVING) {
-            STAILQ_INSERT_TAIL(&gpu->leaving, entry, link);
+            let_entry_go(gpu, entry);
+            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
             continue;
         }
         spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
@@ -200,7 +170,6 @@ void spl_gpu_take_orders(struct gpu *gpu)
             refuse_entry(gpu, entry, &err);
         }
     }
-    let_leaving_go(gpu);
 }
 
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu)

@@ -126,14 +126,6 @@ static void inject(struct gpu *gpu)
     spl_renderer_inject_loss(gpu->renderer);
 }
 
-/* A pick asks for all layers, and not every method has normals of bare points: the reply then says null. */
-static void leave_out_normals(struct spl_job *job)
-{
-    struct spl_view *view = &job->request.view;
-    if (job->request.picks && job->dataset && !spl_method_has_normals(view->method, spl_dataset_get_info(job->dataset)))
-        view->layers &= ~(1u << SPL_LAYER_NORMAL);
-}
-
 /* Sets the view to what its demand is best met with. A job that lacks the time is refused before it is planned. */
 static int plan(struct spl_job *job)
 {
@@ -154,7 +146,6 @@ static bool is_over(const struct gpu *gpu, struct spl_job *job)
 static int begin(struct gpu *gpu, struct spl_job *job)
 {
     inject(gpu);
-    leave_out_normals(job);
     return spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
 }
 
@@ -319,7 +310,7 @@ static void run(struct gpu *gpu)
             break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
-        struct spl_job *job = choose(gpu, !loading || gpu->loading_waits);
+        struct spl_job *job = choose(gpu, (!loading || gpu->loading_waits) && !gpu->uploads_left);
         if (!job && closed) {
             if (!wait_for_pages(gpu))
                 break;
@@ -337,12 +328,11 @@ void *spl_gpu_thread_run(void *argument)
     struct gpu gpu = {.pipeline = argument};
     const struct spl_pipeline_options *options = &gpu.pipeline->options;
     struct spl_error err = {0};
-    const char *plan = getenv("SPLATD_INJECT_LOSS_AFTER");
-    if (plan && sscanf(plan, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
+    const char *losses = getenv("SPLATD_INJECT_LOSS_AFTER");
+    if (losses && sscanf(losses, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
         gpu.inject_left = 1;
     gpu.inject_at = gpu.inject_every;
     TAILQ_INIT(&gpu.entries);
-    STAILQ_INIT(&gpu.leaving);
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);

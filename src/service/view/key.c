@@ -95,7 +95,7 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     bool colored = view->layers >> SPL_LAYER_COLOR & 1;
     uint32_t params = spl_method_get_params(view->method);
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {
-        bool counts = params >> i & 1 && (colored || spl_method_param_get(i)->shapes);
+        bool counts = params >> i & 1 && (colored || spl_method_param_get(i)->changes == SPL_CHANGES_SHAPES);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
     add(&form, colored ? background : 0);

@@ -44,6 +44,7 @@ static bool write_headers(const struct spl_job *job, char **text, size_t *length
     spl_headers_add_view(&headers, &job->request, &job->encoded);
     add_plan(&headers, job);
     spl_headers_add(&headers, "Splatd-Complete", "%s", job->stats.complete ? "true" : "false");
+    spl_headers_add(&headers, "Splatd-Pending", "%s", job->stats.pending ? "true" : "false");
     if (!job->request.picks)
         spl_headers_add(&headers, "Splatd-Splats", "%llu", (unsigned long long)job->stats.splats_drawn);
     spl_headers_add(&headers, "Splatd-Device", "%s", job->device);

@@ -70,7 +70,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_key key = {0};
-    if (parse_view(request, call, parse, &view, &err) || spl_view_check_version(&view, entry->info, &err))
+    if (parse_view(request, call, parse, &view, &err) || spl_view_check_dataset(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
         key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));

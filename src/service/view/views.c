@@ -87,14 +87,14 @@ void spl_views_complete(struct spl_service *service)
     spl_http_pump(service);
 }
 
-/* A URL that names a version means that one, whatever is served by now. */
-int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
-                           struct spl_error *err)
+int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
-    if (!view->versioned || view->version == info->version)
-        return 0;
-    return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
-                          (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+    if (view->versioned && view->version != info->version)
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
+                              (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+    if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
+        view->view.layers &= ~(1u << SPL_LAYER_NORMAL);
+    return view->planned ? 0 : spl_view_check_layers(&view->view, info, err); // what is planned may get another method
 }
 
 /* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view

@@ -34,9 +34,9 @@ void spl_views_finish(struct spl_service *service);
 /* Hands out every job that is done. */
 void spl_views_complete(struct spl_service *service);
 
-/* What views, batches and tours of them check alike. */
-int spl_view_check_version(const struct spl_view_request *view, const struct spl_dataset_info *info,
-                           struct spl_error *err);
+/* What views, batches and tours of them check alike. The first: a URL that names a version means that one, whatever is
+ * served by now; layers that the dataset does not have are refused, or, of picks, left out. */
+int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err);
 bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view,
                           struct spl_error *err); /* too much waits for clients */
 struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);

@@ -86,6 +86,7 @@ static void a_failure_leaves_what_was_there(void **state)
     err = (struct spl_error){0};
     assert_int_not_equal(spl_file_replace("/tmp/no-such-folder-of-splatd/x", "x", 1, &err), 0);
     assert_non_null(strstr(err.message, "/tmp/no-such-folder-of-splatd/x"));
+    assert_non_null(strstr(err.message, "there is no folder '/tmp/no-such-folder-of-splatd/'"));
     errno = 0;
     assert_int_equal(spl_file_sync_folder("/tmp/no-such-folder-of-splatd/x"), -1);
     assert_int_equal(errno, ENOENT);

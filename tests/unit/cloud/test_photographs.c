@@ -376,8 +376,12 @@ static void pose_folders_take_their_size_from_photographs(void **state)
     assert_true(spl_camera_project(&list.views[0].camera, (double[]){1, 1, 3}, pixel, &depth));
     assert_true(fabs(pixel[0] - 431.25) < 1e-9 && fabs(pixel[1] - 330.5) < 1e-9 && depth == 5);
     spl_view_list_finish(&list);
-    static const char *const rows[][2] = {{"1 0 0\n", "3 numbers"}, {"1 0 0 0 1 0 0 0 1 x\n", "'x'"}, {"", "empty"}};
-    for (size_t i = 0; i < 3; i++) {
+    static const char *const rows[][2] = {{"1 0 0\n", "3 numbers"},
+                                          {"1 0 0 0 1 0 0 0 1 x\n", "'x'"},
+                                          {"nan 0 0 0\n0 1 0 0\n0 0 1 -2\n0 0 0 1\n", "nan"},
+                                          {"1 0 0 1e999\n0 1 0 0\n0 0 1 -2\n0 0 0 1\n", "inf"},
+                                          {"", "empty"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         put_text("f-1.pose.txt", rows[i][0]);
         struct spl_error why = {0};
         assert_int_equal(load(&list, folder, NULL, NULL, &why), SPL_E_INPUT);

@@ -99,7 +99,35 @@ static void columns_are_recognised_by_their_values(void **state)
 static void a_header_without_names_asks_for_columns(void **state)
 {
     (void)state;
-    refused_text("easting northing height\n1 2 3\n", SPL_E_INPUT, "x", "name the columns with --columns");
+    refused_text("east north up\n1 2 3\n", SPL_E_INPUT, "x", "there are \"east north up\", and known are x y z");
+    refused_text("east north up\n1 2 3\n", SPL_E_INPUT, "x", "with --columns");
+    refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+    refused_text("x,lat,z\n7,47,3\n", SPL_E_INPUT, "y", "projected first");
+}
+
+static void surveyors_names_are_coordinates(void **state)
+{
+    struct loaded l;
+    (void)state;
+    load_text("Height,Easting,Northing,R,G,B\n3,1,2,9,8,7\n", NULL, &l);
+    assert_point(&l, 0, 1, 2, 3);
+    assert_color(&l, 0, 9, 8, 7);
+    loaded_finish(&l);
+    load_text("# easting northing elevation\n1 2 3\n", NULL, &l);
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+    load_text("height x y z easting\n9 1 2 3 8\n", NULL, &l); /* where a column has the name itself, that one */
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+}
+
+static void decimal_commas_are_named(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {"1,5;2,5;3,5\n", "x;y;z\n1;2;3\n1,5;2,5;3,5\n", "1,5 2,5 3,5\n",
+                                        "x y z\n1,5 2,5 3,5\n"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        refused_text(texts[i], SPL_E_INPUT, i < 2 ? "x" : "y", "decimal commas are not read");
 }
 
 static void counted_files(void **state)
@@ -165,6 +193,9 @@ static void broken_text_is_refused(void **state)
     b.length = 0;
     put(&b, "1 2 3\n4 5 6\n7 8\0009\n", 18); /* a zero byte makes it no text */
     refused(&b, NULL, SPL_E_INPUT, "", "no point cloud known");
+    b.length = 0;
+    put(&b, "SPLD\r\n\x1a\n\2\0\0\0", 12);
+    refused(&b, NULL, SPL_E_INPUT, "", "is packed already");
     b.length = 0;
     put(&b,
         "\xff\xfe"
@@ -235,6 +266,8 @@ int main(void)
         cmocka_unit_test(columns_are_recognised_by_their_values),
         cmocka_unit_test(counted_files),
         cmocka_unit_test(a_header_without_names_asks_for_columns),
+        cmocka_unit_test(surveyors_names_are_coordinates),
+        cmocka_unit_test(decimal_commas_are_named),
         cmocka_unit_test(samples_are_checked_against_the_rest),
         cmocka_unit_test(broken_text_is_refused),
         cmocka_unit_test(the_option_is_checked),

@@ -18,11 +18,11 @@ enum color { RED, GREEN, BLUE };
 struct arguments {
     const char *output, *name;
     bool json;
-    double lod;
-    uint64_t seed, memory;
+    double lod, far, eye[3];
+    uint64_t seed, memory, limit;
     uint32_t threads, size[2];
     enum color color;
-    int sum;
+    int sum, shade;
 };
 
 static const char *const colors[] = {"red", "green", "blue", NULL};
@@ -39,6 +39,27 @@ static int take_sum(void *arguments, const char *option, char *text, struct spl_
     return SPL_OK;
 }
 
+static int shade_from_name(const char *name)
+{
+    return strcmp(name, "grey") && strcmp(name, "gray") ? -1 : 0;
+}
+
+static const char *name_of_shade(int shade)
+{
+    return shade ? "dark" : "grey";
+}
+
+static int take_shade(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    return spl_cmd_take_name(option, text, shade_from_name, name_of_shade, 2, &((struct arguments *)arguments)->shade,
+                             err);
+}
+
+static void print_shades(FILE *out, size_t column)
+{
+    fprintf(out, "%*sall shades\n", (int)column, "");
+}
+
 static const struct spl_cmd_option options[] = {
     {.help = "Things:"},
     {"output", "FILE", "where it goes", .letter = 'o', SPL_CMD_TEXT(struct arguments, output)},
@@ -52,6 +73,11 @@ static const struct spl_cmd_option options[] = {
     {"color", "C", "of the rest, about which there is more to say than stands on one line, because it is long, and so "
                    "on, and so forth", .fallback = "green", SPL_CMD_CHOICE(struct arguments, color, colors)},
     {"sum", "LIST", "numbers", .fallback = "1,1", .take = take_sum},
+    {"limit", "BYTES", "of the rest", SPL_CMD_BYTES(struct arguments, limit, 1, UINT64_MAX)},
+    {"eye", "X,Y,Z", "where", SPL_CMD_VECTOR(struct arguments, eye)},
+    {"far", "F", "how far", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
+    {.help = "Shades:", .print = print_shades},
+    {"shade", "NAME", NULL, .take = take_shade},
 };
 
 static const struct spl_cmd_table table = {
@@ -111,6 +137,11 @@ static void options_set_their_members(void **state)
     assert_int_equal(a.color, BLUE);
     assert_int_equal(a.sum, 9);
     assert_int_equal(optind, 17); // one and two stand behind
+    assert_int_equal(parse("--limit 3 --eye 1,-2,3e2 --shade gray --far 1e12", &a, &err), 0);
+    assert_int_equal(a.limit, 3); // bytes
+    assert_true(a.eye[0] == 1 && a.eye[1] == -2 && a.eye[2] == 300 && a.far == 1e12);
+    assert_int_equal(parse("--limit 18446744073709551615", &a, &err), 0);
+    assert_true(a.limit == UINT64_MAX);
     assert_int_equal(parse("--out y --js", &a, &err), 0); // cut short
     assert_string_equal(a.output, "y");
     assert_true(a.json);
@@ -129,6 +160,12 @@ static void what_is_wrong_is_said(void **state)
         {"--threads 65", "--threads", "'65'"},
         {"--memory 1", "--memory takes a whole number from 64 to 1048576 MiB", "K, M, G or T"},
         {"--size 3x", "--size", "1280x720"},
+        {"--limit 0", "--limit takes a whole number from 1 to", "K, M, G or T"},
+        {"--eye 1,2", "--eye takes three numbers X,Y,Z, not '1,2'", ""},
+        {"--eye 1,2,inf", "--eye", "not '1,2,inf'"},
+        {"--far 0", "--far takes a number from 1e-09 to 1e+12, not '0'", ""},
+        {"--shade blue", "--shade takes grey or dark, not 'blue'", ""},
+        {"--shad", "--shade requires an argument, NAME", ""},
         {"--color pink", "--color takes red, green or blue, not 'pink'", ""},
         {"--sum 1,,2", "--sum takes numbers", ""},
         {"--output", "--output requires an argument, FILE", "'splatd try --help' shows how"},
@@ -173,6 +210,8 @@ static void help_follows_from_the_rows(void **state)
         "\n      --lod L        pixels a splat (0 to 64; default: 1.5)\n",
         "\n      --seed S       of the noise\n",
         "\n      --threads N    (1 to 64; default: all cores)\n",
+        "\n      --far F        how far\n",
+        "\nShades:\n                     all shades\nthe end\n",
         "because it is long,\n                     and so on, and so forth (default: green)\n",
         "the end\n",
     };

@@ -68,7 +68,7 @@ static void test_round_trip(void **state)
             bits += info->attribute_bits[a];
         for (uint32_t s = 0; s < info->stream_count; s++)
             bits += info->streams[s].bits;
-        uint64_t structs = 8 * (nodes * sizeof *node + chunks * (SPL_CHUNK_BYTES + 2 * SPL_STREAM_CHUNK_BYTES));
+        uint64_t structs = 8 * (nodes * SPL_NODE_BYTES + chunks * (SPL_CHUNK_BYTES + 2 * SPL_STREAM_CHUNK_BYTES));
         assert_true(bits > structs && bits <= 8 * bytes + structs);
         for (uint32_t i = 0; levels == 1 && i < count; i++) {
             struct spl_splat splat;
@@ -171,10 +171,8 @@ static const char *region_at(struct bytes b, size_t offset)
         if (offset >= s->offset && offset < s->offset + s->bytes)
             return s->type == SPL_SECTION_PAGE    ? "section PAGE 0 fails its checksum"
                    : s->type == SPL_SECTION_META  ? "section META fails its checksum"
-                   : s->type == SPL_SECTION_NODES ? "section NODE fails its checksum"
-                   : s->type == SPL_SECTION_STREAM
-                       ? (s->index ? "section STRM 1 fails its checksum" : "section STRM 0 fails its checksum")
-                       : "section CHNK fails its checksum";
+                   : s->type == SPL_SECTION_HEAD  ? "section HEAD 0 fails its checksum"
+                                                  : "section PDIR fails its checksum";
     }
     return NULL;
 }
@@ -209,7 +207,7 @@ static void test_every_flipped_bit(void **state)
         }
         assert_int_equal(pwrite(fd, &b.data[offset], 1, (off_t)offset), 1);
     }
-    assert_true(refused > 8 * (sizeof(struct spl_file_header) + sizeof(struct spl_node) + SPL_CHUNK_BYTES));
+    assert_true(refused > 8 * (sizeof(struct spl_file_header) + SPL_NODE_BYTES + SPL_CHUNK_BYTES));
     close(fd);
     unlink(path);
     free(b.data);
@@ -413,6 +411,23 @@ static void test_splats_by_id(void **state)
     free(splats);
 }
 
+static void test_no_path(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0}, other = {0};
+    struct spl_open_options options;
+    struct spl_reader reader;
+    spl_reader_init(&reader);
+    spl_open_options_init(&options);
+    options.reader = &reader;
+    assert_int_equal(spl_dataset_open(NULL, true, &dataset, &err), SPL_E_USAGE);
+    assert_int_equal(spl_dataset_open_with(NULL, &options, &dataset, &other), SPL_E_USAGE);
+    assert_string_equal(err.field, "path");
+    assert_string_equal(other.field, "path");
+    assert_null(dataset);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -421,6 +436,7 @@ int main(void)
         cmocka_unit_test(test_every_truncation),
         cmocka_unit_test(test_other_files),
         cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_no_path),
         cmocka_unit_test(test_splats_by_id),
         cmocka_unit_test(test_version_follows_content),
         cmocka_unit_test(test_refused_memory),

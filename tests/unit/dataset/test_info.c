@@ -130,6 +130,31 @@ static void test_table(void **state)
     assert_non_null(strstr(output, "crs           EPSG:2263"));
 }
 
+/* A scan's name comes into META and from there onto terminals. */
+static void test_texts_of_files_are_shown_not_carried_out(void **state)
+{
+    (void)state;
+    char output[8192];
+    assert_int_equal(
+        run("one.spld >/dev/null; for i in $(seq 300); do echo $i $((i * 7 % 13)) $((i % 5)); done >\"$(printf "
+            "'Z\\303\\274rich\\033[2J\\n\\302\\233x.xyz')\" && \"$SPLATD_BINARY\" pack *.xyz -o odd.spld 2>&1 && "
+            "\"$SPLATD_BINARY\" info odd.spld && rm odd.spld *.xyz",
+            output, sizeof output),
+        0);
+    assert_non_null(strstr(output, "reading Z\303\274rich?[2J??x.xyz: "));
+    assert_non_null(strstr(output, "  source        Z\303\274rich?[2J??x.xyz\n"));
+    assert_null(strchr(output, '\033'));
+    assert_null(strstr(output, "\302\233"));
+    assert_int_equal(run("\"$(printf 'none\\033[2J\\nforged.spld')\" 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "none?[2J?forged.spld"));
+    assert_int_equal(
+        run(">/dev/null 2>&1; seq 300 | sed 's/.*/& & 1/' >a.xyz; \"$SPLATD_BINARY\" pack a.xyz -o gone/a.spld 2>&1; "
+            "rm a.xyz",
+            output, sizeof output),
+        0);
+    assert_non_null(strstr(output, "cannot create gone/a.spld: there is no folder 'gone/'"));
+}
+
 static void test_exit_codes(void **state)
 {
     (void)state;
@@ -226,6 +251,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_json),
         cmocka_unit_test(test_table),
+        cmocka_unit_test(test_texts_of_files_are_shown_not_carried_out),
         cmocka_unit_test(test_exit_codes),
         cmocka_unit_test(test_textures),
     };

@@ -1,5 +1,6 @@
 /* A dataset from memory and from a reader is the one from the file; readers that fail, stop or lie are errors. */
 #include <errno.h>
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -113,7 +114,7 @@ static void test_readers_that_fail(void **state)
         const char *part;
     } rows[] = {
         {end, SPL_E_CORRUPT, "away.spld was cut short"},
-        {break_off, SPL_E_IO, "cannot read away.spld: Input/output error"},
+        {break_off, SPL_E_IO, ": Input/output error"},
         {overflow, SPL_E_IO, "more bytes than it was asked for"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
@@ -135,6 +136,8 @@ static void test_readers_that_fail(void **state)
             }
             if (rc != rows[i].code || !strstr(err.message, rows[i].part))
                 fail_msg("row %zu, call %ld: %d '%s'", i, at, rc, err.message);
+            assert_true(rows[i].code != SPL_E_IO || strstr(err.message, "cannot read away.spld, "));
+            assert_non_null(strstr(err.message, "offset "));
             assert_true(!dataset && !reader.closed);
         }
 }
@@ -185,6 +188,38 @@ static void test_a_callers_reader(void **state)
     assert_true(!of_reader && ours.closed == 1);
 }
 
+static void *let_go_later(void *dataset)
+{
+    usleep(50000);
+    spl_dataset_let_go(dataset);
+    return NULL;
+}
+
+/* What a read on another thread holds stays until that has ended; what a caller lends is waited for. */
+static void test_reads_outlive_close(void **state)
+{
+    (void)state;
+    struct spl_dataset *of_file, *of_reader;
+    struct reader reader = {0};
+    struct spl_dataset_source source = source_of(&reader);
+    pthread_t thread;
+    assert_int_equal(spl_dataset_open(path, true, &of_file, NULL), SPL_OK);
+    uint32_t *page = malloc(spl_dataset_get_page_bytes(of_file, 0));
+    spl_dataset_hold(of_file);
+    spl_dataset_hold(of_file);
+    spl_dataset_close(of_file); // does not wait
+    spl_dataset_let_go(of_file);
+    assert_int_equal(spl_dataset_read_page(of_file, 0, page, NULL), SPL_OK);
+    spl_dataset_let_go(of_file); // leak checkers see that it has gone
+    assert_int_equal(spl_dataset_open_source(&source, "away", true, NULL, &of_reader, NULL), SPL_OK);
+    spl_dataset_hold(of_reader);
+    assert_int_equal(pthread_create(&thread, NULL, let_go_later, of_reader), 0);
+    spl_dataset_close(of_reader);
+    assert_int_equal(reader.closed, 1);
+    pthread_join(thread, NULL);
+    free(page);
+}
+
 static void prepare(const char *folder)
 {
     struct make_splat *splats = calloc(count, sizeof *splats);
@@ -206,6 +241,7 @@ int main(void)
         cmocka_unit_test(test_readers_that_fail),
         cmocka_unit_test(test_sizes_that_lie),
         cmocka_unit_test(test_a_callers_reader),
+        cmocka_unit_test(test_reads_outlive_close),
     };
     char folder[256];
     make_folder(folder);

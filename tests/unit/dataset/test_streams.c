@@ -107,9 +107,22 @@ static void test_bad_codes(void **state)
     assert_int_equal(spl_stream_type_from_name("UINT"), SPL_STREAM_UNKNOWN);
 }
 
+/* Figures of both stand in one object by name. */
+static void names_that_every_dataset_has_are_taken(void **state)
+{
+    (void)state;
+    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
+        assert_true(spl_stream_name_is_taken(spl_attribute_name((enum spl_attribute)a)));
+    assert_true(spl_stream_name_is_taken("total") && spl_stream_name_is_taken("position_axis"));
+    for (int k = 0; k < SPL_STREAM_KNOWN_COUNT; k++)
+        assert_false(spl_stream_name_is_taken(spl_streams_known[k].name));
+    assert_false(spl_stream_name_is_taken("intensity"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(names_that_every_dataset_has_are_taken),
         cmocka_unit_test(test_whole_numbers_are_exact),
         cmocka_unit_test(test_half_octaves),
         cmocka_unit_test(test_bad_codes),

@@ -112,23 +112,10 @@ static void expect(const char *what, int code, const char *part)
 FORGE(nothing, (void)p)
 FORGE(root_depth, p->nodes[0].depth = 1)
 FORGE(child_depth, p->nodes[3].depth = 2)
-FORGE(cycle, p->nodes[0].first_child = 0)
-FORGE(child_beyond, p->nodes[0].first_child = 2)
 FORGE(children_missing, p->nodes[0].child_count = 3)
-FORGE(children_many, p->nodes[0].child_count = 9)
-FORGE(children_beyond, p->node_count = 4)
-FORGE(grandchild, (p->nodes[4].child_count = 1, p->nodes[4].first_child = 5))
-FORGE(stray_first_child, p->nodes[2].first_child = 3)
-FORGE(page_number, p->nodes[2].page = 1)
-FORGE(shared_chunk, p->nodes[2].first_chunk = p->nodes[1].first_chunk)
-FORGE(chunk_beyond, p->nodes[4].first_chunk = UINT64_MAX)
-FORGE(chunk_wraps, p->nodes[4].first_chunk += 1ull << 32)
-FORGE(child_wraps, p->nodes[0].first_child += 1ull << 32)
-FORGE(chunks_beyond, p->nodes[4].chunk_count = 4096)
-FORGE(no_chunks, p->nodes[1].chunk_count = 0)
-FORGE(orphan_chunk, (p->chunks[p->chunk_count] = p->chunks[p->chunk_count - 1],
-                     p->bases[0][p->chunk_count] = p->bases[1][p->chunk_count] = 0,
-                     p->widths[0][p->chunk_count] = p->widths[1][p->chunk_count] = 0, p->chunk_count++))
+FORGE(children_beyond, p->nodes[0].child_count = 8)
+FORGE(grandchild, p->nodes[4].child_count = 1)
+FORGE(own_child, (p->nodes[0].child_count = 3, p->nodes[4].child_count = 1))
 FORGE(origin_nan, p->nodes[1].origin[1] = NAN)
 FORGE(size_zero, p->nodes[0].size = 0)
 FORGE(size_huge, p->nodes[2].size *= 2)
@@ -137,7 +124,7 @@ FORGE(child_nan_size, p->nodes[2].size = NAN)
 FORGE(spacing_negative, p->nodes[0].spacing = -1)
 FORGE(box_turned, p->nodes[0].box_min[2] = p->nodes[0].box_max[2] + 1)
 FORGE(box_infinite, p->nodes[0].box_max[0] = INFINITY)
-FORGE(count_zero, p->chunks[1].count = 0)
+FORGE(count_zero, p->chunks[0].count = 0)
 FORGE(count_large, p->chunks[1].count = 129)
 FORGE(step_zero, p->chunks[0].step = 0)
 FORGE(step_nan, p->chunks[0].step = NAN)
@@ -166,6 +153,8 @@ FORGE(two_of_a_name, add_stream(p, "class", "uint", ""))
 FORGE(empty_name, add_stream(p, "", "uint", ""))
 FORGE(long_name, add_stream(p, "a-name-of-thirty-two-characters-", "uint", ""))
 FORGE(long_unit, add_stream(p, "a", "uint", "a-unit-of-thirty-two-characters-"))
+FORGE(taken_name, add_stream(p, "position", "uint", ""))
+FORGE(total_name, add_stream(p, "total", "uint", ""))
 FORGE(uncertainty_negative, p->bases[1][0] = 0xbf800000)
 FORGE(uncertainty_wide, p->widths[1][0] = 6)
 FORGE(unit_text, json_object_set_new(p->meta, "unit", json_string("km")))
@@ -177,12 +166,13 @@ FORGE(many_lines, p->chunks[0].extra_bits |= 255u << SPL_EXTRA_CLIP)
 FORGE(lines_past_page,
       p->chunks[p->chunk_count - 1].extra_bits |= p->chunks[p->chunk_count - 1].count << SPL_EXTRA_CLIP)
 FORGE(unknown_extra, p->chunks[0].extra_bits |= 1u << 8)
-FORGE(unknown_kind, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_KINDS << SPL_EXTRA_KIND)
 FORGE(discs_as_lines, p->chunks[0].extra_bits |= (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND)
 FORGE(uncertainty_nan, p->bases[1][0] = 0x7fc00000)
 FORGE(past_page, p->chunks[p->chunk_count - 1].geometry_word += 1 + 16)
 FORGE(word_wraps, p->chunks[0].geometry_word = UINT32_MAX)
 FORGE(levels, json_object_set_new(p->meta, "levels", json_integer(3)))
+FORGE(levels_few, json_object_set_new(p->meta, "levels", json_integer(1)))
+FORGE(levels_many, json_object_set_new(p->meta, "levels", json_integer(257)))
 FORGE(leaf_splats, json_object_set_new(p->meta, "leaf_splats", json_integer(399)))
 FORGE(points_few, json_object_set_new(p->meta, "points", json_integer(399)))
 FORGE(points_text, json_object_set_new(p->meta, "points", json_string("400")))
@@ -193,6 +183,7 @@ FORGE(bounds_short, json_array_remove(json_object_get(json_object_get(p->meta, "
 FORGE(fov, json_object_set_new(json_object_get(p->meta, "default_view"), "fov", json_real(180)))
 FORGE(eye, json_object_set(json_object_get(p->meta, "default_view"), "eye",
                            json_object_get(json_object_get(p->meta, "default_view"), "target")))
+FORGE(up, json_array_set_new(json_object_get(json_object_get(p->meta, "default_view"), "up"), 1, json_string("north")))
 FORGE(flags, json_object_del(json_object_get(p->meta, "attributes"), "color"))
 FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
 FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
@@ -210,85 +201,78 @@ static const struct {
     const char *part; /* of the message; NULL: opens */
 } rows[] = {
     {nothing, NULL},
-    {root_depth, "section NODE: node 0 is the root"},
-    {child_depth, "section NODE: node 3 is not one deeper"},
-    {cycle, "section NODE: node 0 has children that do not follow"},
-    {child_beyond, "section NODE: node 0 has children that do not follow"},
-    {children_missing, "section NODE: node 4 is no node's child"},
-    {children_many, "section NODE: node 0 has more than 8"},
-    {children_beyond, "section NODE: node 0 has children that do not follow"},
-    {grandchild, "section NODE: node 4 has children"},
-    {stray_first_child, "section NODE: node 2 has a first child"},
-    {page_number, "section NODE: node 2 names a page"},
-    {shared_chunk, "section NODE: node 2 shares a chunk"},
-    {chunk_beyond, "section NODE: node 4 names chunks"},
-    {chunks_beyond, "section NODE: node 4 names chunks"},
-    {chunk_wraps, "section NODE: node 4 names chunks"},
-    {child_wraps, "section NODE: node 0 has children that do not follow"},
-    {no_chunks, "section NODE: node 1 has no chunks"},
-    {orphan_chunk, "section CHNK: number of chunks"},
-    {origin_nan, "section NODE: node 1 has no finite origin"},
-    {size_zero, "section NODE: node 0 has a size"},
-    {size_huge, "section NODE: node 2 is larger than half"},
-    {child_moved, "section NODE: node 2 lies outside"},
-    {child_nan_size, "section NODE: node 2 has a size"},
-    {spacing_negative, "section NODE: node 0 has a size or spacing"},
-    {box_turned, "section NODE: node 0 has a box"},
-    {box_infinite, "section NODE: node 0 has no finite box"},
-    {count_zero, "section CHNK: chunk 1 has no splats"},
-    {count_large, "section CHNK: chunk 1 has no splats, or more"},
-    {step_zero, "section CHNK: chunk 0 has a step"},
-    {step_nan, "section CHNK: chunk 0 has a step"},
-    {step_overflows, "section CHNK: chunk 0 has positions"},
-    {wide_position, "section CHNK: chunk 0 has positions"},
-    {wide_normal, "section CHNK: chunk 0 has normals"},
-    {radius_negative, "section CHNK: chunk 0 has a step or radius"},
-    {mean_radius_zero, "section CHNK: chunk 0 has a step or radius"},
-    {normal_off, "section CHNK: chunk 0 has normals off"},
-    {normal_step, "section CHNK: chunk 0 has a step"},
-    {axis_three, "section CHNK: chunk 0 has geometry bits"},
-    {unknown_bit, "section CHNK: chunk 0 has geometry bits"},
-    {wide_color, "section CHNK: chunk 0 has colours"},
-    {color_base, "section CHNK: chunk 0 has colours"},
-    {wide_class, "section STRM 0: chunk 0 has codes of more than 32 bits"},
+    {root_depth, "section HEAD 0: node 0 is the root"},
+    {child_depth, "section HEAD 0: node 3 lies deeper than META's"},
+    {children_missing, "section PDIR: page 1 closes it"},
+    {children_beyond, "section PDIR: page 1 closes it"},
+    {grandchild, "section PDIR: page 1 closes it"},
+    {own_child, "section HEAD 0: node 4 is no node's child"},
+    {origin_nan, "section HEAD 0: node 1 has no finite origin"},
+    {size_zero, "section HEAD 0: node 0 has a size"},
+    {size_huge, "section HEAD 0: node 2 is larger than half"},
+    {child_moved, "section HEAD 0: node 2 lies outside"},
+    {child_nan_size, "section HEAD 0: node 2 has a size"},
+    {spacing_negative, "section HEAD 0: node 0 has a size or spacing"},
+    {box_turned, "section HEAD 0: node 0 has a box"},
+    {box_infinite, "section HEAD 0: node 0 has no finite box"},
+    {count_zero, "section HEAD 0: chunk 0 has no splats"},
+    {count_large, "section HEAD 0: chunk 1 has no splats, or more"},
+    {step_zero, "section HEAD 0: chunk 0 has a step"},
+    {step_nan, "section HEAD 0: chunk 0 has a step"},
+    {step_overflows, "section HEAD 0: chunk 0 has positions"},
+    {wide_position, "section HEAD 0: chunk 0 has positions"},
+    {wide_normal, "section HEAD 0: chunk 0 has normals"},
+    {radius_negative, "section HEAD 0: chunk 0 has a step or radius"},
+    {mean_radius_zero, "section HEAD 0: chunk 0 has a step or radius"},
+    {normal_off, "section HEAD 0: chunk 0 has normals off"},
+    {normal_step, "section HEAD 0: chunk 0 has a step"},
+    {axis_three, "section HEAD 0: chunk 0 has geometry bits"},
+    {unknown_bit, "section HEAD 0: chunk 0 has geometry bits"},
+    {wide_color, "section HEAD 0: chunk 0 has colours"},
+    {color_base, "section HEAD 0: chunk 0 has colours"},
+    {wide_class, "section HEAD 0: attribute class of chunk 0 has codes of more than 32 bits"},
     {class_past_page, "reaches beyond the end of its page"},
     {no_streams, NULL},
-    {two_of_a_name, "section META: \"streams\" has two of one name"},
-    {empty_name, "section META: \"streams\" must say \"name\""},
-    {long_name, "section META: \"streams\" must say \"name\""},
-    {long_unit, "section META: \"streams\" must say \"name\""},
-    {uncertainty_negative, "section STRM 1: chunk 0 has a largest value that is negative"},
-    {uncertainty_wide, "section STRM 1: chunk 0 has a largest value that is negative or not finite, or codes"},
-    {unit_text, "section META: \"unit\" must be m, ft"},
-    {unit_number, "section META: \"unit\" must be m, ft"},
+    {two_of_a_name, "section META: \"streams[2].name\" is \"class\", and must be another: a stream"},
+    {empty_name, "section META: \"streams[2].name\" is \"\", and must be a text of 1"},
+    {long_name, "section META: \"streams[2].name\" is \"a-name-of"},
+    {long_unit, "section META: \"streams[2].unit\" is \"a-unit-of-thirty-two-characters-\", and must be a text of at most"},
+    {taken_name, "section META: \"streams[2].name\" is \"position\", and must be another: this is what every"},
+    {total_name, "section META: \"streams[2].name\" is \"total\", and"},
+    {uncertainty_negative, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative"},
+    {uncertainty_wide, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative or not finite, or codes"},
+    {unit_text, "section META: \"unit\" is \"km\", and must be m, ft"},
+    {unit_number, "section META: \"unit\" is 1, and must be m, ft"},
     {unit_gone, NULL},
-    {crs_number, "section META: \"crs\" must be a text"},
+    {crs_number, "section META: \"crs\" is 2056, and must be a text"},
     {crs_null, NULL},
-    {many_lines, "section CHNK: chunk 0 has more clip lines than splats"},
+    {many_lines, "section HEAD 0: chunk 0 has more clip lines than splats"},
     {lines_past_page, "reaches beyond the end of its page"},
-    {unknown_extra, "section CHNK: chunk 0 has extra bits"},
-    {unknown_kind, "section CHNK: chunk 0 is of a kind"},
-    {discs_as_lines, "section CHNK: chunk 0 has fields that lines"},
-    {uncertainty_nan, "section STRM 1: chunk 0 has a largest value"},
+    {unknown_extra, "section HEAD 0: chunk 0 has extra bits"},
+    {discs_as_lines, "section HEAD 0: chunk 0 has fields that lines"},
+    {uncertainty_nan, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value"},
     {past_page, "reaches beyond the end of its page"},
-    {word_wraps, "section CHNK: chunk 0 reaches beyond"},
-    {levels, "section META: \"levels\" 3 is not"},
-    {leaf_splats, "section META: \"leaf_splats\" 399 is not"},
-    {points_few, "section META: \"leaf_splats\" is larger"},
-    {points_text, "section META: \"points\" must be"},
-    {points_gone, "section META: \"points\" must be"},
-    {radius_gone, "section META: \"splat_radius\" must be"},
-    {bounds_turned, "section META: \"bounds\" has a minimum"},
-    {bounds_short, "section META: \"bounds\" must hold"},
-    {fov, "section META: \"default_view\" has no \"fov\""},
-    {eye, "section META: \"default_view\" is no view"},
-    {flags, "section META: \"attributes\" must say"},
-    {sources, "section META: \"sources\" must be"},
-    {stations, "section META: \"stations\" must hold"},
+    {word_wraps, "section HEAD 0: chunk 0 reaches beyond"},
+    {levels, "section META: \"levels\" is not what the nodes"},
+    {levels_few, "section HEAD 0: node 1 lies deeper than META's"},
+    {levels_many, "section META: \"levels\" is 257, and must be a whole number from 1 to 256"},
+    {leaf_splats, "section META: \"leaf_splats\" is not what the nodes"},
+    {points_few, "section META: \"leaf_splats\" is 400, and must be at most \"points\""},
+    {points_text, "section META: \"points\" is \"400\", and must be a whole number"},
+    {points_gone, "section META: \"points\" is missing, and must be"},
+    {radius_gone, "section META: \"splat_radius\" is missing, and must be"},
+    {bounds_turned, "section META: \"bounds.min[0]\" is 1000000000.0, and must be at most that of"},
+    {bounds_short, "section META: \"bounds.max\" is an array of 2, and must be an array of three"},
+    {fov, "section META: \"default_view.fov\" is 180.0, and must be"},
+    {up, "section META: \"default_view.up[1]\" is \"north\", and must be a coordinate"},
+    {eye, "section META: \"default_view\" is no view: "},
+    {flags, "section META: \"attributes.color\" is missing, and must be true"},
+    {sources, "section META: \"sources[0]\" is 1, and must be a name"},
+    {stations, "section META: \"stations[0]\" is an array of 1, and must be a matrix"},
     {color, NULL},
-    {color_text, "section META: \"color\" must be an array"},
-    {color_few, "section META: \"color\" must say of each \"source\""},
-    {color_what, "section META: \"color\" is \"from\" rgb"},
+    {color_text, "section META: \"color\" is \"rgb\", and must be an array"},
+    {color_few, "section META: \"color[0].points\" is -1, and must be"},
+    {color_what, "section META: \"color[0].from\" is \"xyz\", and must be rgb"},
 };
 
 static void test_forged_content(void **state)
@@ -338,6 +322,46 @@ static void save_raw(struct raw *raw)
     fclose(file);
 }
 
+/* The sections in their order. */
+enum { PAGE, META, PDIR, HEAD };
+
+static void rehash(struct raw *r, int section)
+{
+    r->table[section].hash = XXH3_64bits(r->data + r->table[section].offset, r->table[section].bytes);
+}
+
+/* The directory's row `row`. */
+static struct spl_page_row *row_of(struct raw *r, int row)
+{
+    return (struct spl_page_row *)(void *)(r->data + r->table[PDIR].offset) + row;
+}
+
+static void set_node(struct raw *r, uint32_t node, size_t offset, const void *value, size_t bytes)
+{
+    memcpy(r->data + r->table[HEAD].offset + (size_t)node * SPL_NODE_BYTES + offset, value, bytes);
+    rehash(r, HEAD);
+}
+
+static void set_children(struct raw *r, uint32_t node, uint8_t count)
+{
+    set_node(r, node, offsetof(struct spl_node, child_count), &count, 1);
+}
+
+static void set_chunks(struct raw *r, uint32_t node, uint16_t count)
+{
+    set_node(r, node, offsetof(struct spl_node, chunk_count), &count, 2);
+}
+
+/* Puts `with` (no longer) for `text` in META. */
+static void set_meta(struct raw *r, const char *text, const char *with)
+{
+    char *at = memmem(r->data + r->table[META].offset, r->table[META].bytes, text, strlen(text));
+    assert_non_null(at);
+    memset(at, ' ', strlen(text));
+    memcpy(at, with, strlen(with));
+    rehash(r, META);
+}
+
 #define FORGE_RAW(name, statement)                                                                                     \
     static void name(struct raw *r)                                                                                    \
     {                                                                                                                  \
@@ -356,24 +380,55 @@ FORGE_RAW(raw_page_beyond, r->table[0].bytes = UINT64_MAX)
 FORGE_RAW(raw_offset_wraps, (r->table[0].offset = UINT64_MAX - 65535, r->table[0].bytes = 65536))
 FORGE_RAW(raw_misaligned, (r->table[0].offset += 64, r->table[0].bytes -= 64))
 FORGE_RAW(raw_overlap, r->table[1].offset = r->table[0].offset)
-FORGE_RAW(raw_over_table, r->table[5].bytes += 72)
+FORGE_RAW(raw_over_table, r->table[HEAD].bytes += 72)
 FORGE_RAW(raw_tiny_page, r->table[0].bytes = 4)
 FORGE_RAW(raw_page_index, r->table[0].index = 1)
 FORGE_RAW(raw_two_metas, r->table[2].type = SPL_SECTION_META)
 FORGE_RAW(raw_no_meta, r->table[1].type = SPL_FOURCC('X', 'X', 'X', 'X'))
-FORGE_RAW(raw_half_node, r->table[2].bytes -= 1)
-FORGE_RAW(raw_half_chunk, r->table[3].bytes -= 1)
-FORGE_RAW(raw_stream_short, (r->table[4].bytes -= 5, r->table[4].hash = XXH3_64bits(r->data + r->table[4].offset,
-                                                                                 r->table[4].bytes)))
+FORGE_RAW(raw_half_row, r->table[PDIR].bytes -= 1)
+FORGE_RAW(raw_row_short, (r->table[PDIR].bytes -= sizeof(struct spl_page_row), rehash(r, PDIR)))
+FORGE_RAW(raw_no_directory, r->table[PDIR].type = SPL_FOURCC('X', 'X', 'X', 'X'))
+FORGE_RAW(raw_no_head, r->table[HEAD].type = SPL_FOURCC('X', 'X', 'X', 'X'))
+FORGE_RAW(raw_head_index, r->table[HEAD].index = 1)
+FORGE_RAW(raw_head_tiny, r->table[HEAD].bytes = SPL_NODE_BYTES)
+FORGE_RAW(raw_head_short, (r->table[HEAD].bytes -= 1, rehash(r, HEAD)))
+FORGE_RAW(raw_row_begins, (row_of(r, 0)->first_node = 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_begins_id, (row_of(r, 0)->first_id = 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_begins_child, (row_of(r, 0)->first_child = 0, rehash(r, PDIR)))
+FORGE_RAW(raw_row_empty, (row_of(r, 1)->first_chunk = 0, rehash(r, PDIR)))
+FORGE_RAW(raw_row_nodes, (row_of(r, 1)->first_node -= 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_nodes_wrap, (row_of(r, 1)->first_node += 1ull << 62, rehash(r, PDIR))) // times 60 it is the same
+FORGE_RAW(raw_row_chunks_wrap, (row_of(r, 1)->first_chunk += 1ull << 63, rehash(r, PDIR)))
+FORGE_RAW(raw_row_ids_few, (row_of(r, 1)->first_id = 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_ids_many, (row_of(r, 1)->first_id = UINT64_MAX, rehash(r, PDIR)))
+FORGE_RAW(raw_row_ids, (row_of(r, 1)->first_id += 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_children, (row_of(r, 1)->first_child += 1, rehash(r, PDIR)))
+FORGE_RAW(raw_row_children_wrap, (row_of(r, 1)->first_child = 0, rehash(r, PDIR)))
+FORGE_RAW(raw_many_children, set_children(r, 0, 9))
+FORGE_RAW(raw_children_beyond, set_children(r, 0, 5))
+FORGE_RAW(raw_fewer_children, set_children(r, 0, 3))
+FORGE_RAW(raw_chunks_none, set_chunks(r, 1, 0))
+FORGE_RAW(raw_chunks_beyond, set_chunks(r, 4, 4096))
+FORGE_RAW(raw_chunks_many, set_chunks(r, 4, 4097))
+FORGE_RAW(raw_unknown_kind, (r->data[r->table[HEAD].offset + 5 * SPL_NODE_BYTES + SPL_CHUNK_BYTES - 1] = SPL_CHUNK_KINDS,
+                             rehash(r, HEAD)))
+FORGE_RAW(raw_head_damaged, r->data[r->table[HEAD].offset] ^= 1)
+FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 449"))
+FORGE_RAW(raw_splats_many, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
+FORGE_RAW(raw_splats_few, set_meta(r, "\"splats\": 450", "\"splats\": 399"))
+FORGE_RAW(raw_splats_negative, set_meta(r, "\"splats\": 450", "\"splats\": -1"))
+FORGE_RAW(raw_pieces, set_meta(r, "\"pieces\": 0", "\"pieces\": 1"))
+FORGE_RAW(raw_linear, set_meta(r, "\"linear_chunks\": 0", "\"linear_chunks\": 1"))
+FORGE_RAW(raw_no_bits, set_meta(r, "\"bits\"", "\"bots\""))
+FORGE_RAW(raw_stream_bits, set_meta(r, "\"stream_bits\"", "\"strom_bits\""))
+FORGE_RAW(raw_fewer_streams, set_meta(r, "\"streams\"", "\"strooms\""))
+FORGE_RAW(raw_stream_type, set_meta(r, "\"type\": \"uint\"", "\"type\": 7"))
 FORGE_RAW(raw_meta_array, (memcpy(r->data + r->table[1].offset, "[]", 2), r->table[1].bytes = 2,
                            r->table[1].hash = XXH3_64bits("[]", 2)))
 FORGE_RAW(raw_meta_cut, (r->table[1].bytes -= 1,
                          r->table[1].hash = XXH3_64bits(r->data + r->table[1].offset, r->table[1].bytes)))
-FORGE_RAW(raw_stream_half, r->table[4].bytes -= 1)
-FORGE_RAW(raw_stream_gone, r->table[5].type = SPL_FOURCC('X', 'X', 'X', 'X'))
-FORGE_RAW(raw_stream_index, r->table[4].index = 1)
 FORGE_RAW(raw_no_page, r->table[0].type = SPL_FOURCC('X', 'X', 'X', 'X'))
-FORGE_RAW(raw_unknown, (memmove(r->table + 1, r->table, 6 * sizeof *r->table),
+FORGE_RAW(raw_unknown, (memmove(r->table + 1, r->table, 4 * sizeof *r->table),
                         r->table[0] = (struct spl_section){.type = SPL_FOURCC('N', 'E', 'W', 'S'),
                                                            .offset = 64,
                                                            .bytes = 3,
@@ -399,19 +454,50 @@ static const struct {
     {raw_offset_wraps, SPL_E_CORRUPT, "section PAGE 0 overlaps"},
     {raw_misaligned, SPL_E_CORRUPT, "section PAGE 0 is misaligned"},
     {raw_overlap, SPL_E_CORRUPT, "section META overlaps"},
-    {raw_over_table, SPL_E_CORRUPT, "section STRM 1 overlaps"},
+    {raw_over_table, SPL_E_CORRUPT, "section HEAD 0 overlaps"},
     {raw_tiny_page, SPL_E_CORRUPT, "section PAGE 0 has a size"},
     {raw_page_index, SPL_E_CORRUPT, "section PAGE 1 is out of order"},
     {raw_two_metas, SPL_E_CORRUPT, "section META occurs twice"},
     {raw_no_meta, SPL_E_CORRUPT, "section table lists no section META"},
-    {raw_half_node, SPL_E_CORRUPT, "section NODE is not a whole number"},
-    {raw_half_chunk, SPL_E_CORRUPT, "section CHNK is not a whole number"},
-    {raw_stream_short, SPL_E_CORRUPT, "section STRM 0 has not a base and a width for each chunk"},
+    {raw_half_row, SPL_E_CORRUPT, "section PDIR is not a whole number of rows"},
+    {raw_row_short, SPL_E_CORRUPT, "section PDIR has not a row for each page"},
+    {raw_no_directory, SPL_E_CORRUPT, "section table lists no section PDIR"},
+    {raw_no_head, SPL_E_CORRUPT, "section table lists no section HEAD"},
+    {raw_head_index, SPL_E_CORRUPT, "section HEAD 1 is out of order"},
+    {raw_head_tiny, SPL_E_CORRUPT, "section HEAD 0 has a size that no head can have"},
+    {raw_head_short, SPL_E_CORRUPT, "section PDIR: page 0 has another number of nodes or chunks than its head"},
+    {raw_row_begins, SPL_E_CORRUPT, "section PDIR: page 0 does not begin"},
+    {raw_row_begins_id, SPL_E_CORRUPT, "section PDIR: page 0 does not begin"},
+    {raw_row_begins_child, SPL_E_CORRUPT, "section PDIR: page 0 does not begin"},
+    {raw_row_empty, SPL_E_CORRUPT, "section PDIR: page 0 has no nodes or no chunks"},
+    {raw_row_nodes, SPL_E_CORRUPT, "section PDIR: page 0 has another number of nodes"},
+    {raw_row_nodes_wrap, SPL_E_CORRUPT, "section PDIR: page 0 has another number of nodes"},
+    {raw_row_chunks_wrap, SPL_E_CORRUPT, "section PDIR: page 0 has another number of nodes"},
+    {raw_row_ids_few, SPL_E_CORRUPT, "section PDIR: page 0 has more or fewer splats"},
+    {raw_row_ids_many, SPL_E_CORRUPT, "section PDIR: page 0 has more or fewer splats"},
+    {raw_row_ids, SPL_E_CORRUPT, "does not end with the id that PDIR says"},
+    {raw_row_children, SPL_E_CORRUPT, "section PDIR: page 1 closes it"},
+    {raw_row_children_wrap, SPL_E_CORRUPT, "section PDIR: page 0 has more or fewer children"},
+    {raw_many_children, SPL_E_CORRUPT, "section HEAD 0: node 0 has more than 8 children"},
+    {raw_children_beyond, SPL_E_CORRUPT, "section HEAD 0: node 0 has more children than PDIR leaves it"},
+    {raw_fewer_children, SPL_E_CORRUPT, "section HEAD 0: node 4 is no node's child"},
+    {raw_chunks_none, SPL_E_CORRUPT, "section HEAD 0: node 1 has no chunks"},
+    {raw_chunks_beyond, SPL_E_CORRUPT, "section HEAD 0: node 4 has more chunks than PDIR leaves it"},
+    {raw_chunks_many, SPL_E_CORRUPT, "section HEAD 0: node 4 has no chunks, or too many"},
+    {raw_unknown_kind, SPL_E_CORRUPT, "section HEAD 0: chunk 0 is of a kind"},
+    {raw_head_damaged, SPL_E_CORRUPT, "section HEAD 0 fails its checksum; copy"},
+    {raw_splats, SPL_E_CORRUPT, "section META: \"counts\" is not what the nodes and chunks hold"},
+    {raw_splats_many, SPL_E_CORRUPT, "section META: \"counts\" has more splats or pieces than PDIR"},
+    {raw_splats_few, SPL_E_CORRUPT, "section META: \"counts.splats\" is "},
+    {raw_splats_negative, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_pieces, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
+    {raw_linear, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
+    {raw_no_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_stream_bits, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_fewer_streams, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
+    {raw_stream_type, SPL_E_CORRUPT, "section META: \"streams[0].type\" is no text, and must be a text of 1 to 31"},
     {raw_meta_array, SPL_E_CORRUPT, "section META is no JSON object; pack"},
     {raw_meta_cut, SPL_E_CORRUPT, "section META is no JSON object: "},
-    {raw_stream_half, SPL_E_CORRUPT, "section STRM 0 is not a whole number"},
-    {raw_stream_gone, SPL_E_CORRUPT, "\"streams\" are not as many as the sections STRM"},
-    {raw_stream_index, SPL_E_CORRUPT, "section STRM 1 is out of order"},
     {raw_no_page, SPL_E_CORRUPT, "section table lists no section PAGE"},
     {raw_unknown, SPL_OK, NULL},
     {raw_unknown_damaged, SPL_E_CORRUPT, "section NEWS fails its checksum"},

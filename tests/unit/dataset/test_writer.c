@@ -75,7 +75,7 @@ static void test_pages(void **state)
     memset(words, 'a', SPL_META_BYTES_MAX); /* what no reader takes is not written */
     json_t *meta = json_pack("{s:s}", "sources", (const char *)words);
     err = (struct spl_error){0};
-    assert_int_equal(spl_dataset_writer_finish(writer, &(struct spl_node){0}, 1, &(struct spl_chunk){0}, 1, meta, &err),
+    assert_int_equal(spl_dataset_writer_finish(writer, &(struct spl_node){.chunk_count = 1}, 1, &(struct spl_chunk){0}, 1, meta, &err),
                      SPL_E_LIMIT);
     assert_non_null(strstr(err.message, "describes the dataset"));
     json_decref(meta);
@@ -139,7 +139,7 @@ static void test_full_disk(void **state)
     for (off_t size = 0; size <= status.st_size; size += size < 65528 ? 65528 : 8) {
         struct spl_dataset_writer *writer;
         struct spl_error err = {0};
-        struct spl_node node = {.size = 1};
+        struct spl_node node = {.size = 1, .chunk_count = 1};
         struct spl_chunk chunk = {.count = 1};
         uint32_t words[8] = {0}, page;
         json_t *meta = json_pack("{s:s}", "points", "of no importance here");
@@ -173,12 +173,12 @@ static void test_bad_targets(void **state)
     char bad[400];
     snprintf(bad, sizeof bad, "%s/missing/x.spld", folder);
     assert_int_equal(spl_dataset_writer_create(bad, &writer, &err), SPL_E_IO);
-    assert_non_null(strstr(err.message, "missing/x.spld.part-"));
+    assert_non_null(strstr(err.message, "missing/x.spld: there is no folder"));
     assert_null(writer);
 
     snprintf(bad, sizeof bad, "%s/folder.spld", folder); /* a folder in the way: found at the rename */
     assert_int_equal(mkdir(bad, 0777), 0);
-    struct spl_node node = {.size = 1};
+    struct spl_node node = {.size = 1, .chunk_count = 1};
     struct spl_chunk chunk = {.count = 1};
     uint32_t page;
     json_t *meta = json_object();
@@ -201,7 +201,7 @@ static void test_refused_memory(void **state)
     for (;; n++) {
         struct spl_dataset_writer *writer;
         struct spl_error err = {0};
-        struct spl_node node = {.size = 1};
+        struct spl_node node = {.size = 1, .chunk_count = 1};
         struct spl_chunk chunk = {.count = 1};
         uint32_t words[8] = {0}, page;
         json_t *meta = json_object();

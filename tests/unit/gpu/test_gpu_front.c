@@ -12,125 +12,12 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
-#include "gpu/backend.h"
-
-static struct {
-    int buffers, kernels, dispatches, waits, closes;
-    bool refuse_buffers, refuse_submit;
-    uint64_t ended; /* tickets up to this one have ended */
-    uint64_t last_timeout_ns;
-} fake;
-
-static void fake_close(struct spl_gpu *gpu)
-{
-    (void)gpu;
-    fake.closes++;
-}
-
-static int fake_buffer_create(struct spl_gpu *gpu, enum spl_gpu_buffer_kind kind, uint64_t bytes,
-                              struct spl_gpu_buffer **out, struct spl_error *err)
-{
-    (void)gpu;
-    if (fake.refuse_buffers)
-        return spl_fail(err, SPL_E_LIMIT, "refused");
-    *out = calloc(1, sizeof **out);
-    (*out)->map = kind == SPL_GPU_DEVICE ? NULL : calloc(1, bytes);
-    fake.buffers++;
-    return 0;
-}
-
-static void fake_buffer_destroy(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
-{
-    (void)gpu;
-    free(buffer->map);
-    free(buffer);
-    fake.buffers--;
-}
-
-static int fake_kernel_create(struct spl_gpu *gpu, const struct spl_gpu_code *code, const uint32_t *constants,
-                              size_t count, struct spl_gpu_kernel **out, struct spl_error *err)
-{
-    (void)gpu, (void)code, (void)constants, (void)count, (void)err;
-    *out = calloc(1, sizeof **out);
-    fake.kernels++;
-    return 0;
-}
-
-static void fake_kernel_destroy(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel)
-{
-    (void)gpu;
-    free(kernel);
-    fake.kernels--;
-}
-
-static int fake_begin(struct spl_gpu *gpu, struct spl_error *err)
-{
-    (void)gpu, (void)err;
-    return 0;
-}
-
-static void fake_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                          const struct spl_gpu_arguments *arguments, uint32_t workgroups,
-                          struct spl_gpu_buffer *counts, uint64_t offset)
-{
-    (void)gpu, (void)arguments, (void)workgroups, (void)counts, (void)offset;
-    fake.dispatches += kernel->code->storages.count;
-}
-
-static void fake_barrier(struct spl_gpu *gpu)
-{
-    (void)gpu;
-}
-
-static void fake_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset,
-                      struct spl_gpu_buffer *to, uint64_t to_offset, uint64_t bytes)
-{
-    (void)gpu, (void)from, (void)from_offset, (void)to, (void)to_offset, (void)bytes;
-}
-
-static void fake_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes,
-                      uint32_t word)
-{
-    (void)gpu, (void)buffer, (void)offset, (void)bytes, (void)word;
-}
-
-static int fake_submit(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err)
-{
-    (void)gpu, (void)ticket;
-    return fake.refuse_submit ? spl_fail(err, SPL_E_DEVICE_LOST, "gone") : 0;
-}
-
-static int fake_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
-{
-    (void)gpu;
-    fake.waits++;
-    fake.last_timeout_ns = timeout_ns;
-    return ticket <= fake.ended ? 0 : spl_fail(err, SPL_E_TIMEOUT, "not yet");
-}
-
-static const struct spl_gpu_backend backend = {
-    .name = "fake",
-    .close = fake_close,
-    .buffer_create = fake_buffer_create,
-    .buffer_destroy = fake_buffer_destroy,
-    .kernel_create = fake_kernel_create,
-    .kernel_destroy = fake_kernel_destroy,
-    .begin = fake_begin,
-    .dispatch = fake_dispatch,
-    .barrier = fake_barrier,
-    .copy = fake_copy,
-    .fill = fake_fill,
-    .submit = fake_submit,
-    .wait = fake_wait,
-};
+#include "support/fake_gpu.h"
 
 static struct spl_gpu make(void)
 {
-    memset(&fake, 0, sizeof fake);
-    return (struct spl_gpu){.backend = &backend,
-                            .info = {.name = "card"},
-                            .limits = {.memory_bytes = 4096, .buffer_bytes = 2048, .binding_bytes = 1024,
-                                       .workgroups = 100}};
+    return fake_gpu_make((struct spl_gpu_limits){.memory_bytes = 4096, .buffer_bytes = 2048, .binding_bytes = 1024,
+                                                 .workgroups = 100});
 }
 
 static uint64_t submit(struct spl_gpu *gpu)
@@ -155,6 +42,8 @@ static void memory_is_accounted_before_it_is_taken(void **state)
     assert_null(c);
     assert_non_null(strstr(err.message, "64 bytes"));
     assert_non_null(strstr(err.message, "4048 of 4096"));
+    assert_non_null(strstr(err.message, "a readback buffer"));
+    assert_non_null(strstr(err.message, "at least 4112, say 1M"));
     assert_int_equal(fake.buffers, 2);
     spl_gpu_buffer_destroy(&gpu, a);
     assert_int_equal(spl_gpu_get_memory(&gpu), 2000);

@@ -365,10 +365,13 @@ static void rows_may_lie_apart(void **state)
         spl_encoded_finish(&one);
         spl_encoded_finish(&two);
     }
-    other.row_bytes = 4 * width - 4;
-    struct spl_encoded out;
-    assert_int_equal(spl_image_encode(&other, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &out, NULL),
-                     SPL_E_USAGE);
+    static const size_t refused[] = {4 * width - 4, SIZE_MAX / 4 + 1, SIZE_MAX};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        struct spl_encoded out;
+        other.row_bytes = refused[i];
+        assert_int_equal(spl_image_encode(&other, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), &out, NULL),
+                         SPL_E_USAGE);
+    }
 }
 
 static void bad_requests_are_refused_by_field(void **state)
@@ -445,6 +448,8 @@ static void names_round_trip(void **state)
     assert_int_equal(spl_layer_from_name("Color"), -1);
     assert_int_equal(spl_layer_from_name(""), -1);
     assert_int_equal(spl_format_from_name("gif"), -1);
+    assert_int_equal(spl_layer_from_name(NULL), -1);
+    assert_int_equal(spl_format_from_name(NULL), -1);
     assert_int_equal(spl_pixel_bytes(SPL_PIXEL_RGBA8), 4);
     assert_int_equal(spl_pixel_bytes(SPL_PIXEL_F32X3), 12);
 }

@@ -456,9 +456,26 @@ static void test_budgets_are_kept_by_95_of_100(void **state)
     }
 }
 
+/* A prediction for one more view, of Student's t: with few views it is much less than what was measured. */
+static void test_few_views_promise_less(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t views;
+        double t;
+    } rows[] = {{2, 6.314}, {3, 2.920}, {4, 2.353}, {8, 1.895}, {30, 1.699}};
+    const struct spl_profile_point point = {.psnr = 40, .psnr_sd = 1, .psnr_q05 = 39};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_profile profile = {.views = rows[i].views};
+        double least = rows[i].t * sqrt(1 + 1.0 / rows[i].views), less = 40 - spl_profile_psnr_bound(&profile, &point);
+        assert_true(less > 0.99 * least && less < 1.01 * least);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_few_views_promise_less),
         cmocka_unit_test(test_budget_takes_the_most_accurate_that_fits),
         cmocka_unit_test(test_psnr_takes_the_cheapest_that_reaches_it),
         cmocka_unit_test(test_both_hold_the_budget_first),

@@ -177,6 +177,7 @@ static void test_peers_refusals(void **state)
         {"\n\na,0,30\n", "line 3: '0' is no ms", "ms"},
         {"a,-1,30\n", "is no ms", "ms"},
         {"a,1e999,30\n", "is no ms", "ms"},
+        {"a,0x10,30\n", "line 1: '0x10' is no ms", "ms"},
         {",1,30\n", "1 to 63 bytes", "name"},
         {"0123456789012345678901234567890123456789012345678901234567890123,1,30\n", "1 to 63 bytes", "name"},
         {"name,ms,psnr\n", "holds no row", ""},

@@ -7,6 +7,8 @@
 
 #include <cmocka.h>
 
+#include <time.h>
+
 #include "clouds.h"
 #include "pack/linear.h"
 
@@ -216,6 +218,40 @@ static void test_degenerate_clouds(void **state)
 }
 
 /* Far from the origin, on any number of threads: the same. */
+static double cpu_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Wires side by side, each of which is compared with all around: who cancels does not wait for that. */
+static void test_cancelled_within_a_level(void **state)
+{
+    (void)state;
+    struct cloud *c = new_cloud(0.002);
+    double took[2];
+    for (int w = 0; w < 60; w++)
+        add_line(c, (double[]){0, 4 * w, 3 * (w % 4)}, (double[]){300, 4 * w, 3 * (w % 4)}, 0.1);
+    for (int run = 0; run < 2; run++) {
+        atomic_bool cancelled = run;
+        struct spl_points p = cloud_of((const double(*)[3])c->position, c->count);
+        struct spl_stage stage = {.threads = 2, .cancelled = &cancelled};
+        struct spl_error err = {0};
+        atomic_store(&cancelled, false);
+        assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+        atomic_store(&cancelled, run);
+        took[run] = -cpu_s();
+        assert_int_equal(spl_linear_find(&p, &stage, &err), run ? SPL_E_CANCELLED : SPL_OK);
+        took[run] += cpu_s();
+        assert_int_equal(p.linear != NULL, !run);
+        spl_points_finish(&p);
+    }
+    free(c);
+    if (took[1] > took[0] / 8)
+        fail_msg("%.3f s until it is cancelled, %.3f s in all", took[1], took[0]);
+}
+
 static void test_place_and_threads_do_not_matter(void **state)
 {
     (void)state;
@@ -254,6 +290,7 @@ int main(void)
         cmocka_unit_test(test_scan_lines),
         cmocka_unit_test(test_noise),
         cmocka_unit_test(test_length),
+        cmocka_unit_test(test_cancelled_within_a_level),
         cmocka_unit_test(test_degenerate_clouds),
         cmocka_unit_test(test_place_and_threads_do_not_matter),
     };

@@ -279,25 +279,103 @@ static void check_wire(const struct spl_dataset *dataset)
     assert_true(fabs(leaves - 15) < 0.1 && fabs(root - 15) < 0.1);
 }
 
-/* A field with a wire over it, whole and as bare points: the same points are linear, at every level some; bare points
- * have neither normals nor radii to pay for. */
-static void test_linear_and_bare_points(void **state)
+/* A field with a wire over it. */
+enum { side = 150, wire = 400, field_points = side * side + wire };
+
+static double (*make_field(void))[3]
 {
-    (void)state;
-    enum { side = 150, wire = 400, count = side * side + wire };
-    double(*position)[3] = malloc(count * sizeof *position);
+    double(*position)[3] = malloc(field_points * sizeof *position);
     uint64_t random = 71;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < field_points; i++) {
         bool on_wire = i >= side * side;
         position[i][0] =
             on_wire ? 15.0 * (double)(i - side * side) / wire : 0.1 * ((double)(i % side) + uniform(&random));
         position[i][1] = on_wire ? 7 : 0.1 * ((double)(i / side) + uniform(&random));
         position[i][2] = (on_wire ? 4 : 0) + 0.0005 * uniform(&random);
     }
-    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    return position;
+}
+
+/* Of a file packed from points, colours being their numbers: how many of the first `count` of the leaves point down. */
+static size_t count_downwards(const char *path, size_t count)
+{
+    struct spl_dataset *dataset;
+    uint64_t node_count, chunk_count;
+    size_t down = 0;
+    assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
+    const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    for (uint64_t n = 0; n < node_count; n++) {
+        size_t page_bytes;
+        const uint32_t *page = spl_dataset_get_page(dataset, nodes[n].page, &page_bytes);
+        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++)
+            for (uint32_t i = 0; i < chunks[c].count && !nodes[n].child_count; i++) {
+                struct spl_splat s;
+                spl_chunk_decode(&chunks[c], page, i, &s);
+                size_t who = s.color[0] | (size_t)s.color[1] << 8 | (size_t)s.color[2] << 16;
+                down += spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS && who < count && s.normal[2] < 0;
+            }
+    }
+    spl_dataset_close(dataset);
+    return down;
+}
+
+/* -1 to 1. */
+static double spread(uint64_t *random)
+{
+    return 2 * uniform(random) - 1;
+}
+
+/* Nobody gave normals a side. A road as noisy as its points are close, in several blocks, and in two halves, on both of
+ * which bushes stand: it points to one side all over. It was one point of five that did not, where one edge with
+ * another point of the noise, or of a bush, was as good as a hundred with the road. */
+static void test_noise_and_bushes_turn_no_road(void **state)
+{
+    (void)state;
+    enum { edge = 320, bush = 12000 };
+    struct spl_error err = {0};
+    double(*position)[3] = spl_alloc(edge * edge + bush, sizeof *position, NULL);
+    size_t count = 0, road;
+    uint64_t random = 91;
+    assert_non_null(position);
+    for (int i = 0; i < edge; i++)
+        for (int j = 0; j < edge; j++) {
+            double at[3] = {0.01 * i + 0.003 * spread(&random), 0.01 * j + 0.003 * spread(&random), 0};
+            for (int k = 0; k < 6; k++)
+                at[2] += 0.0042 * spread(&random);
+            if (fabs(0.01 * i - 1.6) >= 0.05)
+                memcpy(position[count++], at, sizeof at);
+        }
+    road = count;
+    for (int i = 0; i < bush; i++, count++) {
+        double at[3] = {1.6 + 0.12 * spread(&random), (i % 2 ? 1 : 2) + 0.4 * spread(&random),
+                        0.2 * fabs(spread(&random))};
+        memcpy(position[count], at, sizeof at);
+    }
+    write_ply(path_of("road.ply"), (const double(*)[3])position, count);
+    if (pack_file(path_of("road.ply"), path_of("road.spld"), 2, NULL, &err))
+        fail_msg("%s", err.message);
+    size_t down = count_downwards(path_of("road.spld"), road);
+    if (down > road / 2)
+        down = road - down;
+    if (down > road / 50)
+        fail_msg("%zu of the road's %zu points have another side than the rest", down, road);
+    free(position);
+    unlink(path_of("road.ply"));
+    unlink(path_of("road.spld"));
+}
+
+/* Whole and as bare points: the same points are linear, at every level some; bare points have neither normals nor radii
+ * to pay for. */
+static void test_linear_and_bare_points(void **state)
+{
+    (void)state;
+    double(*position)[3] = make_field();
+    write_ply(path_of("in.ply"), (const double(*)[3])position, field_points);
     for (int run = 0; run < 4; run++) {
         const char *input = path_of("in.ply");
-        struct spl_pack_options options = {.size = sizeof options, .inputs = &input,
+        struct spl_pack_options options = {.size = sizeof options,
+                                           .inputs = &input,
                                            .input_count = 1,
                                            .output = path_of("out.spld"),
                                            .threads = 2,
@@ -308,7 +386,7 @@ static void test_linear_and_bare_points(void **state)
         struct spl_error err = {0};
         struct spl_dataset *dataset;
         assert_int_equal(spl_pack(&options, &report, &err), 0);
-        check_dataset(path_of("out.spld"), (const double(*)[3])position, count, true);
+        check_dataset(path_of("out.spld"), (const double(*)[3])position, field_points, true);
         assert_int_equal(report.linear, options.no_linear ? 0 : wire);
         assert_int_equal(spl_dataset_open(path_of("out.spld"), true, &dataset, &err), 0);
         const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
@@ -420,8 +498,8 @@ static void test_refused_memory(void **state)
 /* Cancels when a stage is first reported; then no other stage may begin. */
 struct canceller {
     struct spl_cancel cancel;
-    const char *at;      // NULL = never
-    char names[16][64];  /* of stages, in their order */
+    const char *at;     // NULL = never
+    char names[16][64]; /* of stages, in their order */
     int count, begun_after;
 };
 
@@ -440,13 +518,9 @@ static void watch_stages(void *context, const struct spl_progress *progress)
 static void test_cancelled_in_any_stage(void **state)
 {
     (void)state;
-    enum { count = 20000 };
-    static double position[count][3];
-    for (int i = 0; i < count; i++) {
-        position[i][0] = 0.01 * (i % 200);
-        position[i][1] = 0.01 * (i / 200);
-    }
-    write_ply(path_of("in.ply"), (const double(*)[3])position, count);
+    double(*position)[3] = make_field();
+    write_ply(path_of("in.ply"), (const double(*)[3])position, field_points);
+    free(position);
     const char *input = path_of("in.ply");
     struct canceller whole = {0};
     struct spl_pack_options options = {.size = sizeof options,
@@ -461,7 +535,9 @@ static void test_cancelled_in_any_stage(void **state)
     unlink(path_of("out.spld"));
     int files = files_in_folder();
     assert_string_equal(whole.names[whole.count - 1], "writing");
+    bool joins = false;
     for (int i = 0; i < whole.count - 1; i++) {
+        joins |= !strcmp(whole.names[i], "joining wires");
         struct canceller now = {.at = whole.names[i]};
         struct spl_error err = {0};
         options.progress_context = &now;
@@ -471,7 +547,7 @@ static void test_cancelled_in_any_stage(void **state)
             fail_msg("cancelled in '%s', '%s' was begun all the same", now.at, now.names[now.count - 1]);
         assert_int_equal(files_in_folder(), files);
     }
-    assert_true(whole.count > 5);
+    assert_true(joins && whole.count > 8);
 }
 
 static int setup(void **state)
@@ -493,10 +569,15 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_point_is_there),   cmocka_unit_test(test_default_view),
-        cmocka_unit_test(test_threads_do_not_matter),  cmocka_unit_test(test_degenerate_clouds),
-        cmocka_unit_test(test_linear_and_bare_points), cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_refused_memory),         cmocka_unit_test(test_cancelled_in_any_stage),
+        cmocka_unit_test(test_every_point_is_there),
+        cmocka_unit_test(test_default_view),
+        cmocka_unit_test(test_threads_do_not_matter),
+        cmocka_unit_test(test_degenerate_clouds),
+        cmocka_unit_test(test_noise_and_bushes_turn_no_road),
+        cmocka_unit_test(test_linear_and_bare_points),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_refused_memory),
+        cmocka_unit_test(test_cancelled_in_any_stage),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

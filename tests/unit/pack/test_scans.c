@@ -181,6 +181,10 @@ static void test_kinds_are_said_and_remembered(void **state)
     assert_non_null(strstr(asked, "no intensity, which --intensity asks for, in 1 (c.ply)"));
     assert_null(strstr(asked, "--intensity takes"));
     assert_null(strstr(pack_two(b, b, true, NULL), "--intensity"));
+    char *bare = write_ply("bare.ply", 10, "", ""); /* names are lent for a few calls */
+    assert_non_null(strstr(pack_two(bare, NULL, true, NULL), "--intensity changes nothing"));
+    assert_non_null(strstr(pack_two(bare, bare, true, NULL), "colours are none at all in 2"));
+    assert_null(strstr(pack_two(bare, NULL, false, NULL), "--intensity"));
 }
 
 /* Stations of one PTX: with colours, without. */

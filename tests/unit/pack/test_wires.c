@@ -42,7 +42,8 @@ static uint32_t join(struct row *row)
 {
     uint32_t ends = 0;
     struct spl_wire_point *p = row->points;
-    struct spl_work work = {UINT64_MAX};
+    struct spl_stage stage = {.threads = 1};
+    struct spl_wires_work work = {UINT64_MAX, &stage};
     assert_int_equal(spl_wires_join(p, row->count, &work, NULL), SPL_OK);
     for (uint32_t i = 0; i < row->count; i++) {
         for (int k = 0; k < 2; k++) {
@@ -131,10 +132,11 @@ static void links_hold_wherever_joining_ends(void **state)
     enum { count = 500 };
     static struct spl_wire_point p[count];
     uint32_t joined = 0;
+    struct spl_stage stage = {.threads = 1};
     for (uint64_t steps = 0, whole = UINT64_MAX; whole == UINT64_MAX; steps = 3 * steps / 2 + 100) {
         for (uint32_t i = 0; i < count; i++)
             p[i] = (struct spl_wire_point){.position = {0.1 * i, 0.01 * (i % 7)}, .spacing = 0.1};
-        struct spl_work work = {steps};
+        struct spl_wires_work work = {steps, &stage};
         int rc = spl_wires_join(p, count, &work, NULL);
         assert_true(rc == (work.left ? SPL_OK : SPL_E_LIMIT));
         whole = work.left ? steps : whole;
@@ -152,6 +154,26 @@ static void links_hold_wherever_joining_ends(void **state)
         joined = links / 2;
     }
     assert_true(joined > count / 2);
+}
+
+/* Whoever packs: is told of every piece, and cancels once something is done. */
+struct packer {
+    struct spl_stage stage;
+    atomic_bool cancelled;
+    bool cancels;
+    uint64_t done, total, reports;
+};
+
+static void watch(void *context, const struct spl_progress *progress)
+{
+    struct packer *p = context;
+    assert_string_equal(progress->stage, "joining wires");
+    assert_true(progress->done >= p->done && progress->done <= progress->total);
+    p->reports += progress->done > p->done;
+    p->done = progress->done;
+    p->total = progress->total;
+    p->stage.reported_ns = 0; /* as if it were long ago */
+    atomic_store(&p->cancelled, p->cancels && progress->done);
 }
 
 /* A cloud of nothing but points on wires, in the order given. */
@@ -222,6 +244,7 @@ static void a_gap_is_crossed_on_the_arc(void **state)
     }
     const struct spl_wire_vertex *v = c.wires.vertices;
     assert_true(!c.wires.cut_short && c.wires.piece_count == c.wires.count - 1);
+    assert_int_equal(c.wires.capacity, c.wires.count); /* pieces of gaps too: no more is reserved than is needed */
     double way = 0;
     for (size_t i = 0; i < c.wires.count; i++) {
         double x = v[i].position[0] - 5e6;
@@ -251,6 +274,27 @@ static void a_straight_wire_is_joined_to_its_end(void **state)
         set_point(&c, (size_t)i, 0.2 * i, 0, 0, 0);
     join_cloud(&c);
     assert_true(!c.wires.cut_short && c.wires.piece_count == count - 1 && c.wires.count == count);
+    free_cloud(&c);
+}
+
+static void joining_is_reported_and_ends_when_it_is_cancelled(void **state)
+{
+    (void)state;
+    enum { count = 20000 };
+    struct cloud c;
+    make_cloud(&c, count);
+    for (int i = 0; i < count; i++)
+        set_point(&c, (size_t)i, 0.2 * i, 0, 0, 0);
+    for (int cancels = 0; cancels < 2; cancels++) {
+        struct packer p = {.stage = {.threads = 1, .callback = watch}, .cancels = cancels};
+        struct spl_error err = {0};
+        p.stage.context = &p;
+        p.stage.cancelled = &p.cancelled;
+        assert_int_equal(spl_wires_find(&c.wires, &c.points, &p.stage, &err), cancels ? SPL_E_CANCELLED : SPL_OK);
+        assert_int_equal(err.code, cancels ? SPL_E_CANCELLED : SPL_OK);
+        assert_true(p.total > 0 && (cancels ? p.done < p.total / 20 : p.reports > 40 && p.done == p.total));
+        spl_wires_finish(&c.wires);
+    }
     free_cloud(&c);
 }
 
@@ -349,8 +393,10 @@ static void a_node_has_so_many_vertices_at_most(void **state)
     for (int i = 0; i < count; i++)
         c.points.radius[i] = 0.15f;
     join_cloud(&c);
+    assert_true(spl_wires_get_node(&c.wires, 0, count, 1, &lines));
+    assert_in_range(lines.capacity, lines.count, SPL_NODE_VERTICES); /* however many pieces lie below */
     assert_true(spl_wires_get_node(&c.wires, 0, count, 0, &lines));
-    assert_int_equal(lines.count, count);
+    assert_true(lines.count == count && lines.capacity == count);
     assert_true(spl_wires_get_node(&c.wires, 0, count, 0.2, &lines)); /* 2 x 6000 would be too many: only the longer */
     assert_int_equal(lines.count, wires);
     assert_true(spl_wires_get_node(&c.wires, 0, count / 2, 0.2, &lines));
@@ -372,6 +418,7 @@ int main(void)
         cmocka_unit_test(links_hold_wherever_joining_ends),
         cmocka_unit_test(a_gap_is_crossed_on_the_arc),
         cmocka_unit_test(a_straight_wire_is_joined_to_its_end),
+        cmocka_unit_test(joining_is_reported_and_ends_when_it_is_cancelled),
         cmocka_unit_test(levels_keep_their_error_and_meet),
         cmocka_unit_test(colors_are_means),
         cmocka_unit_test(a_node_has_so_many_vertices_at_most),

@@ -58,9 +58,9 @@ static void batches_are_of_one_key(void **state)
     spl_draw_list_finish(&list);
 }
 
-/* Chunks with and without clip lines in each of 4,000 pages: depth and every group of layers share the slots of the
+/* Chunks with and without clip lines in each of 4,000 pages: depth and every group of layers share the rounds of the
  * page. */
-static void pages_take_two_slots(void **state)
+static void pages_take_two_rounds(void **state)
 {
     struct spl_draw_list list = {0};
     enum { pages = 4000 };
@@ -71,14 +71,14 @@ static void pages_take_two_slots(void **state)
         add(&list, page, 128, 0, true);
     }
     assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
-    uint64_t slots = spl_draw_list_count_slots(&list, 1 << 20, 1 << 10, 1 << 10);
-    assert_int_equal(slots, 2 * pages);
-    assert_true(slots < SPL_PARAMS_SLOTS);
+    uint64_t rounds = spl_draw_list_count_rounds(&list, 1 << 20, 1 << 10, 1 << 10);
+    assert_int_equal(rounds, 2 * pages);
+    assert_true(rounds < SPL_PARAMS_MAX);
     spl_draw_list_finish(&list);
 }
 
-/* Every entry has its slot, none has two: of so many a dispatch, fewer where textures are summed first. */
-static void slots_cover_the_entries(void **state)
+/* Every entry has its round, none has two: of so many a dispatch, fewer where textures are summed first. */
+static void rounds_cover_the_entries(void **state)
 {
     struct spl_draw_list list = {0};
     (void)state;
@@ -93,17 +93,17 @@ static void slots_cover_the_entries(void **state)
     assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
     static const uint64_t limits[][2] = {{UINT64_MAX, UINT64_MAX}, {100, 100}, {99, 7}, {1, 1}, {3, 1000}};
     for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
-        uint64_t slots = spl_draw_list_count_slots(&list, limits[l][0], limits[l][1], limits[l][1]), next = 0, entries = 0;
+        uint64_t rounds = spl_draw_list_count_rounds(&list, limits[l][0], limits[l][1], limits[l][1]), next = 0, entries = 0;
         for (size_t i = 0; i < list.batch_count; i++) {
             const struct spl_draw_batch *batch = &list.batches[i];
-            assert_int_equal(batch->first_slot, next);
-            assert_true(batch->slot_entries >= 1 && batch->slot_entries <= limits[l][0] &&
-                        (!batch->key.smooth || batch->slot_entries <= limits[l][1]) &&
-                        (batch->key.kind != SPL_CHUNK_LINES || batch->slot_entries <= limits[l][1]));
-            next += (batch->entries + batch->slot_entries - 1) / batch->slot_entries;
+            assert_int_equal(batch->first_round, next);
+            assert_true(batch->round_entries >= 1 && batch->round_entries <= limits[l][0] &&
+                        (!batch->key.smooth || batch->round_entries <= limits[l][1]) &&
+                        (batch->key.kind != SPL_CHUNK_LINES || batch->round_entries <= limits[l][1]));
+            next += (batch->entries + batch->round_entries - 1) / batch->round_entries;
             entries += batch->entries;
         }
-        assert_int_equal(next, slots);
+        assert_int_equal(next, rounds);
         assert_int_equal(entries, 250);
     }
     spl_draw_list_finish(&list);
@@ -150,8 +150,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_are_of_one_key),
-        cmocka_unit_test(pages_take_two_slots),
-        cmocka_unit_test(slots_cover_the_entries),
+        cmocka_unit_test(pages_take_two_rounds),
+        cmocka_unit_test(rounds_cover_the_entries),
         cmocka_unit_test(runs_hold_every_splat),
         cmocka_unit_test(the_nearer_half_goes_first),
     };

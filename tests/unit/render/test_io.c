@@ -1,4 +1,4 @@
-/* The io thread: order, bounds, reads that nobody wants any more, failures, and an end while a read hangs. */
+/* The io threads: order, bounds, reads that nobody wants any more, failures, and an end while a read hangs. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,7 +21,7 @@ static struct file {
     pthread_cond_t moved;
     unsigned may_pass; // guarded by: mutex, as all
     bool open;
-    unsigned asked;
+    unsigned asked, holds;
     uint32_t order[reads_max];
 } files[2] = {{.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
               {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER}};
@@ -39,6 +39,40 @@ static int read_gated(const void *source, uint32_t index, void *out, struct spl_
     pthread_mutex_unlock(&file->mutex);
     memset(out, (int)index, 8);
     return index == broken ? spl_fail(err, SPL_E_IO, "index %u is broken", index) : 0;
+}
+
+static void hold(const void *source)
+{
+    struct file *file = (struct file *)source;
+    pthread_mutex_lock(&file->mutex);
+    file->holds++;
+    pthread_mutex_unlock(&file->mutex);
+}
+
+static void let_go(const void *source)
+{
+    struct file *file = (struct file *)source;
+    pthread_mutex_lock(&file->mutex);
+    file->holds--;
+    pthread_cond_broadcast(&file->moved);
+    pthread_mutex_unlock(&file->mutex);
+}
+
+/* Until nothing reads from it. */
+static void await_let_go(struct file *file)
+{
+    pthread_mutex_lock(&file->mutex);
+    while (file->holds)
+        pthread_cond_wait(&file->moved, &file->mutex);
+    pthread_mutex_unlock(&file->mutex);
+}
+
+static unsigned get_holds(struct file *file)
+{
+    pthread_mutex_lock(&file->mutex);
+    unsigned holds = file->holds;
+    pthread_mutex_unlock(&file->mutex);
+    return holds;
 }
 
 static void let_pass(struct file *file, unsigned count, bool open)
@@ -75,6 +109,7 @@ static struct spl_io *start(void)
 {
     struct spl_io *io = NULL;
     for (int i = 0; i < 2; i++) {
+        await_let_go(&files[i]); // what the test before left behind
         files[i].may_pass = files[i].asked = 0;
         files[i].open = false;
     }
@@ -86,7 +121,13 @@ static struct spl_io *start(void)
 static struct spl_io_read *begin(struct spl_io *io, struct file *file, uint32_t index, size_t bytes, bool awaited,
                                  uint64_t walk)
 {
-    struct spl_io_what what = {.read = read_gated, .source = file, .index = index, .bytes = bytes, .owner = file};
+    struct spl_io_what what = {.read = read_gated,
+                               .hold = hold,
+                               .let_go = let_go,
+                               .source = file,
+                               .index = index,
+                               .bytes = bytes,
+                               .owner = file};
     return spl_io_try_begin(io, &what, (struct spl_io_rank){.awaited = awaited, .walk = walk});
 }
 
@@ -173,11 +214,12 @@ static void reads_that_nobody_wants_are_dropped(void **state)
     await_asked(files, 1);
     spl_io_end(io, reads[1]); // waits
     spl_io_end(io, reads[0]); // is being read
-    assert_false(spl_io_wait_for(io, files, spl_now_ns() + 20 * SPL_NS_PER_MS));
-    assert_true(spl_io_wait_for(io, files + 1, 0));
+    assert_int_equal(get_holds(files), 1); // what is being read holds it, and what waits does not
     spl_io_end(io, reads[2]);
     let_pass(files, 1, false);
-    assert_true(spl_io_wait_for(io, files, spl_now_ns() + 30 * SPL_NS_PER_S));
+    while (spl_io_count(io))
+        usleep(1000);
+    assert_int_equal(get_holds(files), 0);
     assert_int_equal(get_asked(files), 1);
     assert_int_equal(spl_io_count(io), 0);
     assert_null(spl_io_take(io));
@@ -228,6 +270,125 @@ static void waits_end_at_their_deadline(void **state)
     spl_io_destroy(io);
 }
 
+/* Whoever goes on without it. */
+static void a_read_that_hangs_is_left_behind(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    for (uint32_t i = 0; i < 3; i++)
+        begin(io, files, i, 8, true, 1);
+    let_pass(files, 1, false);
+    await_asked(files, 2);
+    assert_non_null(take(io)); // was not given back
+    while (!atomic_load(&wakes))
+        usleep(1000);
+    spl_io_destroy(io);
+    assert_int_equal(get_holds(files), 1);
+    let_pass(files, 0, true);
+    await_let_go(files); // leak checkers see the rest
+    assert_int_equal(get_asked(files), 2);
+    assert_int_equal(atomic_load(&wakes), 1);
+}
+
+/* Of pages that are as large, while there are others to read; nothing once there are none, and never beyond the bound. */
+static void memory_serves_the_next_read(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    enum { bytes = 1 << 20 };
+    for (uint32_t i = 0; i < 4; i++)
+        begin(io, files, i, i < 3 ? bytes - 8 * i : bytes / 4, true, 1);
+    let_pass(files, 1, false);
+    struct spl_io_read *read = take(io);
+    void *data = read->data;
+    await_asked(files, 2); // has memory of its own
+    spl_io_end(io, read);
+    let_pass(files, 2, false);
+    struct spl_io_read *second = take(io);
+    read = take(io);
+    assert_ptr_equal(read->data, data);
+    spl_io_end(io, second);
+    spl_memory_fail_after(1); // a quarter is not taken from a whole
+    spl_io_end(io, read);
+    let_pass(files, 0, true);
+    while (spl_io_count(io) && !(read = spl_io_take(io)))
+        usleep(500);
+    spl_memory_fail_after(0);
+    spl_io_destroy(io);
+}
+
+static void it_says_when_anything_moved(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    uint64_t before = spl_now_ns();
+    begin(io, files, 0, 8, true, 1);
+    await_asked(files, 1);
+    uint64_t begun = spl_io_get_moved_ns(io, files);
+    assert_in_range(begun, before, spl_now_ns());
+    usleep(2000);
+    assert_int_equal(spl_io_get_moved_ns(io, files), begun); // it hangs
+    let_pass(files, 1, false);
+    spl_io_end(io, take(io));
+    assert_in_range(spl_io_get_moved_ns(io, files), begun + 2000000, spl_now_ns());
+    spl_io_destroy(io);
+}
+
+/* As many files at once as there are threads, each read by one of them. */
+static void a_file_that_hangs_holds_up_no_other(void **state)
+{
+    (void)state;
+    struct spl_io *io = start();
+    for (uint32_t i = 0; i < SPL_IO_READS; i++)
+        assert_non_null(begin(io, &files[0], i, 8, true, 1));
+    assert_null(begin(io, &files[0], 0, 8, true, 1)); // it has all the places of one file
+    await_asked(&files[0], 1);
+    let_pass(&files[1], 0, true);
+    for (uint32_t i = 0; i < 10; i++) {
+        assert_non_null(begin(io, &files[1], i, 8, false, 1));
+        struct spl_io_read *read = take(io);
+        assert_ptr_equal(read->what.owner, &files[1]);
+        assert_int_equal(read->what.index, i);
+        spl_io_end(io, read);
+    }
+    assert_int_equal(get_asked(&files[0]), 1);
+    assert_false(spl_io_hangs(io, &files[1]));
+    while (!spl_io_hangs(io, &files[0]))
+        usleep(10000);
+    assert_int_equal(spl_io_count_hanging(io), 1);
+    let_pass(&files[0], 0, true);
+    for (uint32_t i = 0; i < SPL_IO_READS; i++) {
+        struct spl_io_read *read = take(io);
+        assert_int_equal(read->what.index, i);
+        spl_io_end(io, read);
+    }
+    assert_int_equal(spl_io_count_hanging(io), 0);
+    spl_io_destroy(io);
+}
+
+/* Each is left with its thread, in any order. */
+static void reads_that_hang_are_left_behind_together(void **state)
+{
+    (void)state;
+    for (int first = 0; first < 2; first++) {
+        struct spl_io *io = start();
+        for (int i = 0; i < 2; i++) {
+            begin(io, &files[i], 0, 8, true, 1);
+            begin(io, &files[i], 1, 8, true, 1);
+            await_asked(&files[i], 1);
+        }
+        spl_io_destroy(io);
+        for (int i = 0; i < 2; i++) {
+            struct file *file = &files[first ? !i : i];
+            assert_int_equal(get_holds(file), 1);
+            let_pass(file, 0, true);
+            await_let_go(file);
+            assert_int_equal(get_asked(file), 1);
+        }
+        assert_int_equal(atomic_load(&wakes), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -236,6 +397,11 @@ int main(void)
         cmocka_unit_test(reads_that_nobody_wants_are_dropped),
         cmocka_unit_test(failures_are_told),
         cmocka_unit_test(waits_end_at_their_deadline),
+        cmocka_unit_test(a_read_that_hangs_is_left_behind),
+        cmocka_unit_test(memory_serves_the_next_read),
+        cmocka_unit_test(it_says_when_anything_moved),
+        cmocka_unit_test(a_file_that_hangs_holds_up_no_other),
+        cmocka_unit_test(reads_that_hang_are_left_behind_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,8 +64,9 @@ static void a_spacing_of_stand_ins_is_not_complete(void **state)
     spl_dataset_close(dataset);
 }
 
-/* Clumps of a chunk each over two decades of size, in a cube of 2 m; radii as alike as the packer leaves them. */
-static struct spl_dataset *make_clumps(void)
+/* Clumps of a chunk each over two decades of size, in a cube of 2 m; radii as alike as the packer leaves them, but for
+ * one disc of each clump, which is `odd` times as large. */
+static struct spl_dataset *make_clumps(double odd)
 {
     struct make_splat *all = calloc(splats, sizeof *all);
     double middle[3] = {0}, size = 0;
@@ -79,7 +80,7 @@ static struct spl_dataset *make_clumps(void)
         for (int c = 0; c < 3; c++)
             all[i].position[c] = middle[c] + size * (2 * uniform() - 1);
         all[i].normal[2] = 1;
-        all[i].radius = (float)(0.012 * (0.6 + 0.8 * uniform()));
+        all[i].radius = (float)(0.012 * (0.6 + 0.8 * uniform()) * (i % SPL_CHUNK_SPLATS == 8 ? odd : 1));
     }
     struct spl_dataset *dataset = make_dataset_levels(all, splats, 2);
     free(all);
@@ -260,13 +261,54 @@ static void every_splat_that_is_seen_is_drawn_at_its_level(void **state)
     static const double lods[] = {0, 0.3, 1, 4, 16};
     unsigned coarse = 0;
     random_state = 17;
-    struct spl_dataset *dataset = make_clumps();
-    for (int view = 0; view < 400; view++) {
-        struct spl_camera camera = random_camera();
-        coarse += check_view(dataset, &camera, lods[view % 5]);
+    for (int odd = 1; odd < 30; odd += 14) {
+        struct spl_dataset *dataset = make_clumps(odd);
+        for (int view = 0; view < 200; view++) {
+            struct spl_camera camera = random_camera();
+            coarse += check_view(dataset, &camera, lods[view % 5]);
+        }
+        spl_dataset_close(dataset);
     }
-    assert_in_range(coarse, 40, 360); /* both levels were asked for */
+    assert_in_range(coarse, 40, 560); /* both levels were asked for */
+}
+
+/* A wall of small discs 10 m away, beside the image, with one disc that is ten times as large and, pruned, twice as
+ * large again; one of the small ones lies `behind` the others. From `away` beyond the image's edge: how many nodes and
+ * chunks are drawn. */
+static void draw_beside(double behind, double away, uint64_t *nodes, size_t *chunks)
+{
+    enum { wall = 4 * SPL_CHUNK_SPLATS };
+    static struct make_splat all[wall];
+    for (int i = 0; i < wall; i++)
+        all[i] = (struct make_splat){.position = {0.01 * (i % 16), 0.01 * (i / 16), i + 1 < wall ? 10 : 10 + behind},
+                                     .normal = {0, 0, 1},
+                                     .radius = i ? 0.005f : 0.05f};
+    struct spl_dataset *dataset = make_dataset(all, wall);
+    struct spl_camera camera = {.eye = {-5 - away}, .width = 200, .height = 200, .fx = 200, .fy = 200,
+                                .cx = 100, .cy = 100, .near = 0.1, .far = 100};
+    camera.rotation[0] = camera.rotation[4] = camera.rotation[8] = 1;
+    int left = 1 << 30;
+    struct spl_select_params params = {
+        .dataset = dataset, .camera = &camera, .lod = 8, .discs = true, .resident = take_one, .context = &left};
+    struct spl_draw_list list = {0};
+    assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
+    *nodes = list.nodes;
+    *chunks = list.chunk_count;
+    spl_draw_list_finish(&list);
     spl_dataset_close(dataset);
+}
+
+static void one_large_disc_at_the_edge_is_drawn(void **state)
+{
+    (void)state;
+    uint64_t nodes;
+    size_t chunks;
+    draw_beside(0, 0.12, &nodes, &chunks);
+    assert_true(nodes == 1 && chunks == 1);
+    draw_beside(0, 0.17, &nodes, &chunks);
+    assert_true(nodes == 0 && chunks == 0);
+    draw_beside(0.5, 0.42, &nodes, &chunks); /* of such a box a disc could be twice as large, but none is */
+    assert_true(nodes == 0 && chunks == 0);
 }
 
 /* Nodes come nearest first: what is drawn first hides the rest, and takes memory first. */
@@ -274,7 +316,7 @@ static void nodes_are_listed_front_to_back(void **state)
 {
     (void)state;
     random_state = 23;
-    struct spl_dataset *dataset = make_clumps();
+    struct spl_dataset *dataset = make_clumps(1);
     uint64_t node_count, chunk_count;
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
@@ -347,6 +389,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_spacing_of_stand_ins_is_not_complete),
         cmocka_unit_test(every_splat_that_is_seen_is_drawn_at_its_level),
+        cmocka_unit_test(one_large_disc_at_the_edge_is_drawn),
         cmocka_unit_test(nodes_are_listed_front_to_back),
         cmocka_unit_test(what_comes_later_is_asked_for_at_once),
     };

@@ -1,4 +1,4 @@
-/* Which layers a dataset has. */
+/* Which layers a dataset has; what is no method, and no name of one. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -45,11 +45,49 @@ static void test_ids_have_32_bits(void **state)
     }
 }
 
+/* What the camera's own functions leave out, the view has. */
+static void test_a_camera_is_whole_with_a_lens_and_a_pose(void **state)
+{
+    (void)state;
+    struct spl_view view;
+    spl_view_init(&view);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 60, 64, 36, NULL), SPL_OK);
+    assert_int_equal(
+        spl_camera_look_at(&view.camera, (double[3]){1, 2, 3}, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, NULL),
+        SPL_OK);
+    assert_int_equal(spl_view_check(&view, NULL), SPL_OK);
+}
+
+/* From other languages an enum is any number, and a name may be NULL. */
+static void test_what_is_no_method_is_answered(void **state)
+{
+    (void)state;
+    static const int none[] = {-1, SPL_METHOD_COUNT, 99};
+    const struct spl_dataset_info bare = {.splats = 1};
+    for (size_t i = 0; i < sizeof none / sizeof *none; i++) {
+        enum spl_method method = (enum spl_method)none[i];
+        assert_string_equal(spl_method_name(method), "unknown");
+        assert_null(spl_method_get(method));
+        assert_false(spl_method_has_textures(method));
+        assert_false(spl_method_has_normals(method, &bare));
+        assert_int_equal(spl_method_get_params(method), 0);
+        assert_int_equal(spl_method_for(method, &bare), method);
+    }
+    assert_null(spl_method_param_get((enum spl_method_param)99));
+    assert_string_equal(spl_visibility_name((enum spl_visibility)99), "unknown");
+    assert_string_equal(spl_attribute_name((enum spl_attribute)99), "unknown");
+    assert_int_equal(spl_method_from_name(NULL), -1);
+    assert_int_equal(spl_method_param_from_name(NULL), -1);
+    assert_int_equal(spl_visibility_from_name(NULL), -1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_normals_need_a_surface),
         cmocka_unit_test(test_ids_have_32_bits),
+        cmocka_unit_test(test_what_is_no_method_is_answered),
+        cmocka_unit_test(test_a_camera_is_whole_with_a_lens_and_a_pose),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -283,6 +283,21 @@ static void views_that_wait_for_pages_end(void **state)
     assert_int_equal(counters.frames, 1);
 }
 
+/* Many pages have been read and no more will wake anybody: they are put on the device one after the other, without rests. */
+static void what_was_read_is_uploaded_without_rests(void **state)
+{
+    (void)state;
+    setenv("FAKE_UPLOADS", "1000", 1); // with a rest each they take minutes
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *job = make_job(60000);
+    assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0);
+    assert_ptr_equal(take(pipeline), job);
+    assert_int_equal(job->err.code, 0);
+    spl_job_destroy(job);
+    spl_pipeline_destroy(pipeline);
+    unsetenv("FAKE_UPLOADS");
+}
+
 static void a_full_queue_refuses(void **state)
 {
     (void)state;
@@ -392,7 +407,7 @@ static struct spl_catalog_entry *open_entry(void)
     make_folder(path);
     strcat(path, "/one.spld");
     make_dataset_file(path, &splat, 1, 1);
-    assert_int_equal(spl_catalog_entry_open(path, path, true, NULL, &entry, NULL), 0);
+    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
     unlink(path);
     *strrchr(path, '/') = '\0';
     rmdir(path);
@@ -441,37 +456,6 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
-/* Of which a page is being read: nobody waits for that but they. */
-static void versions_leave_when_nothing_of_them_is_read(void **state)
-{
-    (void)state;
-    for (int way = 0; way < 3; way++) {
-        setenv("FAKE_READS_ON", way ? "1000000000" : "20", 1);
-        struct spl_pipeline *pipeline = start(8);
-        struct spl_catalog_entry *entry = open_entry();
-        spl_pipeline_add(pipeline, entry);
-        assert_ptr_equal(take_change(pipeline), entry);
-        spl_catalog_entry_unref(entry);
-        for (int i = 0; i < 2; i++) {
-            struct spl_job *job = make_job(10000);
-            if (way == 1 && i == 1)
-                setenv("FAKE_LOSE", "1", 1);
-            assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0);
-            assert_ptr_equal(take(pipeline), job);
-            assert_int_equal(job->err.code, way == 1 && i == 1 ? SPL_E_DEVICE_LOST : 0);
-            spl_job_destroy(job);
-        }
-        unsetenv("FAKE_LOSE");
-        if (way < 2) { // read, or the device went
-            assert_ptr_equal(take_change(pipeline), entry);
-            assert_int_equal(entry->state, SPL_ENTRY_GONE);
-            spl_catalog_entry_destroy(entry);
-        }
-        spl_pipeline_destroy(pipeline);
-    }
-    unsetenv("FAKE_READS_ON");
-}
-
 static void a_pipeline_ends_with_versions_in_every_state(void **state)
 {
     (void)state;
@@ -502,11 +486,11 @@ int main(void)
         cmocka_unit_test(a_loss_between_tiles_ends_the_large_view_too),
         cmocka_unit_test(a_frame_behind_does_not_hold_up_the_end),
         cmocka_unit_test(views_that_wait_for_pages_end),
+        cmocka_unit_test(what_was_read_is_uploaded_without_rests),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
         cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
-        cmocka_unit_test(versions_leave_when_nothing_of_them_is_read),
         cmocka_unit_test(a_pipeline_ends_with_versions_in_every_state),
         cmocka_unit_test(losses_are_bounded),
         cmocka_unit_test(a_device_that_does_not_open_is_a_failure),

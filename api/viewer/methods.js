@@ -1,0 +1,95 @@
+// The methods and their parameters, as the service's own table has them, and a control for each parameter. The page knows
+// none by name (but atoms, which a budget chooses too), so a method that the service learns is there with all it takes.
+
+import {askJson} from "./service.js";
+
+/** What /v1/methods says, once loadTable() has it. */
+export const table = {default: "", methods: [], parameters: []};
+
+let asked = null;
+
+export async function loadTable() {
+  asked ??= askJson("/v1/methods");
+  try {
+    Object.assign(table, await asked);
+  } catch (problem) {
+    asked = null; // the next one asks anew
+    throw problem;
+  }
+}
+
+export const findMethod = (name) => table.methods.find((method) => method.name === name);
+export const findParameter = (name) => table.parameters.find((parameter) => parameter.name === name);
+
+/** Does the parameter change what `method` draws of `dataset`? */
+export const counts = ({name, textures}, method, dataset) =>
+  Boolean(findMethod(method)?.parameters.includes(name) && (dataset.textures || !textures));
+
+/** What draws `dataset` where `method` is asked for. */
+export function offered(method = table.default, dataset) {
+  const names = [method, findMethod(method)?.stand_in, table.default, ...dataset.methods];
+  return names.find((name) => dataset.methods.includes(name));
+}
+
+/** Sets a select, to a value that it may not offer yet. */
+export function choose(select, value) {
+  if (![...select.options].some((option) => option.value === String(value))) select.append(new Option(value));
+  select.value = value;
+}
+
+/** A control of a parameter, empty where the value is the default. */
+function makeControl({type, minimum, maximum, default: usual, enum: names}) {
+  if (names) {
+    const select = document.createElement("select");
+    select.append(...names.map((name) => new Option(name, name === usual ? "" : name)));
+    return select;
+  }
+  const outside = usual < minimum || usual > maximum; // such as 0 for one that the picture itself decides
+  return Object.assign(document.createElement("input"), {
+    type: "number",
+    min: minimum,
+    max: maximum,
+    step: type === "integer" ? 1 : "any",
+    placeholder: outside ? "automatic" : usual,
+  });
+}
+
+/** The controls of all parameters, put behind `element` in its grid. */
+export class Controls {
+  constructor(element) {
+    this.rows = new Map(); // name → [label, control, help]
+    for (const parameter of table.parameters) {
+      const {name, description} = parameter;
+      const [label, help] = [document.createElement("label"), document.createElement("small")];
+      const control = makeControl(parameter);
+      control.id = label.htmlFor = `parameter-${name}`;
+      help.id = `${control.id}-help`;
+      label.textContent = name[0].toUpperCase() + name.slice(1).replaceAll("_", " ");
+      help.textContent = description;
+      control.setAttribute("aria-describedby", help.id);
+      this.rows.set(name, [label, control, help]);
+    }
+    element.after(...[...this.rows.values()].flat());
+  }
+
+  get names() {
+    return [...this.rows.keys()];
+  }
+
+  get(name) {
+    return this.rows.get(name)?.[1];
+  }
+
+  /** Shows a value, undefined for the default. */
+  set({name, default: usual}, value = usual) {
+    const control = this.get(name),
+      text = value === usual ? "" : value;
+    if (control instanceof HTMLSelectElement) choose(control, text);
+    else control.value = text;
+  }
+
+  /** Is it there, for who might change it? */
+  offer(name, offered) {
+    for (const element of this.rows.get(name)) element.hidden = !offered;
+  }
+}
