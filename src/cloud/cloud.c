@@ -158,6 +158,8 @@ void spl_cloud_destroy(struct spl_cloud *cloud)
 {
     if (!cloud)
         return;
+    if (cloud->state && cloud->reader->close)
+        cloud->reader->close(cloud);
     spl_source_close(&cloud->source);
     free(cloud->info.stations);
     free(cloud->state);

@@ -41,7 +41,7 @@ struct spl_cloud_options {
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "PTX", "PTS", "text" */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;
@@ -68,7 +68,7 @@ struct spl_cloud;
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
 
-/* Opens and checks the header. LAZ, COPC and E57 give SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
+/* Opens and checks the header. E57 gives SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
  * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */
 int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
                    struct spl_error *err);

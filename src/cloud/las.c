@@ -1,8 +1,9 @@
-/* LAS 1.0 to 1.4, point formats 0 to 10. The points are found by the header's offset and record length alone, so
+/* LAS 1.0 to 1.5, point formats 0 to 10. The points are found by the header's offset and record length alone, so
  * variable length records before them, extra bytes in them and extended records behind them cost nothing. Compressed
- * files (LAZ, COPC) wear the same signature and are told apart here.
+ * files (LAZ, COPC) wear the same signature and are told apart here: their records come from a stream.
  *
- * Invariant: the source's cursor is at the start of a record between calls. Owned by the cloud's thread. */
+ * Invariant: the source's cursor is at the start of a record between calls, in a file that is not compressed. Owned by
+ * the cloud's thread. */
 #include <endian.h>
 #include <math.h>
 #include <stdlib.h>
@@ -10,11 +11,17 @@
 
 #include "base/memory.h"
 #include "cloud/las_records.h"
+#include "cloud/laz/stream.h"
+
+enum { format_mask = 0x3f };
+/* The most symbols without surprise that a byte can hold are far more than a point has; less than this at any rate. */
+enum { compressed_points_a_byte = 1024 };
 
 struct las {
     uint64_t start, count, next;
     unsigned format, record_bytes;
     double scale[3], offset[3];
+    struct spl_laz_stream *stream; // may be NULL: records lie in the file as they are
 };
 
 /* Where a format keeps what we read; color 0 = it has none. */
@@ -44,24 +51,47 @@ static double get_double(const uint8_t *p)
     return v;
 }
 
-static int refuse_compressed(struct spl_cloud *cloud, uint64_t header_bytes, uint32_t vlrs, uint64_t points_at,
-                             unsigned format, struct spl_error *err)
+/* How the records are coded, if they are: the LASzip record says so, and the two high bits of the point format. */
+static int find_compression(struct spl_cloud *cloud, const struct spl_las_record *records, unsigned format_byte,
+                            struct spl_laz_format *format, bool *compressed, struct spl_error *err)
 {
-    bool copc, laszip;
-    struct spl_las_record all = {.at = header_bytes, .end = points_at, .count = vlrs}, first = all;
-    first.count = vlrs < 1 ? vlrs : 1;
-    int code = spl_las_find(cloud, &first, "copc", 0, &copc, err);
-    if (code == SPL_OK)
-        code = spl_las_find(cloud, &all, "laszip encoded", 0, &laszip, err);
-    if (code < 0)
+    struct spl_source *source = &cloud->source;
+    struct las *las = cloud->state;
+    struct spl_las_record record = *records;
+    struct spl_laz_fault fault = {0};
+    const uint8_t *content;
+    size_t available;
+    int code = spl_las_find(cloud, &record, "laszip encoded", SPL_LAZ_RECORD_ID, compressed, err);
+    if (code < 0 || (!*compressed && !(format_byte & ~format_mask)))
         return code;
-    if (!copc && !laszip && !(format & 0xc0))
+    if (!*compressed)
+        return spl_source_fail_at(source, 104, "point data record format", err,
+                                  "%u says that points are compressed, but no LASzip record says how", format_byte);
+    spl_source_seek(source, record.content);
+    if ((code = spl_source_peek(source, record.bytes, &content, &available, err)) < 0)
+        return code;
+    available = available < record.bytes ? available : record.bytes;
+    code = spl_laz_format_read(format, content, available, las->format, las->record_bytes, &fault);
+    if (code == SPL_E_UNSUPPORTED)
+        return spl_source_fail(source, code, fault.field, err, "offset %llu: %s",
+                               (unsigned long long)(record.content + fault.at), fault.reason);
+    return code < 0 ? spl_source_fail_at(source, record.content + fault.at, fault.field, err, "%s", fault.reason)
+                    : SPL_OK;
+}
+
+/* Refuses more points than the bytes from `start` on can hold. */
+static int check_count(const struct spl_cloud *cloud, bool compressed, uint64_t at, struct spl_error *err)
+{
+    const struct las *las = cloud->state;
+    uint64_t left = cloud->source.size - las->start;
+    uint64_t most = compressed ? left * compressed_points_a_byte : left / las->record_bytes;
+    if (las->count <= most)
         return SPL_OK;
-    return spl_source_fail(
-        &cloud->source, SPL_E_UNSUPPORTED, "", err,
-        "is %s, which is not supported yet: convert it first, with \"laszip -i IN.laz -o OUT.las\" or "
-        "\"pdal translate IN.laz OUT.las\"",
-        copc ? "COPC (cloud-optimised LAZ)" : "compressed (LAZ)");
+    return spl_source_fail_at(&cloud->source, at, "number of point records", err,
+                              "%llu records of %u bytes from offset %llu do not fit the file's %llu bytes (truncated, "
+                              "or a wrong count)",
+                              (unsigned long long)las->count, las->record_bytes, (unsigned long long)las->start,
+                              (unsigned long long)cloud->source.size);
 }
 
 static int check_transform(struct spl_cloud *cloud, const uint8_t *h, struct spl_error *err)
@@ -104,8 +134,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     uint64_t points_at = get32(h + 96), size = source->size;
     uint32_t vlrs = get32(h + 100);
 
-    if (major != 1 || minor > 4)
-        return spl_source_fail_at(source, 24, "version", err, "%u.%u is no LAS version known here (1.0 to 1.4)", major,
+    if (major != 1 || minor > 5)
+        return spl_source_fail_at(source, 24, "version", err, "%u.%u is no LAS version known here (1.0 to 1.5)", major,
                                   minor);
     if (header_bytes < least || header_bytes > size)
         return spl_source_fail_at(source, 94, "header size", err, "%u bytes; LAS 1.%u needs %u and the file has %llu",
@@ -114,33 +144,32 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return spl_source_fail_at(source, 96, "offset to point data", err,
                                   "%llu lies outside the file's %u header and %llu total bytes",
                                   (unsigned long long)points_at, header_bytes, (unsigned long long)size);
-    code = refuse_compressed(cloud, header_bytes, vlrs, points_at, h[104], err);
-    if (code < 0)
-        return code;
-    las->format = h[104];
+    las->format = h[104] & format_mask;
     las->record_bytes = spl_las_get16(h + 105);
     if (las->format >= sizeof formats / sizeof *formats)
-        return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10",
-                                  las->format);
+        return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10", h[104]);
     if (las->record_bytes < formats[las->format].bytes)
         return spl_source_fail_at(source, 105, "point data record length", err, "%u bytes; format %u needs %u",
                                   las->record_bytes, las->format, formats[las->format].bytes);
     uint64_t legacy = get32(h + 107), large = minor >= 4 ? get64(h + 247) : 0;
     las->count = large ? large : legacy;
-    if (las->count > (size - points_at) / las->record_bytes)
-        return spl_source_fail_at(
-            source, large ? 247 : 107, "number of point records", err,
-            "%llu records of %u bytes from offset %llu do not fit the file's %llu bytes (truncated, "
-            "or a wrong count)",
-            (unsigned long long)las->count, las->record_bytes, (unsigned long long)points_at, (unsigned long long)size);
+    las->start = points_at;
+    struct spl_las_record records = {.at = header_bytes, .end = points_at, .count = vlrs};
+    struct spl_laz_format format;
+    bool compressed;
+    if ((code = find_compression(cloud, &records, h[104], &format, &compressed, err)) < 0)
+        return code;
+    if ((code = check_count(cloud, compressed, large ? 247 : 107, err)) < 0)
+        return code;
     code = check_transform(cloud, h, err);
     if (code < 0)
         return code;
-    struct spl_las_record records = {.at = header_bytes, .end = points_at, .count = vlrs};
     if ((code = spl_las_read_coordinates(cloud, records, err)) < 0)
         return code;
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
-    las->start = points_at;
+    cloud->info.format = compressed ? "LAZ" : "LAS";
+    if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count, 0, err)) < 0)
+        return code;
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_INTENSITY;
@@ -151,23 +180,42 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
-static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
+/* Layers that a batch can show: of colour and intensity the one that decides the colour, once that is known. */
+static uint32_t wanted_layers(const struct spl_cloud *cloud)
+{
+    uint32_t wanted = SPL_LAZ_WANT_Z | SPL_LAZ_WANT_CLASS;
+    if (cloud->color.kind != SPL_COLOR_RGB)
+        wanted |= SPL_LAZ_WANT_INTENSITY;
+    if (cloud->color.kind != SPL_COLOR_GREY)
+        wanted |= SPL_LAZ_WANT_COLOR;
+    return wanted;
+}
+
+/* The next records as they lie in the file. */
+static int peek_records(struct spl_cloud *cloud, const uint8_t **records, size_t *count, struct spl_error *err)
 {
     struct las *las = cloud->state;
     uint64_t left = las->count - las->next;
-    size_t fit = SPL_SOURCE_WINDOW / las->record_bytes, count = limit < fit ? limit : fit, available;
-    unsigned color = formats[las->format].color, class_at = las->format < 6 ? 15 : 16;
-    uint8_t class_mask = las->format < 6 ? 0x1f : 0xff;
-    const uint8_t *p;
-
-    if (count > left)
-        count = (size_t)left;
-    int code = spl_source_peek(&cloud->source, count * las->record_bytes, &p, &available, err);
-    if (code < 0)
-        return code;
-    if (available < count * las->record_bytes)
+    size_t fit = SPL_SOURCE_WINDOW / las->record_bytes, most = *count < fit ? *count : fit, available;
+    *count = most < left ? most : (size_t)left;
+    int code = spl_source_peek(&cloud->source, *count * las->record_bytes, records, &available, err);
+    if (code == SPL_OK && available < *count * las->record_bytes)
         return spl_source_fail_at(&cloud->source, spl_source_tell(&cloud->source), "", err,
                                   "the file became shorter while it was read");
+    return code;
+}
+
+static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
+{
+    struct las *las = cloud->state;
+    unsigned color = formats[las->format].color, class_at = las->format < 6 ? 15 : 16;
+    uint8_t class_mask = las->format < 6 ? 0x1f : 0xff;
+    size_t count = limit;
+    const uint8_t *p;
+    int code = las->stream ? spl_laz_stream_read(las->stream, wanted_layers(cloud), &p, limit, &count, err)
+                           : peek_records(cloud, &p, &count, err);
+    if (code < 0)
+        return code;
     for (size_t r = 0; r < count; r++, p += las->record_bytes) {
         for (unsigned k = 0; k < 3; k++)
             rows->value[SPL_COLUMN_X + k][r] = (int32_t)get32(p + 4 * k) * las->scale[k] + las->offset[k];
@@ -176,7 +224,8 @@ static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
         for (unsigned k = 0; color && k < 3; k++)
             rows->value[SPL_COLUMN_RED + k][r] = spl_las_get16(p + color + 2 * k);
     }
-    spl_source_take(&cloud->source, count * las->record_bytes);
+    if (!las->stream)
+        spl_source_take(&cloud->source, count * las->record_bytes);
     las->next += count;
     rows->count = count;
     return count > 0;
@@ -187,8 +236,18 @@ static int las_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
     struct las *las = cloud->state;
     (void)err;
     las->next = las->count / parts * part;
-    spl_source_seek(&cloud->source, las->start + las->next * las->record_bytes);
+    if (las->stream)
+        spl_laz_stream_seek(las->stream, las->next, parts > 1);
+    else
+        spl_source_seek(&cloud->source, las->start + las->next * las->record_bytes);
     return SPL_OK;
 }
 
-const struct spl_reader spl_las_reader = {.format = "LAS", .open = las_open, .rows = las_rows, .seek = las_seek};
+static void las_close(struct spl_cloud *cloud)
+{
+    struct las *las = cloud->state;
+    spl_laz_stream_destroy(las->stream);
+}
+
+const struct spl_reader spl_las_reader = {
+    .format = "LAS", .open = las_open, .rows = las_rows, .seek = las_seek, .close = las_close};

@@ -13,6 +13,9 @@ struct spl_reader {
     int (*rows)(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err);
     /* Goes to about part / parts of the points, exactly to the first when part is 0. */
     int (*seek)(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err);
+    /* Releases what the state holds, not the state. May be NULL. Called whenever there is a state, also after a failed
+     * open. */
+    void (*close)(struct spl_cloud *cloud);
 };
 
 /* Which ranges come from samples all over a large file, where a pass over all of it would cost as much as reading it.

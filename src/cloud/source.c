@@ -126,6 +126,23 @@ void spl_source_seek(struct spl_source *source, uint64_t offset)
     }
 }
 
+int spl_source_read_at(const struct spl_source *source, uint64_t offset, uint8_t *out, size_t length,
+                       struct spl_error *err)
+{
+    for (size_t done = 0; done < length;) {
+        ssize_t got = pread(source->fd, out + done, length - done, (off_t)(offset + done));
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return spl_fail_errno(err, errno, "%s: offset %llu: cannot be read", source->path,
+                                  (unsigned long long)(offset + done));
+        if (got == 0)
+            return spl_source_fail_at(source, offset + done, "", err, "the file became shorter while it was read");
+        done += (size_t)got;
+    }
+    return SPL_OK;
+}
+
 int spl_source_line(struct spl_source *source, const char **line, size_t *length, struct spl_error *err)
 {
     const uint8_t *bytes = NULL, *stop;

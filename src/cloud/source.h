@@ -56,6 +56,11 @@ static inline uint64_t spl_source_left(const struct spl_source *source)
 /* Moves the cursor; offsets past the end read as the end. The line number is the caller's to restore. */
 void spl_source_seek(struct spl_source *source, uint64_t offset);
 
+/* Bytes of any place into `out`, the window untouched; a file that has fewer there than at open is an error. For what
+ * is larger than the window. Any thread, while nobody closes the source. */
+int spl_source_read_at(const struct spl_source *source, uint64_t offset, uint8_t *out, size_t length,
+                       struct spl_error *err);
+
 /* The next line without its ending: 1, or 0 at the end of the file, or negative. line[length] may be read and belongs
  * to no number. Valid until the next call. */
 int spl_source_line(struct spl_source *source, const char **line, size_t *length, struct spl_error *err);

@@ -1,0 +1,228 @@
+/* LAZ: chunks and files that tests write decode to their records, for every item, version and kind of table; layers
+ * that nobody wants change nothing else; and bytes that are wrong are named, cost no memory and end. */
+#include "laz_file.h"
+
+#include "support/laz_writer.h"
+
+enum { records_max = 3000 };
+
+static void decode(const struct spl_laz_format *format, const struct laz_out *chunk, const uint8_t *records,
+                   size_t count, size_t slice, const char *what)
+{
+    struct spl_laz_decoder *d;
+    struct spl_laz_fault fault = {0};
+    size_t bytes = format->record_bytes;
+    uint8_t *got = malloc(count * bytes);
+    assert_int_equal(spl_laz_decoder_create(format, &d, NULL), 0);
+    for (int again = 0; again < 2; again++) { /* nothing is left of the chunk before */
+        int code = spl_laz_decoder_begin(d, chunk->bytes, chunk->count, SPL_LAZ_WANT_ALL, &fault);
+        for (size_t at = 0; code == 0 && at < count; at += slice)
+            code = spl_laz_decoder_read(d, got + at * bytes, count - at < slice ? count - at : slice, &fault);
+        if (code == 0)
+            code = spl_laz_decoder_end(d, false, &fault);
+        if (code < 0)
+            fail_msg("%s: %s: %s", what, fault.field, fault.reason);
+        for (size_t i = 0; i < count * bytes; i++)
+            if (got[i] != records[i])
+                fail_msg("%s: byte %zu of record %zu of %zu is %u instead of %u", what, i % bytes, i / bytes, count,
+                         got[i], records[i]);
+    }
+    spl_laz_decoder_destroy(d);
+    free(got);
+}
+
+static void every_item_and_version(void **state)
+{
+    static const size_t counts[] = {1, 2, 3, 40, records_max};
+    (void)state;
+    for (unsigned points = 0; points <= 10; points++)
+        for (unsigned version = points < 6 ? 1 : 3; version <= (points < 6 ? 2u : 4u); version++)
+            for (unsigned extra = 0; extra <= 3; extra += 3)
+                for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+                    struct spl_laz_format format = laz_format(points, extra, version, 0);
+                    uint8_t *records = laz_make_records(&format, counts[i], points + 100 * version);
+                    struct laz_out chunk = laz_write_chunk(&format, records, counts[i], version);
+                    char what[64];
+                    snprintf(what, sizeof what, "format %u, version %u, %u extra bytes", points, version, extra);
+                    decode(&format, &chunk, records, counts[i], 1 + counts[i] / 3, what);
+                    free(chunk.bytes);
+                    free(records);
+                }
+}
+
+/* Reads a file in memory; the records must be `records`. */
+static int read_file(const struct laz_out *file, const uint8_t *records, uint64_t count, unsigned threads,
+                     struct spl_error *err)
+{
+    struct laz_file f;
+    uint64_t done = 0;
+    write_scratch(file->bytes, file->count);
+    int code = laz_file_open(&f, scratch_path(), threads, err);
+    while (code == 0) {
+        const uint8_t *got;
+        size_t n, bytes = f.format.record_bytes;
+        code = spl_laz_stream_read(f.stream, SPL_LAZ_WANT_ALL, &got, 777, &n, err);
+        if (code < 0 || n == 0)
+            break;
+        assert_true(done + n <= count);
+        assert_memory_equal(got, records + done * bytes, n * bytes);
+        done += n;
+    }
+    if (code == 0)
+        assert_int_equal(done, count);
+    if (code == 0 && count > 5000) { /* any place, in any order */
+        for (uint64_t at = count; at > 0; at = at / 3) {
+            const uint8_t *got;
+            size_t n;
+            spl_laz_stream_seek(f.stream, at - 1, at & 1);
+            assert_int_equal(spl_laz_stream_read(f.stream, SPL_LAZ_WANT_ALL, &got, 1, &n, err), 0);
+            assert_int_equal(n, 1);
+            assert_memory_equal(got, records + (at - 1) * f.format.record_bytes, f.format.record_bytes);
+        }
+    }
+    laz_file_close(&f);
+    return code;
+}
+
+static void every_kind_of_table(void **state)
+{
+    static const uint32_t even[] = {2000, 2000, 2000, 900, 0}, odd[] = {1, 5000, 20, 1, 1878, 0}, one[] = {6900, 0};
+    (void)state;
+    for (unsigned points = 1; points <= 7; points += 6)
+        for (int kind = 0; kind < 6; kind++) {
+            static const enum laz_table tables[] = {LAZ_TABLE_USUAL, LAZ_TABLE_AT_END, LAZ_TABLE_MISSING,
+                                                    LAZ_TABLE_USUAL, LAZ_TABLE_AT_END, LAZ_TABLE_USUAL};
+            struct spl_error err = {0};
+            struct spl_laz_format format = laz_format(points, 2, points < 6 ? 2 : 3, kind < 3 ? 2000 : 0);
+            if (kind == 5 && points >= 6)
+                continue;
+            if (kind == 5)
+                format.compressor = SPL_LAZ_STREAM;
+            uint8_t *records = laz_make_records(&format, 6900, 5);
+            struct laz_out file = laz_write_file(&format, points, records,
+                                                 kind == 5  ? one
+                                                 : kind < 3 ? even
+                                                            : odd,
+                                                 tables[kind]);
+            for (unsigned threads = 1; threads <= 3; threads += 2)
+                if (read_file(&file, records, 6900, threads, &err) < 0)
+                    fail_msg("format %u, kind %d: %s", points, kind, err.message);
+            free(file.bytes);
+            free(records);
+        }
+}
+
+static void layers_that_nobody_wants(void **state)
+{
+    struct spl_laz_format format = laz_format(8, 2, 3, 0);
+    uint8_t *records = laz_make_records(&format, 500, 9), got[500 * 64];
+    struct laz_out chunk = laz_write_chunk(&format, records, 500, 1);
+    static const struct {
+        uint32_t layer;
+        unsigned at, bytes;
+    } fields[] = {{SPL_LAZ_WANT_Z, 8, 4},      {SPL_LAZ_WANT_CLASS, 16, 1}, {SPL_LAZ_WANT_INTENSITY, 12, 2},
+                  {SPL_LAZ_WANT_ANGLE, 18, 2}, {SPL_LAZ_WANT_USER, 17, 1},  {SPL_LAZ_WANT_SOURCE, 20, 2},
+                  {SPL_LAZ_WANT_TIME, 22, 8},  {SPL_LAZ_WANT_COLOR, 30, 6}, {SPL_LAZ_WANT_INFRARED, 36, 2},
+                  {SPL_LAZ_WANT_BYTES, 38, 2}};
+    struct spl_laz_decoder *d;
+    struct spl_laz_fault fault;
+    (void)state;
+    assert_int_equal(spl_laz_decoder_create(&format, &d, NULL), 0);
+    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
+        assert_int_equal(spl_laz_decoder_begin(d, chunk.bytes, chunk.count, fields[i].layer, &fault), 0);
+        assert_int_equal(spl_laz_decoder_read(d, got, 500, &fault), 0);
+        assert_int_equal(spl_laz_decoder_end(d, false, &fault), 0);
+        for (size_t r = 0; r < 500; r++) {
+            const uint8_t *now = got + r * format.record_bytes, *then = records + r * format.record_bytes;
+            assert_memory_equal(now, then, 8);
+            assert_int_equal(now[14], then[14]);
+            for (size_t k = 0; k < sizeof fields / sizeof *fields; k++)
+                assert_memory_equal(now + fields[k].at, (k == i ? then : records) + fields[k].at, fields[k].bytes);
+        }
+    }
+    spl_laz_decoder_destroy(d);
+    free(chunk.bytes);
+    free(records);
+}
+
+/* What a chunk of `format` with `length` bytes says when `count` records are read from it. */
+static void refused_chunk(const struct spl_laz_format *format, const uint8_t *bytes, size_t length, size_t count,
+                          const char *field, const char *part)
+{
+    struct spl_laz_decoder *d;
+    struct spl_laz_fault fault = {.field = ""};
+    uint8_t *got = malloc(count * format->record_bytes), *exact = malloc(length + 1);
+    memcpy(exact, bytes, length);
+    assert_int_equal(spl_laz_decoder_create(format, &d, NULL), 0);
+    int code = spl_laz_decoder_begin(d, exact, length, SPL_LAZ_WANT_ALL, &fault);
+    if (code == 0)
+        code = spl_laz_decoder_read(d, got, count, &fault);
+    if (code == 0)
+        code = spl_laz_decoder_end(d, false, &fault);
+    if (code != SPL_E_INPUT || strcmp(fault.field, field) || !strstr(fault.reason, part) || fault.at > length)
+        fail_msg("expected [%s] \"%s\", got %d [%s] \"%s\"", field, part, code, fault.field, fault.reason);
+    spl_laz_decoder_destroy(d);
+    free(exact);
+    free(got);
+}
+
+static void wrong_chunks_are_named(void **state)
+{
+    struct spl_laz_format format = laz_format(3, 0, 2, 0), layered = laz_format(7, 0, 3, 0);
+    uint8_t *records = laz_make_records(&format, 300, 1), *others = laz_make_records(&layered, 300, 1);
+    struct laz_out chunk = laz_write_chunk(&format, records, 300, 1),
+                   layers = laz_write_chunk(&layered, others, 300, 1);
+    unsigned at = layered.record_bytes;
+    (void)state;
+    refused_chunk(&format, chunk.bytes, 33, 300, "chunk", "33 bytes");
+    refused_chunk(&format, chunk.bytes, chunk.count - 1, 300, "points", "end inside");
+    refused_chunk(&format, chunk.bytes, chunk.count, 299, "chunk", "end here");
+    refused_chunk(&format, chunk.bytes, chunk.count, 310, "points", "end inside");
+    refused_chunk(&layered, layers.bytes, at + 4 + 39, 300, "chunk", "head of");
+    refused_chunk(&layered, layers.bytes, layers.count - 1, 300, "colour", "left of the chunk");
+    refused_chunk(&layered, layers.bytes, layers.count, 299, "points of the chunk", "1 more");
+    refused_chunk(&layered, layers.bytes, layers.count, 301, "points of the chunk", "fewer");
+    memset(layers.bytes + at + 4 + 4, 0xff, 4); /* z: nearly 2^32 bytes, and with the others a few in 32 bits */
+    refused_chunk(&layered, layers.bytes, layers.count, 300, "z", "4294967295 bytes");
+    free(chunk.bytes);
+    free(layers.bytes);
+    free(records);
+    free(others);
+}
+
+static void wrong_tables_are_named_or_done_without(void **state)
+{
+    static const uint32_t even[] = {200, 200, 100, 0};
+    (void)state;
+    for (int fixed = 0; fixed < 2; fixed++)
+        for (int spoil = 0; spoil < 4; spoil++) {
+            struct spl_error err = {0};
+            struct spl_laz_format format = laz_format(6, 0, 3, fixed ? 200 : 0);
+            uint8_t *records = laz_make_records(&format, 500, 3);
+            struct laz_out file = laz_write_file(&format, 6, records, even, LAZ_TABLE_USUAL);
+            uint64_t start = spl_laz_get32(file.bytes + 96), table = spl_laz_get64(file.bytes + start);
+            uint8_t *at = spoil == 0 ? file.bytes + start + 3
+                                     : file.bytes + table +
+                                           (spoil == 1   ? 0
+                                            : spoil == 2 ? 7
+                                                         : 4);
+            *at += spoil == 3 ? 1 : 0x40; /* beyond the file; version; 2^30 chunks; one more */
+            int code = read_file(&file, records, 500, 2, &err);
+            if (fixed ? code != 0 : code != SPL_E_INPUT || !strstr(err.message, "chunk table"))
+                fail_msg("%d %d: %d %s", fixed, spoil, code, err.message);
+            free(file.bytes);
+            free(records);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_item_and_version),
+        cmocka_unit_test(every_kind_of_table),
+        cmocka_unit_test(layers_that_nobody_wants),
+        cmocka_unit_test(wrong_chunks_are_named),
+        cmocka_unit_test(wrong_tables_are_named_or_done_without),
+    };
+    return cmocka_run_group_tests(tests, NULL, remove_scratch);
+}
