@@ -103,7 +103,7 @@ struct spl_renderer_options {
     uint64_t scratch_samples;   /* largest tile in samples, 0 = SPL_TILE_SAMPLES */
     uint64_t first_page_bytes;  /* largest first page of datasets to come, for the least limit; 0 = unknown */
     uint32_t first_page_chunks; /* most chunks in one of these pages: the draw list has room for them from the start */
-    void (*wake)(void *context); /* on a thread of the renderer's, whenever a page has been read; may be NULL */
+    void (*wake)(void *context); /* by threads of the renderer's, several at once, when a page was read; may be NULL */
     void *wake_context;
 };
 #define SPL_TILE_SAMPLES (4ull << 20)
@@ -128,7 +128,7 @@ SPL_API int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dat
  * then the dataset can be closed, and stays (spl_dataset_close()). */
 SPL_API void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
-/* Pages are read on a thread of the renderer's own and put on the device between tiles: by every step of a frame, and by
+/* Pages are read on threads of the renderer's own and put on the device between tiles: by every step of a frame, and by
  * upload(), for those who have no step to make: some at a time, so that nobody waits long for them. Errors as of
  * spl_renderer_render(), the device's only. wait() blocks until there is something to put there: false where nothing is
  * being read, or nothing came within a second at most or until `deadline_ns` (0 = it only looks whether some are left). */
@@ -142,7 +142,7 @@ SPL_API int spl_renderer_preload(struct spl_renderer *renderer, const struct spl
 
 /* The same in steps that never block, for a renderer that has frames to make in between: *page (0 at first; textures
  * follow) moves over those that are there, the next ones are asked for. *more: to be called again, where *page has not
- * moved once a page has been read. SPL_E_TIMEOUT when no page has come for 10 s, of this dataset or others. */
+ * moved once a page has been read. SPL_E_TIMEOUT when a page of this dataset has been waited for 10 s. */
 SPL_API int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                                       bool *more, struct spl_error *err);
 
@@ -159,7 +159,7 @@ SPL_API void spl_renderer_get_residency(struct spl_renderer *renderer, const str
                                         struct spl_residency_info *info);
 
 /* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs give
- * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page, of whichever dataset, has come for 10 s. A
+ * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page of the dataset has come for 10 s. A
  * dataset without surface is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT
  * (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed.
  * SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */

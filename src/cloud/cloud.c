@@ -87,7 +87,7 @@ static int find_reader(struct spl_source *source, const struct spl_reader **read
         *reader = is_ptx(bytes, available) ? &spl_ptx_reader : &spl_text_reader;
     else
         return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, PTX, PTS, or UTF-8 text with columns)");
+                               "is no point cloud known here (PLY, LAS, LAZ, PTX, PTS, or UTF-8 text with columns)");
     if ((*reader == &spl_ptx_reader || *reader == &spl_text_reader) && !memchr(bytes, '\n', available) &&
         memchr(bytes, '\r', available))
         source->newline = '\r';

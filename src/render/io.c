@@ -13,10 +13,11 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/spares.h"
 
 enum state { FREE, WAITS, BEING_READ, ENDED, TAKEN };
 
-enum { SPARES = 4, READS = 4 * SPL_IO_READS };
+enum { READS = 4 * SPL_IO_READS };
 static const uint64_t hangs_ns = SPL_NS_PER_S;
 
 TAILQ_HEAD(read_list, spl_io_read);
@@ -31,10 +32,7 @@ struct spl_io {
     unsigned threads, idle, reading; /* idle: that look for work, or are about to */
     size_t used, under_way;          /* not free; of these, waiting, being read or ended */
     uint64_t staged, numbers, moved_ns;
-    struct {
-        void *data;
-        size_t room;
-    } spares[SPARES]; /* memory for reads to come; NULL = none */
+    struct spl_spares spares;
     struct spl_io_read reads[READS];
 };
 
@@ -67,55 +65,15 @@ static struct spl_io_read *choose(struct spl_io *io)
     return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
 }
 
-static void drop_spares(struct spl_io *io)
-{
-    for (int i = 0; i < SPARES; i++) {
-        free(io->spares[i].data);
-        io->spares[i].data = NULL;
-    }
-}
-
-/* NULL where none fits, without much of it lying idle; what is left of the others is no longer counted on then. */
-static void *take_spare(struct spl_io *io, size_t bytes, size_t *room)
-{
-    for (int i = 0; i < SPARES; i++) {
-        void *data = io->spares[i].data;
-        if (!data || io->spares[i].room < bytes || io->spares[i].room - bytes > bytes / 8)
-            continue;
-        *room = io->spares[i].room;
-        io->spares[i].data = NULL;
-        return data;
-    }
-    drop_spares(io);
-    *room = bytes;
-    return NULL;
-}
-
-/* Takes the memory of a read that was given back. */
-static void keep(struct spl_io *io, void *data, size_t room)
-{
-    uint64_t kept = io->staged + room;
-    int at = -1;
-    for (int i = 0; i < SPARES; i++) {
-        at = io->spares[i].data ? at : i;
-        kept += io->spares[i].data ? io->spares[i].room : 0;
-    }
-    if (!io->under_way)
-        drop_spares(io);
-    if (!io->under_way || at < 0 || kept > SPL_IO_BYTES) {
-        free(data);
-        return;
-    }
-    io->spares[at].data = data;
-    io->spares[at].room = room;
-}
-
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
     if (read->data) {
         io->staged -= read->what.bytes;
         io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
-        keep(io, read->data, read->room);
+        if (!io->under_way)
+            spl_spares_drop(&io->spares);
+        spl_spares_keep(&io->spares, read->data, read->room,
+                        io->under_way && io->staged < SPL_IO_BYTES ? SPL_IO_BYTES - io->staged : 0);
     }
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
@@ -157,7 +115,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     read->state = BEING_READ;
     read->began_ns = spl_now_ns();
     size_t room;
-    void *data = take_spare(io, what.bytes, &room);
+    void *data = spl_spares_take(&io->spares, what.bytes, &room);
     io->reading++;
     io->staged += what.bytes;
     io->moved_ns = read->began_ns;
@@ -198,7 +156,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
 
 static void release(struct spl_io *io)
 {
-    drop_spares(io);
+    spl_spares_drop(&io->spares);
     for (size_t i = 0; i < READS; i++)
         free(io->reads[i].data);
     pthread_cond_destroy(&io->ended_one);
@@ -277,7 +235,7 @@ void spl_io_destroy(struct spl_io *io)
         return;
     pthread_mutex_lock(&io->mutex);
     io->closing = true;
-    drop_spares(io);
+    spl_spares_drop(&io->spares);
     for (size_t i = 0; i < READS; i++) {
         free(io->reads[i].data);
         io->reads[i].data = NULL;
