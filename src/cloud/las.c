@@ -249,5 +249,5 @@ static void las_close(struct spl_cloud *cloud)
     spl_laz_stream_destroy(las->stream);
 }
 
-const struct spl_reader spl_las_reader = {
+const struct spl_cloud_reader spl_las_reader = {
     .format = "LAS", .open = las_open, .rows = las_rows, .seek = las_seek, .close = las_close};

@@ -378,4 +378,4 @@ static int ply_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
     return SPL_OK;
 }
 
-const struct spl_reader spl_ply_reader = {.format = "PLY", .open = ply_open, .rows = ply_rows, .seek = ply_seek};
+const struct spl_cloud_reader spl_ply_reader = {.format = "PLY", .open = ply_open, .rows = ply_rows, .seek = ply_seek};

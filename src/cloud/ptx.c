@@ -258,4 +258,5 @@ static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
-const struct spl_reader spl_ptx_reader = {.format = "PTX", .open = ptx_open, .rows = ptx_rows, .seek = ptx_seek};
+const struct spl_cloud_reader spl_ptx_reader = {
+    .format = "PTX", .text = true, .open = ptx_open, .rows = ptx_rows, .seek = ptx_seek};

@@ -4,8 +4,9 @@
 
 #include "cloud/rows.h"
 
-struct spl_reader {
+struct spl_cloud_reader {
     const char *format;
+    bool text; /* lines, which may end with a carriage return alone */
     /* Checks the header, allocates cloud->state, fills info (attributes but COLOR), columns, sampling and what
      * else spl_cloud_find_colors() wants. */
     int (*open)(struct spl_cloud *cloud, struct spl_error *err);
@@ -29,7 +30,7 @@ enum spl_sampling {
 struct spl_cloud {
     struct spl_source source;
     struct spl_cloud_info info;
-    const struct spl_reader *reader;
+    const struct spl_cloud_reader *reader;
     const struct spl_cloud_options *options; /* during open only; never NULL then */
     void *state;                             /* the reader's, one allocation */
     uint32_t columns;                        /* bit 1 << enum spl_column for each that the file has */
@@ -42,7 +43,10 @@ struct spl_cloud {
     struct spl_rows rows;
 };
 
-extern const struct spl_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
+extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
+
+/* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
+int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);
 
 /* Takes colours from the next rows on as `colors` say. */
 void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors);

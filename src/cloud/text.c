@@ -309,4 +309,5 @@ static int text_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, str
     return code < 0 ? code : SPL_OK;
 }
 
-const struct spl_reader spl_text_reader = {.format = "text", .open = text_open, .rows = text_rows, .seek = text_seek};
+const struct spl_cloud_reader spl_text_reader = {
+    .format = "text", .text = true, .open = text_open, .rows = text_rows, .seek = text_seek};
