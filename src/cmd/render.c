@@ -82,7 +82,8 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
                         a->drawing.output, spl_format_name((enum spl_format)a->drawing.format),
                         spl_format_name((enum spl_format)a->drawing.format));
     if (a->drawing.format < 0)
-        return spl_fail(err, SPL_E_USAGE, "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
+        return spl_fail(err, SPL_E_USAGE,
+                        "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
     return SPL_OK;

@@ -95,7 +95,8 @@ static int resolve_output(struct arguments *a, struct spl_error *err)
     struct stat status;
     int rc;
     if (!a->path)
-        return spl_fail(err, SPL_E_USAGE, "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
+        return spl_fail(err, SPL_E_USAGE,
+                        "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
     if (!output)
         return spl_fail(err, SPL_E_USAGE, "tour needs a video or a folder to write to: -o OUT.mp4 or -o FOLDER");
     a->video = !strcasecmp(spl_cmd_ending(output), "mp4");
