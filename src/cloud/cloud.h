@@ -48,7 +48,7 @@ struct spl_cloud_options {
     const char *columns; /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
-    const struct spl_keep *keep; /* NULL = class, intensity and returns where there are any */
+    const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
 };
 
 struct spl_cloud_info {

@@ -7,7 +7,8 @@
 
 enum { SPL_LAS_FIELDS_MAX = SPL_COLUMN_COUNT - SPL_COLUMN_CLASS };
 
-enum spl_las_type { /* of extra bytes, by their number in the record */
+/* As record 4 numbers them. */
+enum spl_las_type {
     SPL_LAS_U8 = 1,
     SPL_LAS_I8,
     SPL_LAS_U16,
@@ -22,11 +23,11 @@ enum spl_las_type { /* of extra bytes, by their number in the record */
 
 /* A field that is wanted. */
 struct spl_las_field {
-    int8_t column;       // enum spl_column
-    uint8_t type;        // enum spl_las_type
-    uint8_t shift, bits; /* of an integer's bits; bits 0: all of them */
-    uint16_t at;         /* in the record */
-    uint32_t layer;      // enum spl_laz_want
+    int8_t column;                 // enum spl_column
+    uint8_t type;                  // enum spl_las_type
+    uint8_t shift, bits;           /* of an integer's bits; bits 0: all of them */
+    uint16_t at;                   /* in the record */
+    uint32_t layer;                // enum spl_laz_want
     double scale, offset, no_data; /* value = number × scale + offset; NaN: every number is one */
 };
 

@@ -45,7 +45,8 @@ struct spl_ply_header {
 
 unsigned spl_ply_type_bytes(enum spl_ply_type type);
 
-/* Reads the header, and takes columns from the vertices' properties; the cursor is then at the first byte of the data. */
+/* Reads the header, and takes columns from the vertices' properties; the cursor is then at the first byte of the data.
+ */
 int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header, struct spl_error *err);
 
 #endif

@@ -156,8 +156,14 @@ static void extra_bytes_go_by_their_names(void **state)
     static const struct {
         const char *name;
         unsigned type, options, bytes;
-    } rows[] = {{"Amplitude", i16, 1 | 8 | 16, 2}, {"", 0, 5, 5},         {"old", 13, 0, 4}, {"Deviation", f32, 1, 4},
-                {"big", u64, 0, 8},                {"negative", i64, 1, 8}, {"red", u8, 0, 1}, {"exact ", f64, 0, 8}};
+    } rows[] = {{"Amplitude", i16, 1 | 8 | 16, 2},
+                {"", 0, 5, 5},
+                {"old", 13, 0, 4},
+                {"Deviation", f32, 1, 4},
+                {"big", u64, 0, 8},
+                {"negative", i64, 1, 8},
+                {"red", u8, 0, 1},
+                {"exact ", f64, 0, 8}};
     enum { descriptions = sizeof rows / sizeof *rows };
     struct kept k;
     (void)state;
