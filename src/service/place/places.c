@@ -225,12 +225,14 @@ static int to_world(const struct spl_camera_places *hook, uint32_t crs, const ch
         return rc;
     }
     double height_m = spl_transform_get_height_m(transform);
-    bool good = spl_transform_apply(transform, true, in, out);
-    out[2] = in[2] * height_m / get_world_m(places, transform);
-    double distance_m = good ? get_distance_m(places, transform, out) : INFINITY;
+    double at[3] = {0, 0, in[2] * height_m / get_world_m(places, transform)};
+    bool good = spl_transform_apply(transform, true, in, at);
+    double distance_m = good ? get_distance_m(places, transform, at) : INFINITY;
     pthread_mutex_unlock(&places->mutex);
-    if (distance_m <= reach_m)
+    if (distance_m <= reach_m) {
+        memcpy(out, at, sizeof at);
         return 0;
+    }
     char far[64] = "has no place in the dataset's coordinate system";
     if (isfinite(distance_m))
         snprintf(far, sizeof far, "lies %.0f km from the dataset", distance_m / 1000);
