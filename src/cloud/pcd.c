@@ -38,17 +38,14 @@ static bool is_padding(const struct spl_pcd_field *field)
 static int take_column(struct spl_cloud *cloud, struct spl_pcd_field *field)
 {
     const uint32_t rgb = 7u << SPL_COLUMN_RED;
+    size_t length = strlen(field->name);
     bool packed = !strcasecmp(field->name, "rgb") || !strcasecmp(field->name, "rgba");
-    if (packed && field->count == 1 && field->bytes == 4 && !(cloud->columns & rgb)) {
-        cloud->columns |= rgb;
-        field->packed = true;
-        return SPL_COLUMN_RED;
-    }
-    int column = spl_column_from_name(field->name, strlen(field->name));
-    if (column < 0 || cloud->columns >> column & 1)
-        return SPL_COLUMN_SKIP;
-    cloud->columns |= 1u << column;
-    return column;
+    if (!packed || field->bytes != 4 || cloud->columns & rgb)
+        return spl_cloud_take_column(cloud, field->name, length);
+    spl_cloud_name_field(cloud, field->name, length);
+    cloud->columns |= rgb;
+    field->packed = true;
+    return SPL_COLUMN_RED;
 }
 
 static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
