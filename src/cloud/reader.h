@@ -48,6 +48,9 @@ extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_ptx_rea
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);
 
+/* The format that the path's ending is of, static, where `format` of `reader` is another one; else NULL. */
+const char *spl_cloud_find_wrong_ending(const char *path, const struct spl_cloud_reader *reader, const char *format);
+
 /* Takes colours from the next rows on as `colors` say. */
 void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors);
 
