@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "cloud/crs.h"
 #include "cloud/reader.h"
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err)
@@ -66,6 +67,7 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
         code = spl_cloud_find_colors(cloud, err);
     if (code < 0)
         goto fail;
+    cloud->info.named = spl_cloud_find_wrong_ending(path, cloud->reader, cloud->info.format);
     cloud->options = NULL;
     *out = cloud;
     return SPL_OK;
@@ -147,6 +149,7 @@ void spl_cloud_destroy(struct spl_cloud *cloud)
     if (cloud->state && cloud->reader->close)
         cloud->reader->close(cloud);
     spl_source_close(&cloud->source);
+    spl_crs_finish(&cloud->info.coordinates);
     free(cloud->info.stations);
     free(cloud->state);
     free(cloud);
