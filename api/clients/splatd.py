@@ -59,7 +59,7 @@ class Dataset:
         return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
 
     def place(self, crs, **point):
-        """Both of position=[longitude, latitude, height], in crs ("EPSG:4326"), and world=[x, y, z], of which one is given."""
+        """A point both ways: give position=[longitude, latitude, height], in crs ("EPSG:4326"), or world=[x, y, z]."""
         return json.loads(self.ask(f"{self.info['uri']}/place", {"crs": crs, **point})[0])
 
     def ask(self, path, params):

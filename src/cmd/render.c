@@ -23,7 +23,7 @@ struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
-    uint32_t crs;                                                    /* of eye and target; 0 = the dataset's coordinates */
+    uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
 
 _Static_assert(offsetof(struct arguments, drawing) == 0, "its rows know it there");
