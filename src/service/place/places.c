@@ -14,6 +14,7 @@
 #include <strings.h>
 
 #include "base/memory.h"
+#include "geom/unit.h"
 #include "service/place/transform.h"
 
 enum { kept = 8, made_max = 4, wkt_bytes_max = 64 << 10 };
@@ -75,11 +76,6 @@ static const char *find_fault(const struct spl_places *places)
                : NULL;
 }
 
-static double unit_in_metres(const char *unit)
-{
-    return !strcmp(unit, "m") ? 1 : !strcmp(unit, "ft") ? 0.3048 : !strcmp(unit, "us-ft") ? 1200.0 / 3937 : 0;
-}
-
 static int to_world(const struct spl_camera_places *hook, uint32_t crs, const char *name, const double in[3],
                     double out[3], struct spl_error *err);
 
@@ -104,7 +100,7 @@ int spl_places_create(const struct spl_dataset *dataset, struct spl_places **out
     memcpy(places->crs, crs ? crs : "", length);
     places->epsg = read_epsg(places->crs);
     places->fault = find_fault(places);
-    places->unit_m = unit_in_metres(info->unit);
+    spl_unit_parse(info->unit, &places->unit_m); /* else 0 */
     memcpy(places->low, info->bounds_min, sizeof places->low);
     memcpy(places->high, info->bounds_max, sizeof places->high);
     pthread_mutex_init(&places->mutex, NULL);
