@@ -41,10 +41,9 @@ static bool has_points(const struct spl_scan *scan)
     return scan->points_from[0] + scan->points_from[1] + scan->points_from[2] > 0;
 }
 
-bool spl_scans_share(struct spl_scans *scans)
+void spl_scans_share(struct spl_scans *scans)
 {
     double black = INFINITY, white = -INFINITY, least = INFINITY;
-    bool changed = false;
     for (size_t i = 0; i < scans->count; i++) {
         const struct spl_cloud_colors *own = &scans->list[i].own_colors;
         if (own->from != SPL_COLORS_INTENSITY || !own->guessed)
@@ -55,15 +54,13 @@ bool spl_scans_share(struct spl_scans *scans)
     }
     bool alike = white - black <= like_ranges * least;
     for (size_t i = 0; i < scans->count; i++) {
-        struct spl_cloud_colors *colors = &scans->list[i].colors, old = *colors;
+        struct spl_cloud_colors *colors = &scans->list[i].colors;
         *colors = scans->list[i].own_colors;
         if (colors->from == SPL_COLORS_INTENSITY && colors->guessed && alike) {
             colors->black = black;
             colors->white = white;
         }
-        changed |= colors->black != old.black || colors->white != old.white;
     }
-    return changed;
 }
 
 static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, struct spl_error *err)
