@@ -1,6 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
- * spl_cloud_open() recognises the format by content alone and dispatches to one reader per format (readers.c). Owned by one thread at a time. */
+ * spl_cloud_open() recognises the format by content alone and dispatches to one reader per format (readers.c). Owned by
+ * one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 

@@ -155,61 +155,41 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
-/* As if the points behind `before` had never been read; room that was made stays. */
-static void go_back(struct spl_points *p, const struct spl_points *before)
-{
-    struct spl_points now = *p;
-    *p = *before;
-    p->capacity = now.capacity;
-    p->stations = now.stations;
-    p->station_capacity = now.station_capacity;
-    p->color_class = now.color_class;
-    memcpy(p->axis, now.axis, sizeof p->axis);
-    if (before->station)
-        p->station = now.station;
-    else
-        free(now.station);
-    if (before->normal)
-        p->normal = now.normal;
-    else
-        free(now.normal);
-}
-
-/* One pass over all scans. */
+/* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
+ * on only to find all that break. */
 static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
                   struct spl_stage *stage, struct spl_error *err)
 {
     int rc = SPL_OK;
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_scan *scan = &scans->list[i];
-        struct spl_points before = *points;
         struct spl_error why = {0};
-        rc = gather_file(points, batch, scans, scan, stage, &why);
-        if (rc == SPL_OK) {
+        if (!(rc = gather_file(points, batch, scans, scan, stage, &why))) {
             i++;
             continue;
         }
-        go_back(points, &before);
+        spl_points_finish(points);
         if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
             spl_scans_remove(scans, i);
     }
     return rc;
 }
 
-/* What turns out broken after others were read may have had a share in the range of their intensities. Then all are
- * read again, so that the result is that of a pack without it; what broke before is not opened any more. */
+/* What breaks after some of it was read has left its mark: on the common range of grey, on which arrays there are. So
+ * that the result is that of a pack without it, all others are read once more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
     int rc = spl_point_batch_init(&batch, batch_points, err);
-    bool again = !rc;
-    while (again) {
+    for (bool again = !rc; again;) {
         size_t count = scans->count;
         rc = gather(points, &batch, scans, stage, err);
-        again = !rc && scans->count < count && spl_scans_share(scans);
-        if (again)
+        again = !rc && scans->count < count;
+        if (again) {
             spl_points_finish(points);
+            spl_scans_share(scans);
+        }
     }
     spl_point_batch_finish(&batch);
     if (!rc && !scans->count)

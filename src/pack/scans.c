@@ -16,8 +16,8 @@
 #include "pack/names.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
-static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
-static const double like_steps = 10;    /* times the finest step of coordinates: nothing to mention */
+static const double like_ranges = 8; /* times the smallest white less black: of one kind */
+static const double like_steps = 10; /* times the finest step of coordinates: nothing to mention */
 /* 32 bit floats: coarser than a millimetre, and than the scan's size alone would make them. */
 static const double float_step = 1e-3, float_step_diagonals = 1e-6;
 static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
@@ -43,10 +43,9 @@ static bool has_points(const struct spl_scan *scan)
     return scan->points_from[0] + scan->points_from[1] + scan->points_from[2] > 0;
 }
 
-bool spl_scans_share(struct spl_scans *scans)
+void spl_scans_share(struct spl_scans *scans)
 {
     double black = INFINITY, white = -INFINITY, least = INFINITY;
-    bool changed = false;
     for (size_t i = 0; i < scans->count; i++) {
         const struct spl_cloud_colors *own = &scans->list[i].own_colors;
         if (own->from != SPL_COLORS_INTENSITY || !own->guessed)
@@ -57,15 +56,13 @@ bool spl_scans_share(struct spl_scans *scans)
     }
     bool alike = white - black <= like_ranges * least;
     for (size_t i = 0; i < scans->count; i++) {
-        struct spl_cloud_colors *colors = &scans->list[i].colors, old = *colors;
+        struct spl_cloud_colors *colors = &scans->list[i].colors;
         *colors = scans->list[i].own_colors;
         if (colors->from == SPL_COLORS_INTENSITY && colors->guessed && alike) {
             colors->black = black;
             colors->white = white;
         }
-        changed |= colors->black != old.black || colors->white != old.white;
     }
-    return changed;
 }
 
 static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, struct spl_error *err)

@@ -38,8 +38,8 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const cha
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
 void spl_scans_remove(struct spl_scans *scans, size_t place);
 
-/* Gives the scans in the list their common range of intensities. True: some are taken otherwise than before. */
-bool spl_scans_share(struct spl_scans *scans);
+/* Gives the scans in the list their common range of intensities. */
+void spl_scans_share(struct spl_scans *scans);
 
 void spl_scans_finish(struct spl_scans *scans);
 
