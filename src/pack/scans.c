@@ -82,11 +82,11 @@ static void share_intensities(struct spl_scans *scans)
 }
 
 int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
-                   bool intensity, struct spl_stage *stage, struct spl_error *err)
+                   bool intensity, const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .keep = keep};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.count = count, .columns = columns, .intensity = intensity};
+    *scans = (struct spl_scans){.count = count, .columns = columns, .intensity = intensity, .keep = keep};
     scans->list = spl_alloc(count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
@@ -103,10 +103,14 @@ int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t co
                                   .colors = info->colors,
                                   .coordinates = info->coordinates,
                                   .attributes = info->attributes,
+                                  .columns = info->columns,
+                                  .scalars = info->scalars,
                                   .points_expected =
                                       info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                                   .min = {INFINITY, INFINITY, INFINITY},
                                   .max = {-INFINITY, -INFINITY, -INFINITY}};
+        if (i == 0)
+            snprintf(scans->fields, sizeof scans->fields, "%s", info->fields);
         spl_cloud_destroy(cloud);
         spl_stage_add(stage, 1, 0);
         rc = spl_stage_check(stage, err);

@@ -12,23 +12,26 @@ struct spl_scan {
     const char *path, *name;        /* borrowed; the name is the path's last part */
     struct spl_cloud_colors colors; /* as they are taken; intensities of like range share one over all scans */
     struct spl_cloud_coordinates coordinates;
-    uint32_t attributes;      /* enum spl_cloud_attribute */
-    uint64_t points_expected; /* of the header, or a guess by the file's size */
-    uint64_t points_from[3];  /* that were read, by struct spl_cloud_colors.from */
-    double min[3], max[3];    /* of their coordinates; nothing while there is no point */
+    uint32_t attributes;       /* enum spl_cloud_attribute */
+    uint32_t columns, scalars; /* as of struct spl_cloud_info */
+    uint64_t points_expected;  /* of the header, or a guess by the file's size */
+    uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */
+    double min[3], max[3];     /* of their coordinates; nothing while there is no point */
 };
 
 struct spl_scans {
     struct spl_scan *list; // owned
     size_t count;
-    const char *columns; /* as of struct spl_cloud_options */
-    bool intensity;      /* likewise */
+    const char *columns;         /* as of struct spl_cloud_options */
+    bool intensity;              /* likewise */
+    const struct spl_keep *keep; /* likewise, never NULL */
+    char fields[400];            /* names of the first scan's */
 };
 
 /* Opens each scan once, so that one that cannot be read is refused before hours of work, and decides how colours are
  * taken. Points are counted by spl_points_gather(). On failure nothing is held. Blocks. */
 int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
-                   bool intensity, struct spl_stage *stage, struct spl_error *err);
+                   bool intensity, const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err);
 void spl_scans_finish(struct spl_scans *scans);
 
 /* Hands out what a user may not know and would see: scans that disagree in colours, attributes or coordinates, that

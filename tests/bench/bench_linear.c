@@ -97,7 +97,8 @@ int main(int argc, char **argv)
     const char *scan = argc > 1 ? argv[1] : "",
                *out = argc > 2 && !strcmp(argv[argc - 2], "-o") ? argv[argc - 1] : NULL;
     struct spl_scans scans;
-    int rc = spl_scans_init(&scans, &scan, 1, NULL, false, &stage, &err);
+    const struct spl_keep keep = {0};
+    int rc = spl_scans_init(&scans, &scan, 1, NULL, false, &keep, &stage, &err);
     if (!rc)
         rc = spl_points_gather(&points, &scans, &stage, &err);
     if (!rc && argc > (out ? 4 : 2))
