@@ -59,7 +59,7 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
 }
 
 static int append(struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
-                  uint32_t first_station, const char *path, struct spl_error *err)
+                  uint32_t first_station, struct spl_error *err)
 {
     int rc = reserve(p, batch->count, attributes, err);
     if (rc)
@@ -68,11 +68,6 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, uin
     for (size_t i = 0; i < batch->count; i++, at++) {
         for (int c = 0; c < 3; c++) {
             double v = batch->position[i][c];
-            if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(err, SPL_E_INPUT,
-                                "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
-                                "file's scale and columns",
-                                path, (unsigned long long)(p->points_read + i), "xyz"[c], v, SPL_COORDINATE_MAX);
             p->axis[c][at] = fabs(v) < nothing ? 0 : v;
         }
         uint32_t color = grey;
@@ -103,13 +98,22 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-static void grow_box(struct spl_scan *scan, const struct spl_point_batch *batch)
+/* The batch's first point is number `first` of the scan. */
+static int grow_box(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
 {
     for (size_t i = 0; i < batch->count; i++)
         for (int c = 0; c < 3; c++) {
-            scan->min[c] = fmin(scan->min[c], batch->position[i][c]);
-            scan->max[c] = fmax(scan->max[c], batch->position[i][c]);
+            double v = batch->position[i][c];
+            if (fabs(v) > SPL_COORDINATE_MAX)
+                return spl_fail(
+                    err, SPL_E_INPUT,
+                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
+                    "and columns",
+                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
+            scan->min[c] = fmin(scan->min[c], v);
+            scan->max[c] = fmax(scan->max[c], v);
         }
+    return SPL_OK;
 }
 
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
@@ -123,6 +127,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
+    uint64_t first = p->points_read;
     char name[128];
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
@@ -131,8 +136,9 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
-        grow_box(scan, batch);
-        rc = append(p, batch, attributes, p->station_count, scan->path, err);
+        rc = grow_box(scan, batch, p->points_read - first, err);
+        if (!rc)
+            rc = append(p, batch, attributes, p->station_count, err);
         if (!rc)
             rc = spl_stage_check(stage, err);
     }
@@ -149,14 +155,65 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
+/* As if the points behind `before` had never been read; room that was made stays. */
+static void go_back(struct spl_points *p, const struct spl_points *before)
+{
+    struct spl_points now = *p;
+    *p = *before;
+    p->capacity = now.capacity;
+    p->stations = now.stations;
+    p->station_capacity = now.station_capacity;
+    p->color_class = now.color_class;
+    memcpy(p->axis, now.axis, sizeof p->axis);
+    if (before->station)
+        p->station = now.station;
+    else
+        free(now.station);
+    if (before->normal)
+        p->normal = now.normal;
+    else
+        free(now.normal);
+}
+
+/* One pass over all scans. */
+static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
+                  struct spl_stage *stage, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (size_t i = 0; !rc && i < scans->count;) {
+        struct spl_scan *scan = &scans->list[i];
+        struct spl_points before = *points;
+        struct spl_error why = {0};
+        rc = gather_file(points, batch, scans, scan, stage, &why);
+        if (rc == SPL_OK) {
+            i++;
+            continue;
+        }
+        go_back(points, &before);
+        if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
+            spl_scans_remove(scans, i);
+    }
+    return rc;
+}
+
+/* What turns out broken after others were read may have had a share in the range of their intensities. Then all are
+ * read again, so that the result is that of a pack without it; what broke before is not opened any more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
     int rc = spl_point_batch_init(&batch, batch_points, err);
-    for (size_t i = 0; !rc && i < scans->count; i++)
-        rc = gather_file(points, &batch, scans, &scans->list[i], stage, err);
+    bool again = !rc;
+    while (again) {
+        size_t count = scans->count;
+        rc = gather(points, &batch, scans, stage, err);
+        again = !rc && scans->count < count && spl_scans_share(scans);
+        if (again)
+            spl_points_finish(points);
+    }
     spl_point_batch_finish(&batch);
+    if (!rc && !scans->count)
+        rc = spl_inputs_fail_empty(scans->inputs, err);
     if (!rc && !points->count)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
