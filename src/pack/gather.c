@@ -120,8 +120,11 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
                        struct spl_scan *scan, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
-    struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors};
+    struct spl_cloud_options options = {.columns = scans->columns,
+                                        .intensity = scans->intensity,
+                                        .colors = &scan->colors,
+                                        .max_points = scan->max_points,
+                                        .points = scan->points_total};
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pack/part.h"
 #include "pack/names.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
@@ -65,7 +66,7 @@ bool spl_scans_share(struct spl_scans *scans)
         }
         changed |= colors->black != old.black || colors->white != old.white;
     }
-    return changed;
+    return spl_part_share(scans) || changed;
 }
 
 static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, struct spl_error *err)
@@ -82,6 +83,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .own_colors = info->colors,
                               .coordinates = info->coordinates,
                               .attributes = info->attributes,
+                              .points_total = info->points_total,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
@@ -91,11 +93,11 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
 }
 
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   struct spl_stage *stage, struct spl_error *err)
+                   uint64_t max_points, struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .max_points = max_points};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity};
+    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .max_points = max_points};
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;

@@ -100,7 +100,7 @@ int main(int argc, char **argv)
     struct spl_inputs inputs;
     int rc = spl_inputs_find(&inputs, &scan, 1, &(struct spl_inputs_listener){0}, &err);
     if (!rc)
-        rc = spl_scans_init(&scans, &inputs, NULL, false, &stage, &err);
+        rc = spl_scans_init(&scans, &inputs, NULL, false, 0, &stage, &err);
     if (!rc)
         rc = spl_points_gather(&points, &scans, &stage, &err);
     if (!rc && argc > (out ? 4 : 2))
