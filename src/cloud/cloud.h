@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
  * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
+ * one reader per format (ply.c, las.c, e57.c, ptx.c, text.c). Owned by one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -41,7 +41,7 @@ struct spl_cloud_options {
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "LAZ", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PTX", "PTS", "text" */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;
@@ -68,7 +68,7 @@ struct spl_cloud;
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
 
-/* Opens and checks the header. E57 gives SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
+/* Opens and checks the header. Everything malformed gives SPL_E_INPUT with file,
  * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */
 int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
                    struct spl_error *err);

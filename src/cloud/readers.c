@@ -24,6 +24,11 @@ static bool is_las(const uint8_t *bytes, size_t available)
     return begins_with(bytes, available, "LASF");
 }
 
+static bool is_e57(const uint8_t *bytes, size_t available)
+{
+    return begins_with(bytes, available, "ASTM-E57");
+}
+
 static bool is_text(const uint8_t *bytes, size_t available)
 {
     for (size_t i = 0; i < available; i++)
@@ -55,6 +60,7 @@ static const struct {
 } readers[] = {
     {&spl_ply_reader, is_ply},
     {&spl_las_reader, is_las},
+    {&spl_e57_reader, is_e57},
     {&spl_ptx_reader, is_ptx},
     {&spl_text_reader, is_text},
 };
@@ -70,15 +76,11 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
         return spl_source_fail(source, SPL_E_INPUT, "", err,
                                "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
                                "is; pack takes the scans that it was made of");
-    if (begins_with(bytes, available, "ASTM-E57"))
-        return spl_source_fail(source, SPL_E_UNSUPPORTED, "", err,
-                               "is E57, which is not supported yet: convert it first, with \"pdal translate IN.e57 "
-                               "OUT.las\" or CloudCompare");
     while (found < sizeof readers / sizeof *readers && !readers[found].is(bytes, available))
         found++;
     if (found == sizeof readers / sizeof *readers)
         return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, LAZ, PTX, PTS, or UTF-8 text with columns)");
+                               "is no point cloud known here (PLY, LAS, LAZ, E57, PTX, PTS, or UTF-8 text with columns)");
     *reader = readers[found].reader;
     if ((*reader)->text && !memchr(bytes, '\n', available) && memchr(bytes, '\r', available))
         source->newline = '\r';
