@@ -71,7 +71,8 @@ struct spl_dataset_info {
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the
- * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the caller owns *out. Blocks on disk. */
+ * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the
+ * caller owns *out. Blocks on disk. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 
 /* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
@@ -105,14 +106,14 @@ static inline void spl_open_options_init(struct spl_open_options *options)
     spl_sized_init(options, sizeof *options);
 }
 
-/* The same as spl_dataset_open(), with options. With a reader `path` is the dataset's name in errors and, without folder
- * and extension, its id; nothing is opened there. SPL_E_CANCELLED. */
+/* The same as spl_dataset_open(), with options. With a reader `path` is the dataset's name in errors and, without
+ * folder and extension, its id; nothing is opened there. SPL_E_CANCELLED. */
 SPL_API int spl_dataset_open_with(const char *path, const struct spl_open_options *options, struct spl_dataset **out,
                                   struct spl_error *err);
 
-/* NULL-safe. Where a renderer that has let go of the dataset is still in a read of it, a file is closed behind that read. A
- * reader's is waited for, 10 s at most: one that hangs longer goes on using `context` until it returns, so what lies
- * there is freed by the reader's close(). */
+/* NULL-safe. Where a renderer that has let go of the dataset is still in a read of it, a file is closed behind that
+ * read. A reader's is waited for, 10 s at most: one that hangs longer goes on using `context` until it returns, so what
+ * lies there is freed by the reader's close(). */
 SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 
 /* Borrowed until close. */

@@ -33,10 +33,10 @@ struct spl_image {
 
 enum spl_format {
     SPL_FORMAT_JPEG, /* color; float layers through a colour map, a picture for people */
-    SPL_FORMAT_PNG,  /* color RGBA8; depth and range 16 bit grey, `depth_scale` steps per unit, 0 = nothing; normal RGB8;
-                        id RGBA8 (little-endian bytes of the id); coverage 8 bit grey */
-    SPL_FORMAT_NPY,  /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
-    SPL_FORMAT_RAW,  /* the same bytes without a header, little-endian */
+    SPL_FORMAT_PNG, /* color RGBA8; depth and range 16 bit grey, `depth_scale` steps per unit, 0 = nothing; normal RGB8;
+                       id RGBA8 (little-endian bytes of the id); coverage 8 bit grey */
+    SPL_FORMAT_NPY, /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
+    SPL_FORMAT_RAW, /* the same bytes without a header, little-endian */
     SPL_FORMAT_WEBP, /* lossy; as JPEG, with the alpha of color; only where it was built in */
     SPL_FORMAT_COUNT
 };
@@ -47,6 +47,7 @@ struct spl_encode_options {
     int quality;          /* JPEG and WebP, 1..100; 0 = 90 */
     int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
+    char unit[32];        /* of distances, for the note that a 16 bit PNG carries: "m", "ft"; "" = "unit" */
 };
 
 static inline void spl_encode_options_init(struct spl_encode_options *options)

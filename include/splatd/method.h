@@ -27,7 +27,8 @@ enum spl_method {
     SPL_METHOD_COUNT
 };
 #define SPL_METHOD_DEFAULT ((enum spl_method)0)
-#define SPL_METHOD_RAW SPL_METHOD_POINTS /* shows each splat in the one sample it falls on: what measuring looks through */
+/* Shows each splat in the one sample it falls on: what measuring looks through. */
+#define SPL_METHOD_RAW SPL_METHOD_POINTS
 
 /* Discs. */
 struct spl_disc_params {
@@ -95,7 +96,8 @@ struct spl_method_param_info {
     const char *(*choice_name)(int choice); /* CHOICE, as the next; choices are 0 … most */
     int (*choice_from_name)(const char *name);
 };
-SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param); /* static; NULL for none */
+/* Static; NULL for none. */
+SPL_API const struct spl_method_param_info *spl_method_param_get(enum spl_method_param param);
 SPL_API int spl_method_param_from_name(const char *name); /* -1 for an unknown name */
 /* Is `value` within the parameter's range? SPL_E_USAGE names it. */
 SPL_API int spl_method_param_check(const struct spl_method_param_info *param, double value, struct spl_error *err);

@@ -24,18 +24,18 @@ struct spl_view {
     enum spl_method method;
     uint32_t layers;            /* bit per enum spl_layer, at least one */
     double lod;                 /* wanted spacing of splats, samples; 1 = one splat a sample, 0 = every leaf splat */
-    double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size and
-                                   enlarged */
+    double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size
+                                   and enlarged */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
     struct spl_disc_params disc; /* of methods that draw discs, as SPL_METHOD_PARAMS says */
     struct spl_fill_params fill; /* of those that fill */
-    bool partial;               /* draws what is on the device now, coarser where pages are still to come; else waits for
-                                   them. A dataset's first page is waited for in any case */
+    bool partial;               /* draws what is on the device now, coarser where pages are still to come; else waits
+                                   for them. A dataset's first page is waited for in any case */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
 };
 
-/* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1, supersample 1, opaque black, and each
- * method's parameters as their table says. */
+/* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,
+ * supersample 1, opaque black, and each method's parameters as their table says. */
 SPL_API void spl_view_init_sized(struct spl_view *view, size_t size);
 static inline void spl_view_init(struct spl_view *view)
 {
@@ -47,8 +47,8 @@ static inline void spl_view_init(struct spl_view *view)
 SPL_API double spl_view_get_param(const struct spl_view *view, enum spl_method_param param);
 SPL_API void spl_view_set_param(struct spl_view *view, enum spl_method_param param, double value);
 
-/* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is the
- * pixels, which are enlarged, encoded and sent all the same. */
+/* What a view costs, whatever it shows: width times height times supersample squared. Below one sample a pixel it is
+ * the pixels, which are enlarged, encoded and sent all the same. */
 SPL_API uint64_t spl_view_get_samples(const struct spl_view *view);
 /* What the images of its layers take in memory. */
 SPL_API uint64_t spl_view_get_frame_bytes(const struct spl_view *view);
@@ -58,7 +58,8 @@ SPL_API int spl_view_check(const struct spl_view *view, struct spl_error *err);
 
 /* Has a dataset the layers that the view asks for? SPL_E_INPUT (field "layer") of normals where it has no surface and
  * the method makes none, and of ids where it has more splats than 32 bits number. Every renderer asks. */
-SPL_API int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
+SPL_API int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info,
+                                  struct spl_error *err);
 
 struct spl_frame_stats {
     uint64_t splats_drawn, chunks_drawn, nodes_drawn;
@@ -68,8 +69,8 @@ struct spl_frame_stats {
                                    spl_view.partial demanded */
     double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
                                    the device has timestamps, else host times */
-    bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the memory
-                                   limit has no room for it */
+    bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the
+                                   memory limit has no room for it */
 };
 
 struct spl_frame {
@@ -116,22 +117,23 @@ static inline void spl_renderer_options_init(struct spl_renderer_options *option
 /* SPL_E_LIMIT with field memory-limit, and the least limit that works, where the working memory alone exceeds it. */
 SPL_API int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out,
                                 struct spl_error *err);
-/* NULL-safe; datasets that were not removed are let go. Waits for the device, and for no page: a read that does not end is
- * left behind with its thread, which ends with it. */
+/* NULL-safe; datasets that were not removed are let go. Waits for the device, and for no page: a read that does not end
+ * is left behind with its thread, which ends with it. */
 SPL_API void spl_renderer_destroy(struct spl_renderer *renderer);
 SPL_API const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer *renderer);
 
 /* Makes `dataset` (borrowed; must outlive its removal) renderable: pages are loaded as views need them, within the
  * memory limit. Refuses with both sizes when not even one frame's worth fits. */
 SPL_API int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
-/* Lets go of it, and of frames' waits for it; never blocks. A page that is being read is dropped when it has come: until
- * then the dataset can be closed, and stays (spl_dataset_close()). */
+/* Lets go of it, and of frames' waits for it; never blocks. A page that is being read is dropped when it has come:
+ * until then the dataset can be closed, and stays (spl_dataset_close()). */
 SPL_API void spl_renderer_remove(struct spl_renderer *renderer, const struct spl_dataset *dataset);
 
 /* Pages are read on threads of the renderer's own and put on the device between tiles: by every step of a frame, and by
  * upload(), for those who have no step to make: some at a time, so that nobody waits long for them. Errors as of
  * spl_renderer_render(), the device's only. wait() blocks until there is something to put there: false where nothing is
- * being read, or nothing came within a second at most or until `deadline_ns` (0 = it only looks whether some are left). */
+ * being read, or nothing came within a second at most or until `deadline_ns` (0 = it only looks whether some are
+ * left). */
 SPL_API int spl_renderer_upload(struct spl_renderer *renderer, struct spl_error *err);
 SPL_API bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns);
 
@@ -158,11 +160,11 @@ struct spl_residency_info {
 SPL_API void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                                         struct spl_residency_info *info);
 
-/* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs give
- * up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page of the dataset has come for 10 s. A
- * dataset without surface is drawn by what stands in for a method that needs one; where that finds no normals SPL_E_INPUT
- * (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is zeroed.
- * SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */
+/* Renders one frame; blocks at most until the view's deadline, for pages too, which other frames that wait for theirs
+ * give up where there is no room for both; SPL_E_TIMEOUT when it passes, or no page of the dataset has come for 10 s. A
+ * dataset without surface is drawn by what stands in for a method that needs one; where that finds no normals
+ * SPL_E_INPUT (field "layer") refuses them. On success the caller owns `frame` (spl_frame_finish), on failure it is
+ * zeroed. SPL_E_DEVICE_LOST: the renderer is dead, destroy it and make a new one. */
 SPL_API int spl_renderer_render(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                                 const struct spl_view *view, struct spl_frame *frame, struct spl_error *err);
 
@@ -214,10 +216,9 @@ struct spl_frame_steps;
 SPL_API int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                             const struct spl_view *view, struct spl_frame_steps **out, struct spl_error *err);
 
-/* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count) or the frame waits: then it makes
- * nothing and does not block. *more: there are others. Times
- * in the frame's stats are those of its own steps. Fails as spl_renderer_render() does; then the steps can only be
- * ended. */
+/* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count) or the frame waits: then it
+ * makes nothing and does not block. *more: there are others. Times in the frame's stats are those of its own steps.
+ * Fails as spl_renderer_render() does; then the steps can only be ended. */
 SPL_API int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err);
 
 /* Does it wait for pages? A step has nothing to do then; others may have come, or room, after each

@@ -10,12 +10,22 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "cloud/keep.h"
 
 enum spl_cloud_attribute {
     SPL_CLOUD_COLOR = 1 << 0, /* measured colour, or intensity as grey when the file has no colour */
     SPL_CLOUD_NORMAL = 1 << 1,
     SPL_CLOUD_CLASS = 1 << 2,
     SPL_CLOUD_STATION = 1 << 3, /* batch.station indexes info.stations */
+};
+
+/* Numbers that a point may have. */
+enum spl_scalar {
+    SPL_SCALAR_INTENSITY,
+    SPL_SCALAR_RETURN,
+    SPL_SCALAR_RETURNS,
+    SPL_SCALAR_KEPT, /* the first of SPL_KEPT_MAX, in the order of struct spl_keep */
+    SPL_SCALAR_COUNT = SPL_SCALAR_KEPT + SPL_KEPT_MAX
 };
 
 /* What a file's colours are made from, and the values that are black and white. */
@@ -38,6 +48,7 @@ struct spl_cloud_options {
     const char *columns; /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
+    const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
 };
 
 struct spl_cloud_info {
@@ -51,6 +62,9 @@ struct spl_cloud_info {
     uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
     struct spl_cloud_coordinates coordinates;
     uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
+    uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
+    uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
@@ -61,6 +75,7 @@ struct spl_point_batch {
     float (*normal)[3];    /* unit; zero where the file has none or it is degenerate */
     uint8_t *classification;
     uint16_t *station;
+    double *scalar[SPL_SCALAR_COUNT]; /* of info.scalars; NaN = the point has none */
 };
 
 struct spl_cloud;

@@ -16,6 +16,8 @@
 #include "cloud/reader.h"
 #include "geom/quaternion.h"
 
+_Static_assert(SPL_E57_ROLES - SPL_E57_CLASS == SPL_COLUMN_COUNT - SPL_COLUMN_CLASS, "roles follow the columns");
+
 /* Of a value's range; NaN = it is not known. */
 struct range {
     double least, most;
@@ -33,8 +35,9 @@ struct e57 {
     struct spl_e57_pages pages;
     struct spl_e57_document document;
     struct spl_e57_points points;
-    struct scan *scans; /* document.scan_count */
-    size_t scan;        /* the one that is read; document.scan_count = the end */
+    struct scan *scans;               /* document.scan_count */
+    size_t scan;                      /* the one that is read; document.scan_count = the end */
+    const struct spl_e57_scan *named; /* the first one with points: its fields' names are known */
     bool begun;
     bool scale_colors, scale_intensity;
     struct spl_cloud_colors base; /* of the file as a whole */
@@ -90,11 +93,49 @@ static struct range range_of(const struct spl_e57_field *field, const double lim
     return range;
 }
 
+static bool has_field(const struct spl_e57_document *document, const struct spl_e57_scan *scan, const char *name)
+{
+    for (size_t i = 0; i < scan->fields; i++)
+        if (!strcmp(document->fields[scan->first_field + i].name, name))
+            return true;
+    return false;
+}
+
+/* Which fields fill the columns from CLASS on: those that E57 itself has, then others by their names, with the prefix
+ * of their extension or without. */
+static void find_columns(struct spl_cloud *cloud, struct spl_e57_scan *scan)
+{
+    struct e57 *e57 = cloud->state;
+    const struct spl_e57_scan *first = e57->named;
+    uint32_t taken = (1u << SPL_COLUMN_CLASS) - 1; /* no other field is a position or a colour */
+    for (int column = SPL_COLUMN_CLASS; column < SPL_COLUMN_KEPT; column++)
+        if (scan->field[SPL_E57_CLASS + column - SPL_COLUMN_CLASS] >= 0)
+            taken |= 1u << column;
+    for (size_t i = 0; i < scan->fields; i++) {
+        const struct spl_e57_field *field = &e57->document.fields[scan->first_field + i];
+        const char *name = field->name, *colon = strchr(name, ':');
+        if (!first || !has_field(&e57->document, first, name))
+            spl_cloud_name_field(cloud, name, strlen(name));
+        bool free = field->role == SPL_E57_OTHER || field->role == SPL_E57_ROW || field->role == SPL_E57_COLUMN;
+        if (!free || field->type == SPL_E57_STRING)
+            continue;
+        int column = spl_keep_find_column(&cloud->keep, taken, name, strlen(name));
+        if (column < 0 && colon)
+            column = spl_keep_find_column(&cloud->keep, taken, colon + 1, strlen(colon + 1));
+        if (column < 0)
+            continue;
+        taken |= 1u << column;
+        scan->field[SPL_E57_CLASS + column - SPL_COLUMN_CLASS] = (int)i;
+    }
+    cloud->columns |= taken >> SPL_COLUMN_CLASS << SPL_COLUMN_CLASS;
+    e57->named = first ? first : scan;
+}
+
 static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err)
 {
     struct e57 *e57 = cloud->state;
     const struct spl_e57_document *document = &e57->document;
-    const struct spl_e57_scan *from = &document->scans[index];
+    struct spl_e57_scan *from = &e57->document.scans[index];
     struct scan *scan = &e57->scans[index];
     bool cartesian = spl_e57_have3(from, SPL_E57_X), colors = spl_e57_have3(from, SPL_E57_RED);
     int code = set_pose(cloud, from, scan, err);
@@ -123,12 +164,11 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
         cloud->columns |= 7u << SPL_COLUMN_RED;
     if (spl_e57_have3(from, SPL_E57_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
+    find_columns(cloud, from);
     if (from->field[SPL_E57_CLASS] >= 0)
         cloud->info.attributes |= SPL_CLOUD_CLASS;
-    if (from->field[SPL_E57_INTENSITY] >= 0) {
+    if (from->field[SPL_E57_INTENSITY] >= 0)
         scan->intensity = range_of(spl_e57_field(document, from, SPL_E57_INTENSITY), from->intensity_limits, false);
-        cloud->columns |= 1u << SPL_COLUMN_INTENSITY;
-    }
     return SPL_OK;
 }
 
@@ -206,12 +246,14 @@ static void set_colors(struct spl_cloud *cloud)
     spl_cloud_set_colors(cloud, &colors);
 }
 
-/* The role's values for the next rows, or zeros where the scan has none. */
-static int read_column(struct e57 *e57, enum spl_e57_role role, double *out, size_t count, struct spl_error *err)
+/* The role's values for the next rows, or `none` where the scan does not have it. */
+static int read_column(struct e57 *e57, enum spl_e57_role role, double *out, size_t count, double none,
+                       struct spl_error *err)
 {
     if (e57->document.scans[e57->scan].field[role] >= 0)
         return spl_e57_points_read(&e57->points, role, out, count, err);
-    memset(out, 0, count * sizeof *out);
+    for (size_t i = 0; i < count; i++)
+        out[i] = none;
     return SPL_OK;
 }
 
@@ -220,7 +262,7 @@ static int read_columns(struct e57 *e57, enum spl_e57_role role, struct spl_rows
 {
     int code = SPL_OK;
     for (int k = 0; k < columns && code == SPL_OK; k++)
-        code = read_column(e57, role + (unsigned)k, rows->value[column + k], rows->count, err);
+        code = read_column(e57, role + (unsigned)k, rows->value[column + k], rows->count, 0, err);
     return code;
 }
 
@@ -232,7 +274,7 @@ static int read_positions(struct e57 *e57, struct spl_rows *rows, struct spl_err
     double *state = e57->state;
     int code = read_columns(e57, scan->spherical ? SPL_E57_RANGE : SPL_E57_X, rows, SPL_COLUMN_X, 3, err);
     if (code == SPL_OK)
-        code = read_column(e57, scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE, state, rows->count, err);
+        code = read_column(e57, scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE, state, rows->count, 0, err);
     for (size_t r = 0; code == SPL_OK && scan->spherical && r < rows->count; r++) {
         double range = x[r], azimuth = y[r], elevation = z[r], level = range * cos(elevation);
         x[r] = level * cos(azimuth);
@@ -277,6 +319,33 @@ static int scale(const struct spl_cloud *cloud, struct spl_rows *rows, int colum
     return SPL_OK;
 }
 
+/* Does a batch show it? Intensity is also what grey is made of. */
+static bool is_wanted(const struct spl_cloud *cloud, int column)
+{
+    if (!(cloud->columns >> column & 1))
+        return false;
+    if (column == SPL_COLUMN_CLASS)
+        return cloud->info.attributes & SPL_CLOUD_CLASS;
+    return cloud->info.scalars >> (column - SPL_COLUMN_INTENSITY) & 1 ||
+           (column == SPL_COLUMN_INTENSITY && cloud->color.kind != SPL_COLOR_RGB);
+}
+
+static int read_scalars(struct e57 *e57, struct spl_rows *rows, int column, struct spl_error *err)
+{
+    double *value = rows->value[column];
+    enum spl_e57_role role = SPL_E57_CLASS + (unsigned)(column - SPL_COLUMN_CLASS);
+    int code = read_column(e57, role, value, rows->count, NAN, err);
+    for (size_t r = 0; role == SPL_E57_RETURN && r < rows->count; r++)
+        value[r] += 1; /* datasets count them from 1 */
+    if (code < 0 || role != SPL_E57_INTENSITY)
+        return code;
+    code = read_column(e57, SPL_E57_INTENSITY_STATE, e57->state, rows->count, 0, err);
+    for (size_t r = 0; code == SPL_OK && r < rows->count; r++)
+        if (e57->state[r] != 0)
+            value[r] = NAN;
+    return code;
+}
+
 static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_error *err)
 {
     struct e57 *e57 = cloud->state;
@@ -285,12 +354,11 @@ static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_
     int code = read_positions(e57, rows, err);
     if (code == SPL_OK && cloud->info.attributes & SPL_CLOUD_NORMAL)
         code = read_columns(e57, SPL_E57_NX, rows, SPL_COLUMN_NX, 3, err);
-    if (code == SPL_OK && cloud->info.attributes & SPL_CLOUD_CLASS)
-        code = read_columns(e57, SPL_E57_CLASS, rows, SPL_COLUMN_CLASS, 1, err);
     if (code == SPL_OK && cloud->columns >> SPL_COLUMN_RED & 1 && cloud->color.kind != SPL_COLOR_GREY)
         code = read_columns(e57, SPL_E57_RED, rows, SPL_COLUMN_RED, 3, err);
-    if (code == SPL_OK && cloud->columns >> SPL_COLUMN_INTENSITY & 1 && cloud->color.kind != SPL_COLOR_RGB)
-        code = read_columns(e57, SPL_E57_INTENSITY, rows, SPL_COLUMN_INTENSITY, 1, err);
+    for (int column = SPL_COLUMN_CLASS; column < SPL_COLUMN_COUNT && code == SPL_OK; column++)
+        if (is_wanted(cloud, column))
+            code = read_scalars(e57, rows, column, err);
     if (code < 0)
         return code;
     if (scan->posed) {
@@ -301,7 +369,7 @@ static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_
          e57->scale_colors && spl_e57_have3(from, SPL_E57_RED) && cloud->color.kind != SPL_COLOR_GREY && k < 3; k++)
         if ((code = scale(cloud, rows, SPL_COLUMN_RED + k, &scan->color[k], 255, err)) < 0)
             return code;
-    if (e57->scale_intensity && from->field[SPL_E57_INTENSITY] >= 0 && cloud->color.kind != SPL_COLOR_RGB)
+    if (e57->scale_intensity && from->field[SPL_E57_INTENSITY] >= 0 && is_wanted(cloud, SPL_COLUMN_INTENSITY))
         code = scale(cloud, rows, SPL_COLUMN_INTENSITY, &scan->intensity, 1, err);
     return code;
 }

@@ -291,7 +291,6 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];
         if (p->column < 0)
             continue;
-        cloud->columns |= 1u << p->column;
         if (p->column >= SPL_COLUMN_RED && p->column <= SPL_COLUMN_BLUE) {
             cloud->scan_colors |= p->type != SPL_PLY_UINT8;
             cloud->integer_colors &= p->type < SPL_PLY_FLOAT32;
@@ -311,7 +310,7 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
 static int ply_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct ply *ply = cloud->state = spl_alloc(1, sizeof *ply, err);
-    int code = ply ? spl_ply_parse_header(&cloud->source, &ply->header, err) : SPL_E_NOMEM;
+    int code = ply ? spl_ply_parse_header(cloud, &ply->header, err) : SPL_E_NOMEM;
     if (code == SPL_OK)
         code = find_columns(cloud, err);
     for (unsigned i = 0; code == SPL_OK && i < ply->header.vertex; i++) {

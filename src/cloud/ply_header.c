@@ -50,9 +50,9 @@ static enum spl_ply_type find_type(const struct words *words, size_t i)
     return SPL_PLY_NONE;
 }
 
-static void copy_name(char name[24], const struct words *words, size_t i)
+static void copy_name(char *name, size_t room, const struct words *words, size_t i)
 {
-    snprintf(name, 24, "%.*s", (int)words->length[i], words->word[i]);
+    snprintf(name, room, "%.*s", (int)words->length[i], words->word[i]);
     for (char *p = name; *p; p++)
         if (*p < ' ' || *p > '~')
             *p = '?';
@@ -94,15 +94,16 @@ static int parse_element(const struct spl_source *source, const struct words *wo
         header->vertex_line = source->line;
     }
     struct spl_ply_element *element = &header->elements[header->element_count++];
-    copy_name(element->name, words, 1);
+    copy_name(element->name, sizeof element->name, words, 1);
     element->count = count;
     element->first = header->property_count;
     return SPL_OK;
 }
 
-static int parse_property(const struct spl_source *source, const struct words *words, struct spl_ply_header *header,
+static int parse_property(struct spl_cloud *cloud, const struct words *words, struct spl_ply_header *header,
                           struct spl_error *err)
 {
+    const struct spl_source *source = &cloud->source;
     bool list = word_is(words, 1, "list");
     size_t name = list ? 4 : 2;
     if (words->count != name + 1)
@@ -125,15 +126,10 @@ static int parse_property(const struct spl_source *source, const struct words *w
         return spl_source_fail_line(source, source->line, "property", err, "unknown type \"%.*s\"",
                                     (int)words->length[name - 1], words->word[name - 1]);
     struct spl_ply_element *element = &header->elements[header->element_count - 1];
-    copy_name(p.name, words, name);
+    copy_name(p.name, sizeof p.name, words, name);
     p.offset = (uint16_t)element->row_bytes;
-    if (!list && header->vertex_line && element == &header->elements[header->vertex]) {
-        int column = spl_column_from_name(words->word[name], words->length[name]);
-        p.column = (int8_t)column;
-        for (unsigned i = element->first; i < header->property_count; i++)
-            if (header->properties[i].column == column)
-                p.column = SPL_COLUMN_SKIP; /* "red" beside "diffuse_red": the first counts */
-    }
+    if (!list && header->vertex_line && element == &header->elements[header->vertex])
+        p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
     element->row_bytes += spl_ply_type_bytes(list ? p.count_type : p.type);
     element->lists |= list;
     element->properties++;
@@ -157,8 +153,9 @@ static int find_newline(struct spl_source *source, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_ply_parse_header(struct spl_source *source, struct spl_ply_header *header, struct spl_error *err)
+int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header, struct spl_error *err)
 {
+    struct spl_source *source = &cloud->source;
     const char *line;
     size_t length;
     struct words words;
@@ -185,7 +182,7 @@ int spl_ply_parse_header(struct spl_source *source, struct spl_ply_header *heade
         } else if (word_is(&words, 0, "element")) {
             code = parse_element(source, &words, header, err);
         } else if (word_is(&words, 0, "property")) {
-            code = parse_property(source, &words, header, err);
+            code = parse_property(cloud, &words, header, err);
         } else {
             struct spl_fields shown = spl_fields_begin(line, length, ' ');
             char text[32];

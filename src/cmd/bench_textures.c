@@ -68,8 +68,8 @@ static int take_codings(void *arguments, const char *option, char *text, struct 
             i++;
         if (i == sizeof names / sizeof *names)
             return spl_fail(err, SPL_E_USAGE,
-                            "%s takes a list of training, D8W4, D12W4, D16W8 and adaptive, or none, not '%.32s'", option,
-                            piece);
+                            "%s takes a list of training, D8W4, D12W4, D16W8 and adaptive, or none, not '%.32s'",
+                            option, piece);
         *runs |= names[i].runs;
     }
     return 0;

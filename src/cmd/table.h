@@ -1,5 +1,5 @@
-/* Tables of options. A row says all of one: its names, the form of its argument, the member that it sets, its range, its
- * default, what it is for. What is refused, what --help says and what was probably meant follow from the rows. */
+/* Tables of options. A row says all of one: its names, the form of its argument, the member that it sets, its range,
+ * its default, what it is for. What is refused, what --help says and what was probably meant follow from the rows. */
 #ifndef SPL_CMD_TABLE_H
 #define SPL_CMD_TABLE_H
 
@@ -79,8 +79,9 @@ int spl_cmd_take_name(const char *option, const char *text, int (*from_name)(con
 
 enum { SPL_CMD_DONE = 1 };
 
-/* Sets members of `arguments`, defaults first. 0: optind is the first operand. SPL_CMD_DONE: --help was asked for and is
- * on stdout. SPL_E_USAGE, or what `take` says, for the first that is wrong. Moves operands behind options in argv. */
+/* Sets members of `arguments`, defaults first. 0: optind is the first operand. SPL_CMD_DONE: --help was asked for and
+ * is on stdout. SPL_E_USAGE, or what `take` says, for the first that is wrong. Moves operands behind options in
+ * argv. */
 int spl_cmd_table_parse(const struct spl_cmd_table *table, int argc, char **argv, void *arguments,
                         struct spl_error *err);
 

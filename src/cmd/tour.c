@@ -83,7 +83,7 @@ static const struct spl_cmd_table table = {
         "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
         "Ten seconds between keyframes, slow at both ends, at another size:\n"
         "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
-        "Metric depth images of a recorded trajectory, one a pose, into a folder:\n"
+        "Depth images of a recorded trajectory, one a pose, into a folder:\n"
         "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n",
     .options = options,
     .count = sizeof options / sizeof *options,
@@ -95,7 +95,8 @@ static int resolve_output(struct arguments *a, struct spl_error *err)
     struct stat status;
     int rc;
     if (!a->path)
-        return spl_fail(err, SPL_E_USAGE, "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
+        return spl_fail(err, SPL_E_USAGE,
+                        "tour needs a path of cameras: --path FILE of nerfstudio, Open3D, COLMAP or TUM");
     if (!output)
         return spl_fail(err, SPL_E_USAGE, "tour needs a video or a folder to write to: -o OUT.mp4 or -o FOLDER");
     a->video = !strcasecmp(spl_cmd_ending(output), "mp4");
@@ -214,6 +215,8 @@ static int run(struct arguments *a, struct spl_error *err)
     int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_cameras(a, dataset, err);
+    if (!rc)
+        spl_cmd_drawing_set_unit(&a->drawing, dataset);
     if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
         rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->drawing.output);
     if (!rc)

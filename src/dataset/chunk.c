@@ -1,6 +1,6 @@
-/* One chunk's words. Colours are codes above the chunk's least, in as many bits as the largest needs; positions, normals
- * and radii come quantised (chunk_geometry.c), clip lines are added at the end (chunk_clip.c); optional attributes
- * follow them (streams.c). Pure functions; any thread. */
+/* One chunk's words. Colours are codes above the chunk's least, in as many bits as the largest needs; positions,
+ * normals and radii come quantised (chunk_geometry.c), clip lines are added at the end (chunk_clip.c); optional
+ * attributes follow them (streams.c). Pure functions; any thread. */
 #include "dataset/codec.h"
 
 #include <math.h>

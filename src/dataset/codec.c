@@ -1,5 +1,5 @@
-/* The table of kinds, and the functions of chunk.h that look a chunk's row up. A chunk that opening has checked has one,
- * and so has one that is being written. Pure functions; any thread. */
+/* The table of kinds, and the functions of chunk.h that look a chunk's row up. A chunk that opening has checked has
+ * one, and so has one that is being written. Pure functions; any thread. */
 #include "dataset/codec.h"
 
 #include "base/error.h"

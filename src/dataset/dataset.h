@@ -5,6 +5,7 @@
 #include <splatd/dataset.h>
 
 #include <stdatomic.h>
+#include <string.h>
 
 #include <jansson.h>
 
@@ -14,10 +15,16 @@
 #include "dataset/tables.h"
 #include "sparse/dictionary.h"
 
+/* The unit of info's lengths, for people and programs alike: "m", "ft" …, "unit" where nobody knows. */
+static inline const char *spl_unit_word(const struct spl_dataset_info *info)
+{
+    return !*info->unit || !strcmp(info->unit, "unknown") ? "unit" : info->unit;
+}
+
 /* How to open one. */
 struct spl_dataset_opening {
     bool verify;                  /* as of spl_dataset_open() */
-    uint64_t tables_bytes;        /* all tables are kept where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
+    uint64_t tables_bytes;        /* all tables stay where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
     const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
 };
 
@@ -84,7 +91,8 @@ int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes);
 
 /* Reads and decodes splat `id` of any level, or the vertex of a line that has this id; false (*splat untouched) when
- * there is none, or the file was cut short in place. Its position is relative to its node. Any thread; blocks on disk. */
+ * there is none, or the file was cut short in place. Its position is relative to its node. Any thread; blocks on
+ * disk. */
 struct spl_splat;
 bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat);
 

@@ -49,8 +49,8 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
         return wrong(dataset, err, info->pages, "closes it with nodes that are no node's child, or with too few nodes");
     if (info->splats > last->first_id || info->pieces > last->first_id)
         return spl_fail_field(err, SPL_E_CORRUPT, "counts",
-                              "%s: section META: \"counts\" has more splats or pieces than PDIR has ids; pack the dataset "
-                              "again",
+                              "%s: section META: \"counts\" has more splats or pieces than PDIR has ids; pack the "
+                              "dataset again",
                               dataset->name);
     dataset->rows = rows;
     info->nodes = last->first_node;

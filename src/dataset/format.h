@@ -93,10 +93,10 @@ enum spl_chunk_kind {
     SPL_CHUNK_KINDS
 };
 
-/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order of
- * their lines, with the same fields but for clip lines. Streams of fixed-width codes, each stream starting on a word:
- * geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional attributes (streams.h),
- * which vertices do not have. A splat's fields lie one after the other from the low bits up. */
+/* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order
+ * of their lines, with the same fields but for clip lines. Streams of fixed-width codes, each stream starting on a
+ * word: geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional attributes
+ * (streams.h), which vertices do not have. A splat's fields lie one after the other from the low bits up. */
 struct spl_chunk {
     float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;

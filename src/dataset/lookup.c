@@ -1,6 +1,6 @@
-/* One splat, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages and
- * chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a map, so that
- * a file that was cut short in place is no SIGBUS. Any thread. */
+/* One splat, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages
+ * and chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a map,
+ * so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
 #include <stdlib.h>
@@ -39,7 +39,8 @@ static bool read_splat(const struct spl_dataset *dataset, const struct spl_place
 {
     uint32_t words[SPL_CHUNK_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
     struct spl_chunk chunk = *place->chunk;
-    uint32_t count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS; // reading the tables has checked that the page has them
+    /* reading the tables has checked that the page has them */
+    uint32_t count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS;
     spl_assert(count <= sizeof words / sizeof *words);
     uint64_t offset = dataset->pages[place->tables->page]->offset + (uint64_t)chunk.geometry_word * sizeof *words;
     if (spl_dataset_read(dataset, offset, words, count * sizeof *words, NULL))

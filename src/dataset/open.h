@@ -92,8 +92,8 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
                                  uint64_t *bytes);
 
-/* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held against
- * theirs whenever they are read; fills everything up to `textures` and the sizes in info. */
+/* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held
+ * against theirs whenever they are read; fills everything up to `textures` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);
 
 /* What lies in the sections, one kind after the other; each check trusts what those before it have passed. */

@@ -1,7 +1,7 @@
-/* Heads of pages: what nodes and chunks may say. A head is held against its row of the directory alone: its sums end where
- * the next row begins, so each node but the root is exactly one node's child, whose number is larger than its parent's;
- * each chunk is one node's; every stream lies in its page; and every code decodes to finite numbers. Any walk of the tree
- * ends, and the renderer and the shaders check nothing. Linear in nodes and chunks. Any thread. */
+/* Heads of pages: what nodes and chunks may say. A head is held against its row of the directory alone: its sums end
+ * where the next row begins, so each node but the root is exactly one node's child, whose number is larger than its
+ * parent's; each chunk is one node's; every stream lies in its page; and every code decodes to finite numbers. Any walk
+ * of the tree ends, and the renderer and the shaders check nothing. Linear in nodes and chunks. Any thread. */
 #include <math.h>
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
-/* Tables of pages in memory: how large, how they are laid out, and reading them; see tables.h. Opening reads all of them
- * where they fit, on all cores, one after the other into arrays of the whole dataset; else the root's page's, and of a
- * dataset that is verified the others in passing. The opener's thread for that, any for the rest. */
+/* Tables of pages in memory: how large, how they are laid out, and reading them; see tables.h. Opening reads all of
+ * them where they fit, on all cores, one after the other into arrays of the whole dataset; else the root's page's, and
+ * of a dataset that is verified the others in passing. The opener's thread for that, any for the rest. */
 #include "dataset/tables.h"
 
 #include <pthread.h>
@@ -125,8 +125,8 @@ static int read_head(const struct spl_dataset *dataset, struct spl_tables *table
         rc = take_all(&reader, tables, err);
     if (!rc && XXH3_64bits_digest(reader.hash) != section->hash)
         rc = spl_fail(err, SPL_E_CORRUPT,
-                      dataset->opened ? "%s: section HEAD %u fails its checksum: it is damaged, or was overwritten while in "
-                                        "use; put the dataset back under another name and rename it"
+                      dataset->opened ? "%s: section HEAD %u fails its checksum: it is damaged, or was overwritten "
+                                        "while in use; put the dataset back under another name and rename it"
                                       : "%s: section HEAD %u fails its checksum; copy or pack the dataset again",
                       spl_dataset_get_name(dataset), tables->page);
     XXH3_freeState(reader.hash);
@@ -251,7 +251,8 @@ static int read_all(struct spl_dataset *dataset, struct spl_error *err)
         return spl_fail(err, reading.err.code, "%s", reading.err.message);
     const char *key = spl_counts_compare(&reading.counts, &dataset->counts);
     return key ? spl_fail_field(err, SPL_E_CORRUPT, key,
-                                "%s: section META: \"%s\" is not what the nodes and chunks hold; pack the dataset again",
+                                "%s: section META: \"%s\" is not what the nodes and chunks hold; pack the dataset "
+                                "again",
                                 dataset->name, key)
                : SPL_OK;
 }

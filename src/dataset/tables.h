@@ -1,6 +1,6 @@
-/* What describes a page: its nodes, the headers of their chunks, and where the codes of attributes and textures lie: the
- * section HEAD as it is used. A dataset keeps those of all its pages, or, where they would take more memory than it may
- * have, only the root's; the others are read when somebody wants them. */
+/* What describes a page: its nodes, the headers of their chunks, and where the codes of attributes and textures lie:
+ * the section HEAD as it is used. A dataset keeps those of all its pages, or, where they would take more memory than it
+ * may have, only the root's; the others are read when somebody wants them. */
 #ifndef SPL_DATASET_TABLES_H
 #define SPL_DATASET_TABLES_H
 
@@ -35,13 +35,13 @@ uint64_t spl_dataset_get_all_tables_bytes(const struct spl_dataset *dataset);
 /* What tables may take altogether, as the dataset was opened. */
 uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset);
 
-/* Reads the tables of a page into `block`, which has room for their bytes and then begins with a struct spl_tables. Held
- * against checksum and directory, so that whoever has them checks nothing but what lies between a node and its children
- * (spl_node_judge_child()). SPL_E_CORRUPT, SPL_E_IO, SPL_E_NOMEM. Any thread; blocks on disk. */
+/* Reads the tables of a page into `block`, which has room for their bytes and then begins with a struct spl_tables.
+ * Held against checksum and directory, so that whoever has them checks nothing but what lies between a node and its
+ * children (spl_node_judge_child()). SPL_E_CORRUPT, SPL_E_IO, SPL_E_NOMEM. Any thread; blocks on disk. */
 int spl_dataset_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err);
 
-/* Those that the dataset keeps, or has read into *read, which the caller frees after use (NULL otherwise). NULL and `err`
- * as read_tables. Any thread; may block on disk. */
+/* Those that the dataset keeps, or has read into *read, which the caller frees after use (NULL otherwise). NULL and
+ * `err` as read_tables. Any thread; may block on disk. */
 const struct spl_tables *spl_dataset_borrow_tables(const struct spl_dataset *dataset, uint32_t page,
                                                    struct spl_tables **read, struct spl_error *err);
 

@@ -68,8 +68,8 @@ int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t w
                        struct spl_error *err)
 {
     if (!(fov_degrees > 0 && fov_degrees <= 179))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "a vertical field of view must be above 0, up to 179 degrees, not %g",
-                              fov_degrees);
+        return spl_fail_field(err, SPL_E_INPUT, "fov",
+                              "a vertical field of view must be above 0, up to 179 degrees, not %g", fov_degrees);
     if (!width)
         return spl_fail_field(err, SPL_E_INPUT, "width", "an image needs at least one pixel of width");
     if (!height)
@@ -105,7 +105,8 @@ int spl_camera_look_at(struct spl_camera *camera, const double eye[3], const dou
     double right[3], down[3];
     cross(forward, upward, right);
     if (sqrt(dot(right, right)) < parallel_sine)
-        return spl_fail_field(err, SPL_E_INPUT, "up", "up is parallel to the direction of view; give another, such as up=%s",
+        return spl_fail_field(err, SPL_E_INPUT, "up",
+                              "up is parallel to the direction of view; give another, such as up=%s",
                               fabs(forward[2]) > 0.5 ? "0,1,0" : "0,0,1");
     normalize(right, 3);
     cross(forward, right, down);

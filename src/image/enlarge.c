@@ -127,7 +127,8 @@ static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worke
     }
 }
 
-void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin, uint32_t end)
+void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin,
+                       uint32_t end)
 {
     struct job job = {.small = small, .large = large, .scale = scale, .first = begin};
     spl_parallel_for(0, end - begin, 32, enlarge_rows, &job);

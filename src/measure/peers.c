@@ -22,7 +22,8 @@ static int take_number(char *line, const char *field, double least, const char *
     *out = strtod(comma + 1, &end);
     end += strspn(end, " \t");
     /* strtod alone would also take hex floats */
-    if (end == comma + 1 || comma[1 + strspn(comma + 1, "0123456789+-.eE \t")] || *end || !isfinite(*out) || *out <= least)
+    if (end == comma + 1 || comma[1 + strspn(comma + 1, "0123456789+-.eE \t")] || *end || !isfinite(*out) ||
+        *out <= least)
         return spl_fail_field(err, SPL_E_INPUT, field, "%s: line %zu: '%.40s' is no %s", path, number, comma + 1,
                               field);
     return SPL_OK;

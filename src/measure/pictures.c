@@ -1,7 +1,7 @@
 /* Pictures for people: thumbnails and error maps.
  *
- * A thumbnail averages boxes of whole pixels, so that no pixel counts more than another; averages are of sRGB values, as
- * browsers scale pictures too: these are for looking, not for measuring. An error map composes as the metrics do, so
+ * A thumbnail averages boxes of whole pixels, so that no pixel counts more than another; averages are of sRGB values,
+ * as browsers scale pictures too: these are for looking, not for measuring. An error map composes as the metrics do, so
  * that it is black exactly where PSNR sees nothing; channels stay apart: a swapped or a tinted one shows by its hue.
  * Pure; any thread. */
 #include "measure/pictures.h"

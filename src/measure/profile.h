@@ -70,8 +70,8 @@ void spl_profile_finish(struct spl_profile *profile);
 void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, double *fixed_ms, double *ms_per_mpx);
 
 /* The Pareto front: front[i] = true where no other entry has at most i's cost and at most i's error, and less of one of
- * them. Entries that are equal in both are on the front together. An entry whose cost or error is NaN is never on it and
- * beats nobody; infinities are ordinary. Less is better on both axes: hand over -PSNR. O(count²), no allocation. */
+ * them. Entries that are equal in both are on the front together. An entry whose cost or error is NaN is never on it
+ * and beats nobody; infinities are ordinary. Less is better on both axes: hand over -PSNR. O(count²), no allocation. */
 void spl_front_mark(const double *cost, const double *error, size_t count, bool *front);
 
 /* Sets `front` of every point, from ms and psnr. Points without a PSNR are not on it. */

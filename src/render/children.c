@@ -1,5 +1,5 @@
-/* Children of a node, in their order, on as many pages as they lie; see children.h. All of these pages are asked for, so
- * that they come together. The renderer's thread. */
+/* Children of a node, in their order, on as many pages as they lie; see children.h. All of these pages are asked for,
+ * so that they come together. The renderer's thread. */
 #include "render/children.h"
 
 static int check(const struct spl_select_params *params, const struct spl_node *node,
@@ -9,7 +9,8 @@ static int check(const struct spl_select_params *params, const struct spl_node *
         const char *what = spl_node_judge_child(node, children[i].node);
         if (what)
             return spl_fail(err, SPL_E_CORRUPT, "%s: node %llu %s; pack the dataset again",
-                            spl_dataset_get_info(params->dataset)->id, (unsigned long long)(node->first_child + i), what);
+                            spl_dataset_get_info(params->dataset)->id, (unsigned long long)(node->first_child + i),
+                            what);
     }
     return SPL_OK;
 }
@@ -29,7 +30,8 @@ int spl_children_find(const struct spl_select_params *params, const struct spl_n
             return SPL_OK;
         for (; i < node->child_count && node->first_child + i < spl_dataset_get_page_end(dataset, page); i++)
             if (one == SPL_SELECT_YES)
-                children[i] = (struct spl_found_node){tables->nodes + (node->first_child + i - tables->first_node), tables};
+                children[i] =
+                    (struct spl_found_node){tables->nodes + (node->first_child + i - tables->first_node), tables};
     }
     return *answer != SPL_SELECT_YES || spl_dataset_keeps_all(dataset) ? SPL_OK : check(params, node, children, err);
 }

@@ -16,8 +16,8 @@ static inline const struct spl_chunk *spl_found_get_chunks(const struct spl_foun
     return found->tables->chunks + (found->node->first_chunk - found->tables->first_chunk);
 }
 
-/* Sets node->child_count children where *answer becomes SPL_SELECT_YES. SPL_E_CORRUPT where one of them does not fit its
- * parent, which opening has left unchecked where it did not read all tables. */
+/* Sets node->child_count children where *answer becomes SPL_SELECT_YES. SPL_E_CORRUPT where one of them does not fit
+ * its parent, which opening has left unchecked where it did not read all tables. */
 int spl_children_find(const struct spl_select_params *params, const struct spl_node *node,
                       struct spl_found_node children[8], enum spl_select_answer *answer, struct spl_error *err);
 

@@ -1,9 +1,9 @@
 /* Room on the device for slots, and for the renderer itself: the least recently asked for give way.
  *
- * Invariant: nothing gives way for what has no room in the end. So whether a slot has room in a walk follows from what the walk
- * has asked for before it, and what others hold: a walk that is made again, once its slots have come, finds all of them, and
- * refuses what it refused. Only a device that is out of memory below its limit may break this (SPL_E_NOMEM).
- * The renderer's thread. */
+ * Invariant: nothing gives way for what has no room in the end. So whether a slot has room in a walk follows from what
+ * the walk has asked for before it, and what others hold: a walk that is made again, once its slots have come, finds
+ * all of them, and refuses what it refused. Only a device that is out of memory below its limit may break this
+ * (SPL_E_NOMEM). The renderer's thread. */
 #include <inttypes.h>
 
 #include "render/residency.h"
@@ -33,7 +33,8 @@ static bool evict_one(struct spl_residency *residency, bool evict_held)
         struct spl_resident_dataset *resident = &residency->datasets[i];
         for (uint32_t p = 0; p < resident->device_slots; p++) {
             struct spl_resident_page *page = &resident->pages[p];
-            if (page->buffer && page->last_frame < residency->frame && (evict_held || !spl_resident_is_kept(resident, page)) &&
+            if (page->buffer && page->last_frame < residency->frame &&
+                (evict_held || !spl_resident_is_kept(resident, page)) &&
                 (!first || spl_resident_gives_way_before(resident, page, of_first, first))) {
                 first = page;
                 of_first = resident;
@@ -47,7 +48,8 @@ static bool evict_one(struct spl_residency *residency, bool evict_held)
     return true;
 }
 
-/* Evicts until so many bytes are free, or nothing: SPL_SLOT_CROWDED where they would be but for what others hold, SPL_E_LIMIT. */
+/* Evicts until so many bytes are free, or nothing: SPL_SLOT_CROWDED where they would be but for what others hold,
+ * SPL_E_LIMIT. */
 static int make_room(struct spl_residency *residency, bool evict_held, uint64_t bytes, struct spl_error *err)
 {
     const uint64_t limit = spl_gpu_get_limits(residency->gpu)->memory_bytes, used = spl_gpu_get_memory(residency->gpu);
@@ -134,8 +136,8 @@ int spl_residency_grow_staging(struct spl_residency *residency, size_t bytes, st
     return grow_staging(residency, true, bytes, err);
 }
 
-int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                                   bool evict_held, struct spl_error *err)
+int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident,
+                                   uint32_t slot, bool evict_held, struct spl_error *err)
 {
     const bool software = is_software(residency);
     const size_t bytes = spl_slot_get_bytes(resident->dataset, slot);

@@ -17,8 +17,8 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID,       [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
 };
 
-/* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same answers.
- * One that does not takes what is there, but for the first page. */
+/* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same
+ * answers. One that does not takes what is there, but for the first page. */
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
@@ -26,7 +26,8 @@ static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
-    bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT); // for which a coarser one stands in
+    /* for which a coarser one stands in */
+    bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT);
     if (rc < 0 && !no_room)
         spl_fail(&job->page_error, rc, "%s", why.message);
     if (rc == SPL_SLOT_PENDING && !awaited)
@@ -59,11 +60,12 @@ static enum spl_select_answer ask_tables(void *context, uint32_t page, const str
     return answer == SPL_SELECT_YES && !*tables ? SPL_SELECT_LATER : answer;
 }
 
-/* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page among
- * them. */
+/* 0, SPL_SLOT_PENDING where the walk is to be made again once what it asked for has come, or an error, that of a page
+ * among them. */
 static int end_walk(struct spl_frame_job *job, struct spl_error *err)
 {
-    int rc = spl_hold_end_walk(&job->renderer->residency, job->resident, &job->hold, &job->frame->stats.pages_loaded, err);
+    int rc =
+        spl_hold_end_walk(&job->renderer->residency, job->resident, &job->hold, &job->frame->stats.pages_loaded, err);
     if (job->page_error.code)
         return spl_fail(err, job->page_error.code, "%s", job->page_error.message);
     return rc;
@@ -216,8 +218,8 @@ static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats
     }
 }
 
-/* Has the device draw the tile. A list that could not be recorded to its end is run all the same, for nothing: parameters
- * and half its work are the device's by then. */
+/* Has the device draw the tile. A list that could not be recorded to its end is run all the same, for nothing:
+ * parameters and half its work are the device's by then. */
 static int draw_tile(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_gpu *gpu = tile->renderer->gpu;

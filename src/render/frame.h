@@ -23,15 +23,18 @@ struct spl_frame_job {
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera);
 
-/* spl_select_spacing() of what `camera` sees. SPL_SLOT_PENDING where it has pages to wait for: it is to be called again. */
+/* spl_select_spacing() of what `camera` sees. SPL_SLOT_PENDING where it has pages to wait for: it is to be called
+ * again. */
 int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *camera, double *spacing,
                            struct spl_error *err);
 
-/* Makes the images of the view's layers, but for those that are there: the caller's, or from a tile before. SPL_E_NOMEM. */
+/* Makes the images of the view's layers, but for those that are there: the caller's, or from a tile before.
+ * SPL_E_NOMEM. */
 int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err);
 
-/* Renders `tile` into the job's images, which it makes, and adds to its stats. Blocks until it is done; SPL_SLOT_PENDING where it has pages
- * to wait for, and nothing was drawn; SPL_E_TIMEOUT where the view's deadline had passed before. */
+/* Renders `tile` into the job's images, which it makes, and adds to its stats. Blocks until it is done;
+ * SPL_SLOT_PENDING where it has pages to wait for, and nothing was drawn; SPL_E_TIMEOUT where the view's deadline had
+ * passed before. */
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
 
 /* Milliseconds since *from, which becomes now. */

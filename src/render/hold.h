@@ -1,8 +1,8 @@
 /* What a frame waits with: the slots that its walk asked for, some of them still on their way. They do not give way to
  * pages of other frames until it has gone on, so each frame that waits ends its wait.
  *
- * A walk whose slots have no room beside those that others hold takes none and waits until they are let go of; the first
- * of these goes first, so that it is not passed over for ever. The renderer's thread. */
+ * A walk whose slots have no room beside those that others hold takes none and waits until they are let go of; the
+ * first of these goes first, so that it is not passed over for ever. The renderer's thread. */
 #ifndef SPL_RENDER_HOLD_H
 #define SPL_RENDER_HOLD_H
 
@@ -27,19 +27,19 @@ struct spl_hold {
     size_t hanging;                         /* disks, when there was no room */
     bool crowded;                           /* no slots: it waits for room */
     bool stalled;                           /* the same, until its own disk answers */
-    size_t ready;                           /* of the slots before the first that was missed: the most of any walk, + 1 */
+    size_t ready;                           /* of slots before the first that was missed: the most of any walk, + 1 */
     uint32_t fruitless;                     /* waits behind which there were no more */
     bool alone;                             /* the caller makes no step of another frame meanwhile: holds give way */
 };
 
-/* Ends the walk that `hold` asked: 0 = its frame goes on, or SPL_SLOT_PENDING: it has something to wait for, *awaited (to
- * be added to) slots of them on their way. SPL_E_NOMEM. */
+/* Ends the walk that `hold` asked: 0 = its frame goes on, or SPL_SLOT_PENDING: it has something to wait for, *awaited
+ * (to be added to) slots of them on their way. SPL_E_NOMEM. */
 int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_dataset *resident, struct spl_hold *hold,
                       uint64_t *awaited, struct spl_error *err);
 
-/* Has waiting got it nowhere? Every wait ends with all that was held in its place, so that the walk behind gets further; but
- * where others drive that out without end (who renders to the end meanwhile, a device that is out of memory below its
- * limit), a frame takes what is there for this tile. */
+/* Has waiting got it nowhere? Every wait ends with all that was held in its place, so that the walk behind gets
+ * further; but where others drive that out without end (who renders to the end meanwhile, a device that is out of
+ * memory below its limit), a frame takes what is there for this tile. */
 bool spl_hold_gives_up(const struct spl_hold *hold);
 
 /* SPL_SLOT_PENDING as long as there is nothing to do for its frame; 0: it is to let go and to walk (again). Why a slot

@@ -1,7 +1,7 @@
-/* Room on the host for tables that a dataset does not keep: counted in before their read begins, the least recently asked
- * for out, within what the dataset's tables may take; what it keeps itself is of it; none for what has no
- * room in the end, as device_room.c has it. What a walk has asked for stays until
- * the next one begins, so that it may look at it. The renderer's thread. */
+/* Room on the host for tables that a dataset does not keep: counted in before their read begins, the least recently
+ * asked for out, within what the dataset's tables may take; what it keeps itself is of it; none for what has no room in
+ * the end, as device_room.c has it. What a walk has asked for stays until the next one begins, so that it may look at
+ * it. The renderer's thread. */
 #include "render/residency.h"
 #include "render/slot.h"
 
@@ -11,7 +11,8 @@ static uint64_t evict_one(struct spl_residency *residency, struct spl_resident_d
     struct spl_resident_page *first = NULL;
     for (uint32_t s = resident->device_slots; s < resident->slot_count; s++) {
         struct spl_resident_page *page = &resident->pages[s];
-        if (page->host_bytes && page->last_frame < residency->frame && (evict_held || !spl_resident_is_kept(resident, page)) &&
+        if (page->host_bytes && page->last_frame < residency->frame &&
+            (evict_held || !spl_resident_is_kept(resident, page)) &&
             (!first || spl_resident_gives_way_before(resident, page, resident, first)))
             first = page;
     }

@@ -1,12 +1,13 @@
 /* Reads on threads of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
- * memory that is counted before it is taken. Each file is read by one thread at a time, and files side by side: one whose
- * disk does not answer holds up nobody else.
+ * memory that is counted before it is taken. Each file is read by one thread at a time, and files side by side: one
+ * whose disk does not answer holds up nobody else.
  *
- * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that waits
- * is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that does not
- * end: it holds what it reads from, and its thread goes with it where the rest has gone by then.
+ * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that
+ * waits is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that
+ * does not end: it holds what it reads from, and its thread goes with it where the rest has gone by then.
  *
- * Threads: every function is called by the one that owns the renderer; those of spl_io_what, and `wake`, by io threads. */
+ * Threads: every function is called by the one that owns the renderer; those of spl_io_what, and `wake`, by io
+ * threads. */
 #ifndef SPL_RENDER_IO_H
 #define SPL_RENDER_IO_H
 
@@ -18,7 +19,7 @@
 #include "base/error.h"
 
 enum {
-    SPL_IO_READS = 256, /* of a source that may be under way, ended ones that were not given back among them; 4 times of all */
+    SPL_IO_READS = 256, /* of a source that may be under way, with ended ones not yet given back; 4 times of all */
     SPL_IO_THREADS = 16
 };
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
@@ -78,8 +79,8 @@ void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* When the read of the source that is under way was begun; where none is, when one of any source was last begun, has ended or
- * was given back: what tells a disk that is slow from one that hangs. */
+/* When the read of the source that is under way was begun; where none is, when one of any source was last begun, has
+ * ended or was given back: what tells a disk that is slow from one that hangs. */
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source);
 
 /* Has it been reading of the source for a second, and how many sources are there of which it has? */

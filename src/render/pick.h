@@ -5,8 +5,8 @@
 #include <splatd/render.h>
 
 /* The view of one pixel whose centre is point (x, y) of `view`'s image: principal point moved, nothing else, so the
- * splats, their sizes and the level of detail are those of the whole image. All layers; colours are the splats', without
- * textures. `out` may be `view`. */
+ * splats, their sizes and the level of detail are those of the whole image. All layers; colours are the splats',
+ * without textures. `out` may be `view`. */
 void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out);
 
 /* Reads the one pixel of `frame`, whose layers are those of spl_pick_view() (normals may be missing); `camera` is the

@@ -1,6 +1,6 @@
-/* Which pages are there, asked for and uploaded; see residency.h. A software device draws from host-visible memory, which
- * pages are copied to; a GPU's go through a staging buffer, which has its room before they have theirs. The renderer's
- * thread. */
+/* Which pages are there, asked for and uploaded; see residency.h. A software device draws from host-visible memory,
+ * which pages are copied to; a GPU's go through a staging buffer, which has its room before they have theirs. The
+ * renderer's thread. */
 #include "render/residency.h"
 
 #include <stdlib.h>
@@ -164,15 +164,15 @@ static int take_room(struct spl_residency *residency, struct spl_resident_datase
                                           : spl_residency_take_device_room(residency, resident, slot, alone, err);
 }
 
-/* Is an error the latest word on a slot? It is for who waits with it already, and for a while for who takes what is there and
- * would never hear of it; whoever comes to wait has it read anew. */
+/* Is an error the latest word on a slot? It is for who waits with it already, and for a while for who takes what is
+ * there and would never hear of it; whoever comes to wait has it read anew. */
 static bool is_told(const struct spl_resident_page *page, bool awaited)
 {
     return page->holds || (!awaited && spl_now_ns() - page->read->ended_ns < errors_last_ns);
 }
 
-/* Why its read failed. It is forgotten with the last frame that waits for it; where none does, once for all that failed of
- * the dataset. */
+/* Why its read failed. It is forgotten with the last frame that waits for it; where none does, once for all that failed
+ * of the dataset. */
 static int tell_failure(struct spl_residency *residency, struct spl_resident_dataset *resident,
                         const struct spl_resident_page *page, struct spl_error *err)
 {

@@ -1,13 +1,14 @@
-/* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them, on the io thread (io.h), and
- * evicted, least recently drawn first, when the device's memory limit refuses another.
+/* Which slots of which datasets are on the device, or of tables on the host. They are read when a view asks for them,
+ * on the io thread (io.h), and evicted, least recently drawn first, when the device's memory limit refuses another.
  *
- * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read; for one
- * that has no room nothing is evicted. So what has no room depends on what the walk asks for, and not on what has come by
- * then, and a walk that is made again finds what it has waited for. A frame that waits holds what it asked for (hold.h).
+ * Asking for a slot that is not there takes its room at once, in the order that a walk asks in, and begins its read;
+ * for one that has no room nothing is evicted. So what has no room depends on what the walk asks for, and not on what
+ * has come by then, and a walk that is made again finds what it has waited for. A frame that waits holds what it asked
+ * for (hold.h).
  *
- * A disk that has not answered for a second (io.h) costs its own dataset's views only: what it is to bring gives way before all
- * else, held or not, and whatever else is asked of it takes no room until it answers; the read goes on, unwanted.
- * Bookkeeping of the renderer's thread. */
+ * A disk that has not answered for a second (io.h) costs its own dataset's views only: what it is to bring gives way
+ * before all else, held or not, and whatever else is asked of it takes no room until it answers; the read goes on,
+ * unwanted. Bookkeeping of the renderer's thread. */
 #ifndef SPL_RENDER_RESIDENCY_H
 #define SPL_RENDER_RESIDENCY_H
 
@@ -48,15 +49,18 @@ struct spl_resident_dataset {
 };
 
 /* Does a frame that waits keep it? Not what a disk that hangs is to bring. */
-static inline bool spl_resident_is_kept(const struct spl_resident_dataset *resident, const struct spl_resident_page *page)
+static inline bool spl_resident_is_kept(const struct spl_resident_dataset *resident,
+                                        const struct spl_resident_page *page)
 {
     return page->holds && (page->filled || !resident->hangs);
 }
 
-/* What gives way first: the least of what a disk that hangs is to bring, what nobody keeps, the rest; then the one that was
- * asked for longest ago. */
-static inline bool spl_resident_gives_way_before(const struct spl_resident_dataset *of_a, const struct spl_resident_page *a,
-                                                 const struct spl_resident_dataset *of_b, const struct spl_resident_page *b)
+/* What gives way first: the least of what a disk that hangs is to bring, what nobody keeps, the rest; then the one that
+ * was asked for longest ago. */
+static inline bool spl_resident_gives_way_before(const struct spl_resident_dataset *of_a,
+                                                 const struct spl_resident_page *a,
+                                                 const struct spl_resident_dataset *of_b,
+                                                 const struct spl_resident_page *b)
 {
     int worth_a = (a->filled || !of_a->hangs) + spl_resident_is_kept(of_a, a);
     int worth_b = (b->filled || !of_b->hangs) + spl_resident_is_kept(of_b, b);
@@ -145,10 +149,10 @@ int spl_residency_ask(struct spl_residency *residency, struct spl_resident_datas
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank);
 
-/* device_room.c: makes a slot's buffer, evicting others, those of frames that wait where `evict_held`; none where that would
- * not do. SPL_SLOT_CROWDED, SPL_E_LIMIT, SPL_E_NOMEM. */
-int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident, uint32_t slot,
-                                   bool evict_held, struct spl_error *err);
+/* device_room.c: makes a slot's buffer, evicting others, those of frames that wait where `evict_held`; none where that
+ * would not do. SPL_SLOT_CROWDED, SPL_E_LIMIT, SPL_E_NOMEM. */
+int spl_residency_take_device_room(struct spl_residency *residency, struct spl_resident_dataset *resident,
+                                   uint32_t slot, bool evict_held, struct spl_error *err);
 
 /* The same of what uploads go through; what it takes is never given back. */
 int spl_residency_grow_staging(struct spl_residency *residency, size_t bytes, struct spl_error *err);
@@ -160,8 +164,8 @@ int spl_residency_take_host_room(struct spl_residency *residency, struct spl_res
 /* Gives up what has room and did not come. */
 void spl_residency_drop_slot(struct spl_residency *residency, struct spl_resident_page *page);
 
-/* Puts on the device what has been read since, as much as holds up nobody; spl_io_wait() says whether that was all. Device
- * errors only: a read that failed is told to who asks for it. */
+/* Puts on the device what has been read since, as much as holds up nobody; spl_io_wait() says whether that was all.
+ * Device errors only: a read that failed is told to who asks for it. */
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err);
 
 #endif

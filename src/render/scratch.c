@@ -153,8 +153,8 @@ static int upload(struct spl_scratch *scratch, struct spl_residency *residency, 
         larger = taken(larger <= left ? larger : bytes);
         if (larger > left) // both are there for a moment
             return spl_fail(err, SPL_E_LIMIT,
-                            "a draw list of %" PRIu64 " bytes has no room beside working memory and the largest dataset's "
-                            "first page; raise lod, or memory-limit above %" PRIu64, bytes,
+                            "a draw list of %" PRIu64 " bytes has no room beside working memory and the largest "
+                            "dataset's first page; raise lod, or memory-limit above %" PRIu64, bytes,
                             spl_gpu_get_limits(gpu)->memory_bytes);
         struct spl_gpu_buffer *replacement;
         int rc = spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, larger, &replacement, err);

@@ -34,8 +34,8 @@ struct spl_select_params {
     enum spl_select_answer (*tables)(void *context, uint32_t page, const struct spl_tables **tables);
     enum spl_select_answer (*resident)(void *context, uint32_t page); /* may the page be drawn? may ask for it */
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
-    enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them; may
-                                                                         be NULL where atoms is 0 */
+    enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them;
+                                                                         may be NULL where atoms is 0 */
     void *context;
 };
 

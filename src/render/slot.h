@@ -1,6 +1,6 @@
-/* What of a dataset is read for frames, in slots: its pages; where it has textures, as many of their codes by page, and one of
- * the dictionary; where it does not keep all tables, those by page, which stay on the host. Pure but for reading;
- * any thread. */
+/* What of a dataset is read for frames, in slots: its pages; where it has textures, as many of their codes by page, and
+ * one of the dictionary; where it does not keep all tables, those by page, which stay on the host. Pure but for
+ * reading; any thread. */
 #ifndef SPL_RENDER_SLOT_H
 #define SPL_RENDER_SLOT_H
 
@@ -26,8 +26,8 @@ uint32_t spl_slot_of_tables(const struct spl_dataset *dataset, uint32_t page);
 /* What the device takes for it, or of tables the host. */
 size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot);
 
-/* Fills `out` with as many bytes, held against their checksum where the dataset is. `source` is the dataset, so that this
- * is a spl_io_what.read. SPL_E_IO, SPL_E_CORRUPT. Blocks on disk. */
+/* Fills `out` with as many bytes, held against their checksum where the dataset is. `source` is the dataset, so that
+ * this is a spl_io_what.read. SPL_E_IO, SPL_E_CORRUPT. Blocks on disk. */
 int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error *err);
 
 /* spl_dataset_hold() and spl_dataset_let_go(), for spl_io_what. */

@@ -2,8 +2,8 @@
  *
  * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the place of the
  * next tile and the fill plan, which is the whole image's, are all on the host. So frames may take turns, and a tile
- * is the same whatever was drawn before it. Images are made when there is a tile to put into them: one that waits for its
- * first pages has none. Belongs to the renderer's thread. */
+ * is the same whatever was drawn before it. Images are made when there is a tile to put into them: one that waits for
+ * its first pages has none. Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,14 +48,15 @@ static int check_image(const struct spl_image *image, const struct spl_view *vie
                               (int)image->layer);
     if (image->type != spl_readback_type(image->layer) || image->width != view->camera.width ||
         image->height != view->camera.height)
-        return spl_fail_field(err, SPL_E_USAGE, "images", "the image of layer %s has another type or size than the view",
+        return spl_fail_field(err, SPL_E_USAGE, "images",
+                              "the image of layer %s has another type or size than the view",
                               spl_layer_name(image->layer));
     if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
         spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type) ||
         image->row_bytes > SIZE_MAX / 2 / image->height)
         return spl_fail_field(err, SPL_E_USAGE, "images",
-                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, or "
-                              "rows that overlap or do not fit into memory",
+                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, "
+                              "or rows that overlap or do not fit into memory",
                               spl_layer_name(image->layer), unit);
     return SPL_OK;
 }
@@ -120,8 +121,8 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     return rc;
 }
 
-/* What can be refused is, before the device or a page is touched. `options` NULL: a frame in steps, of which all layers are
- * handed out; `handed_out`: those that have no image of the caller's are. */
+/* What can be refused is, before the device or a page is touched. `options` NULL: a frame in steps, of which all layers
+ * are handed out; `handed_out`: those that have no image of the caller's are. */
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                  const struct spl_render_options *options, bool handed_out, struct spl_frame_steps **out,
                  struct spl_error *err)

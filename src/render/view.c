@@ -87,8 +87,8 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
         return refuse_normals(info, err);
     if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
-                              "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer id number (%u): ask for "
-                              "other layers, or pack the scans as several datasets",
+                              "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
+                              "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
     return SPL_OK;
 }

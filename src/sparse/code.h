@@ -66,9 +66,9 @@ uint64_t spl_chunk_code_bits(const struct spl_chunk_code *code);
 struct spl_code_settings {
     uint32_t atoms;       /* a splat's at most, 0..SPL_ATOMS_MAX */
     float psnr;           /* dB: a splat takes no further atom once it is this good; 0: no such stop */
-    float lambda;         /* > 0: an atom must lower the splat's squared error (sum over its n values) by more than
-                             lambda · its bits, and widths are chosen for the smallest error + lambda · bits; 0: the paper's
-                             coding, every plane weight_bits and the dictionary's full index width */
+    float lambda;         /* > 0: an atom must lower the splat's squared error (sum over its n values) by more
+                             than lambda · its bits, and widths are chosen for the smallest error + lambda · bits; 0:
+                             the paper's coding, every plane weight_bits and the dictionary's full index width */
     uint32_t weight_bits; /* 1..8; with lambda the widest that is tried */
 };
 

@@ -29,11 +29,15 @@ enum spl_e57_role {
     SPL_E57_NX,
     SPL_E57_NY,
     SPL_E57_NZ,
-    SPL_E57_INTENSITY,
-    SPL_E57_CLASS,
+    SPL_E57_INTENSITY_STATE, /* not 0 = it means nothing */
     SPL_E57_ROW,
     SPL_E57_COLUMN,
-    SPL_E57_ROLES,
+    SPL_E57_CLASS, /* from here on: in the order of enum spl_column, and for the reader to give to other fields */
+    SPL_E57_INTENSITY,
+    SPL_E57_RETURN, /* counted from 0 */
+    SPL_E57_RETURNS,
+    SPL_E57_KEPT,
+    SPL_E57_ROLES = SPL_E57_KEPT + 8,
     SPL_E57_OTHER = SPL_E57_ROLES
 };
 

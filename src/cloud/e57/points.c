@@ -90,8 +90,6 @@ int spl_e57_points_begin(struct spl_e57_points *points, const struct spl_e57_sca
                                           .index = (size_t)(scan->field[i] < 0 ? 0 : scan->field[i]),
                                           .packet = points->start,
                                           .window = stream->window};
-        if (stream->field && !stream->window && !(stream->window = spl_alloc_raw(window_bytes, 1, err)))
-            return SPL_E_NOMEM;
     }
     return SPL_OK;
 }
@@ -142,6 +140,8 @@ static int hold_packet(struct spl_e57_points *points, uint64_t *at, struct spl_e
 /* Adds the next packet's bytes to the stream's window: 1, or 0 where there are no more. */
 static int fill(struct spl_e57_points *points, struct spl_e57_stream *stream, struct spl_error *err)
 {
+    if (!stream->window && !(stream->window = spl_alloc_raw(window_bytes, 1, err)))
+        return SPL_E_NOMEM;
     int code = hold_packet(points, &stream->packet, err);
     if (code <= 0)
         return code;

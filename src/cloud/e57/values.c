@@ -66,6 +66,9 @@ static const struct {
     {"colorGreen", SPL_E57_GREEN},
     {"colorBlue", SPL_E57_BLUE},
     {"intensity", SPL_E57_INTENSITY},
+    {"isIntensityInvalid", SPL_E57_INTENSITY_STATE},
+    {"returnIndex", SPL_E57_RETURN},
+    {"returnCount", SPL_E57_RETURNS},
     {"rowIndex", SPL_E57_ROW},
     {"columnIndex", SPL_E57_COLUMN},
 };

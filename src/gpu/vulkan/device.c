@@ -1,4 +1,5 @@
-/* Opening and closing a Vulkan device, and the backend's table. One compute queue. Owned by the thread that opens it. */
+/* Opening and closing a Vulkan device, and the backend's table. One compute queue. Owned by the thread that opens
+ * it. */
 #include "gpu/vulkan/vk.h"
 
 #include <stdlib.h>

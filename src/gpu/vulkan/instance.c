@@ -37,7 +37,8 @@ static bool has_layer(const char *name)
 
 static int create(bool debug, VkInstance *out, struct spl_error *err)
 {
-    static const char *const layer = "VK_LAYER_KHRONOS_validation", *const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+    static const char *const layer = "VK_LAYER_KHRONOS_validation";
+    static const char *const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
     uint32_t version = 0;
     if (vkEnumerateInstanceVersion(&version) < 0 || version < VK_API_VERSION_1_3)
         return spl_fail(err, SPL_E_NO_DEVICE, "vulkan: the loader has version %u.%u; 1.3 is needed",

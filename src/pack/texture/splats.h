@@ -1,5 +1,5 @@
-/* The splats of a dataset, chunk by chunk, as the photographs see them: in world coordinates, as they decode. Vertices of
- * lines are among them, which take colours as splats do, but no textures. */
+/* The splats of a dataset, chunk by chunk, as the photographs see them: in world coordinates, as they decode. Vertices
+ * of lines are among them, which take colours as splats do, but no textures. */
 #ifndef SPL_PACK_TEXTURE_SPLATS_H
 #define SPL_PACK_TEXTURE_SPLATS_H
 

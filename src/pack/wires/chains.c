@@ -1,6 +1,6 @@
-/* Wires are found once, after the radii, for the whole scan: which points belong together depends on no level of detail.
- * A join of two points is a straight piece; over a gap it is several, which follow the arc that the stretches on both
- * sides are parts of. A piece belongs to the node of the nearer of its two points. One thread. */
+/* Wires are found once, after the radii, for the whole scan: which points belong together depends on no level of
+ * detail. A join of two points is a straight piece; over a gap it is several, which follow the arc that the stretches
+ * on both sides are parts of. A piece belongs to the node of the nearer of its two points. One thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -5,8 +5,8 @@
  * wires beside each other). Distances count in the points' own spacing; there is no length in metres.
  *
  * Points that are only taken for a wire's, as of noise, may be looked at by all others and walked along for ever, so
- * each look and each point on a walk is a step of `work`, and where they end, so does joining. Whoever cancels waits for
- * a sort at most. */
+ * each look and each point on a walk is a step of `work`, and where they end, so does joining. Whoever cancels waits
+ * for a sort at most. */
 #include "pack/wires/join.h"
 
 #include <math.h>
@@ -290,7 +290,8 @@ int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wir
     free(spacings);
     spacings = NULL;
     rc = thin_out(&j, count, 2 * reach, kept);
-    for (uint64_t share = count / 2; reach <= 2 * far * longest && !rc; reach *= 2, share /= 2) { /* fewer ends each time */
+    /* fewer ends each time */
+    for (uint64_t share = count / 2; reach <= 2 * far * longest && !rc; reach *= 2, share /= 2) {
         lay_grid(&j, count, reach, kept);
         rc = find_pairs(&j, reach, share, err);
         if (!rc)

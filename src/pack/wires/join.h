@@ -35,7 +35,8 @@ static inline void spl_wires_advance(const struct spl_wires_work *work, uint64_t
     enum { every = 1000 };
     uint64_t left = count - i;
     if (i % every == 0)
-        spl_stage_add(work->stage, (uint64_t)((double)share * (double)(left < every ? left : every) / (double)count), 0);
+        spl_stage_add(work->stage, (uint64_t)((double)share * (double)(left < every ? left : every) / (double)count),
+                      0);
 }
 
 /* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or

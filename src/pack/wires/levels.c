@@ -1,6 +1,6 @@
-/* A node's share of the wires: its pieces, put together to lines, and these simplified (Douglas and Peucker). Each level
- * is made of what was joined, not of the level below, so errors do not add up. A long line is simplified in stretches,
- * which bounds the work by its length. Any thread. */
+/* A node's share of the wires: its pieces, put together to lines, and these simplified (Douglas and Peucker). Each
+ * level is made of what was joined, not of the level below, so errors do not add up. A long line is simplified in
+ * stretches, which bounds the work by its length. Any thread. */
 #include "pack/wires/wires.h"
 
 #include <math.h>
@@ -127,7 +127,8 @@ static struct spl_wire_vertex mean_vertex(const struct spl_wire_vertex *v, size_
     return out;
 }
 
-/* Appends the line of vertices [0, count), simplified; the last one ends it. False: a node has no room for all of it. */
+/* Appends the line of vertices [0, count), simplified; the last one ends it. False: a node has no room for all of
+ * it. */
 static bool add_simplified(struct spl_node_lines *out, const struct spl_wire_vertex *v, size_t count, double spacing,
                            double error)
 {

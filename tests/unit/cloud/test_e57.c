@@ -376,6 +376,50 @@ static void classes_of_an_extension(void **state)
     loaded_finish(&l);
 }
 
+static void fields_that_are_kept(void **state)
+{
+    struct spl_keep keep;
+    struct spl_cloud *cloud;
+    struct spl_point_batch batch;
+    struct loaded l;
+    (void)state;
+    prepare_doubles();
+    for (int i = 0; i < N; i++)
+        raw[0][i] = i % 2, raw[1][i] = i;
+    const struct e57_field fields[] = {doubles("cartesianX", 0),
+                                       doubles("cartesianY", 1),
+                                       doubles("cartesianZ", 2),
+                                       doubles("intensity", 3),
+                                       {.name = "isIntensityInvalid", .type = E57_INTEGER, .most = 1, .raw = raw[0]},
+                                       {.name = "returnIndex", .type = E57_INTEGER, .most = 1, .raw = raw[0]},
+                                       {.name = "rowIndex", .type = E57_INTEGER, .most = 999, .raw = raw[1]},
+                                       doubles("a:amplitude", 4),
+                                       doubles("timeStamp", 5)};
+    const struct e57_scan scans[] = {{"all", NULL, fields, 9, 4, 0}, {"none", NULL, fields, 3, 4, 0}};
+    load_scans(scans, 2, NULL, &l);
+    loaded_finish(&l);
+    assert_int_equal(spl_keep_parse(&keep, "amplitude,rowindex,timeStamp", NULL), 0);
+    assert_int_equal(spl_cloud_open(scratch_path(), &(struct spl_cloud_options){.keep = &keep}, &cloud, NULL), 0);
+    assert_int_equal(spl_point_batch_init(&batch, 8, NULL), 0);
+    assert_int_equal(spl_cloud_read(cloud, &batch, NULL), 1);
+    const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+    assert_int_equal(info->scalars, 1u << SPL_SCALAR_INTENSITY | 1u << SPL_SCALAR_RETURN | 7u << SPL_SCALAR_KEPT);
+    assert_non_null(strstr(info->fields, "a:amplitude"));
+    for (size_t i = 0; i < 8; i++) {
+        const double expected[5] = {i % 2 ? NAN : value[3][i], (double)(i % 2) + 1, value[4][i], (double)i,
+                                    value[5][i]};
+        const int scalar[5] = {SPL_SCALAR_INTENSITY, SPL_SCALAR_RETURN, SPL_SCALAR_KEPT, SPL_SCALAR_KEPT + 1,
+                               SPL_SCALAR_KEPT + 2};
+        for (int k = 0; k < 5; k++) {
+            double got = batch.scalar[scalar[k]][i], wanted = i < 4 ? expected[k] : NAN;
+            if (got != wanted && !(isnan(got) && isnan(wanted)))
+                fail_msg("point %zu, %d: %g instead of %g", i, k, got, wanted);
+        }
+    }
+    spl_point_batch_finish(&batch);
+    spl_cloud_destroy(cloud);
+}
+
 static void a_prototype_may_be_nested_and_repeat_itself(void **state)
 {
     static const char xml[] =
@@ -535,6 +579,7 @@ int main(void)
         cmocka_unit_test(colours_by_limits_by_type_and_by_sight),
         cmocka_unit_test(scans_of_different_limits_agree),
         cmocka_unit_test(classes_of_an_extension),
+        cmocka_unit_test(fields_that_are_kept),
         cmocka_unit_test(a_prototype_may_be_nested_and_repeat_itself),
         cmocka_unit_test(what_the_header_must_not_say),
         cmocka_unit_test(what_sections_and_packets_must_not_say),
