@@ -219,6 +219,7 @@ static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
         if ((code = set_scan(cloud, i, err)) < 0)
             return code;
     agree_on_ranges(cloud);
+    cloud->sampling = SPL_SAMPLE_INTENSITY;
     cloud->info.coordinates.unit_m = 1;
     return SPL_OK;
 }
@@ -401,14 +402,25 @@ static int e57_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     return 0;
 }
 
+/* Parts in their order go forward: from one to the next costs the heads of the packets between them. */
 static int e57_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
 {
     struct e57 *e57 = cloud->state;
-    (void)part, (void)parts, (void)err;
-    e57->scan = 0;
-    e57->begun = false;
+    const struct spl_e57_scan *scans = e57->document.scans;
+    uint64_t to = cloud->info.points_expected / parts * part;
+    size_t scan = 0;
+    int code = SPL_OK;
     e57->base = cloud->info.colors;
-    return SPL_OK;
+    while (scan + 1 < e57->document.scan_count && to >= scans[scan].points)
+        to -= scans[scan++].points;
+    if (part == 0 || scan != e57->scan || !e57->begun || to < e57->points.next) {
+        e57->scan = part ? scan : 0;
+        e57->begun = part != 0;
+        code = part ? spl_e57_points_begin(&e57->points, &scans[scan], err) : SPL_OK;
+    }
+    if (code == SPL_OK && part)
+        code = spl_e57_points_skip(&e57->points, to, err);
+    return code;
 }
 
 static void e57_close(struct spl_cloud *cloud)

@@ -101,32 +101,45 @@ static int fail_packet(const struct spl_e57_points *points, uint64_t at, const c
                               "packet of scan '%s': %s %llu", points->scan->name, what, (unsigned long long)value);
 }
 
+/* The head of the packet at `at`, its kind and length checked, and of a data packet the number of its streams: 1, or 0
+ * behind the last one. */
+static int read_head(struct spl_e57_points *points, uint64_t at, uint8_t h[packet_header], size_t *length,
+                     struct spl_error *err)
+{
+    if (points->end - at < packet_header)
+        return 0;
+    int code = spl_e57_read(points->pages, at, h, packet_header, err);
+    if (code < 0)
+        return code;
+    size_t streams = spl_e57_get16(h + 4);
+    *length = spl_e57_get16(h + 2) + (size_t)1;
+    if (h[0] > 2)
+        return fail_packet(points, at, "packet type", err, "none of index (0), data (1), ignored (2):", h[0]);
+    if (*length > points->end - at || *length < 4)
+        return fail_packet(points, at, "packet length", err, "does not fit its section:", *length);
+    if (h[0] == 1 && (streams != points->scan->fields || packet_header + 2 * streams > *length))
+        return fail_packet(points, at, "bytestreams", err, "as many as the prototype has fields are needed, not",
+                           streams);
+    return 1;
+}
+
 /* Brings the data packet at *at, or the first one behind it, into the buffer: 1, or 0 where there is none. */
 static int hold_packet(struct spl_e57_points *points, uint64_t *at, struct spl_error *err)
 {
     while (points->held_bytes == 0 || points->held != *at) {
         uint8_t *h = points->packet;
-        if (points->end - *at < packet_header)
-            return 0;
+        size_t length;
         points->held_bytes = 0;
-        int code = spl_e57_read(points->pages, *at, h, packet_header, err);
-        if (code < 0)
+        int code = read_head(points, *at, h, &length, err);
+        if (code <= 0)
             return code;
-        size_t length = spl_e57_get16(h + 2) + (size_t)1, streams = spl_e57_get16(h + 4);
-        if (h[0] > 2)
-            return fail_packet(points, *at, "packet type", err, "none of index (0), data (1), ignored (2):", h[0]);
-        if (length > points->end - *at || length < 4)
-            return fail_packet(points, *at, "packet length", err, "does not fit its section:", length);
         if (h[0] != 1) {
             *at += length;
             continue;
         }
-        if (streams != points->scan->fields || packet_header + 2 * streams > length)
-            return fail_packet(points, *at, "bytestreams", err, "as many as the prototype has fields are needed, not",
-                               streams);
         if ((code = spl_e57_read(points->pages, *at, h, length, err)) < 0)
             return code;
-        size_t sum = packet_header + 2 * streams;
+        size_t streams = points->scan->fields, sum = packet_header + 2 * streams;
         for (size_t i = 0; i < streams; i++)
             sum += spl_e57_get16(h + packet_header + 2 * i);
         if (sum > length)
@@ -156,6 +169,56 @@ static int fill(struct spl_e57_points *points, struct spl_e57_stream *stream, st
     stream->bit %= 8;
     stream->bytes = left + count;
     return 1;
+}
+
+/* Takes the streams that stand at the packet at `at` over as much of it as they have to skip: 1, or 0 behind the last
+ * packet. */
+static int skip_packet(struct spl_e57_points *points, uint64_t at, uint64_t skip[SPL_E57_ROLES], struct spl_error *err)
+{
+    uint8_t h[packet_header], size[2] = {0};
+    size_t length;
+    int code = read_head(points, at, h, &length, err);
+    for (int i = 0; code > 0 && i < SPL_E57_ROLES; i++) {
+        struct spl_e57_stream *stream = &points->streams[i];
+        if (!skip[i] || stream->packet != at)
+            continue;
+        if (h[0] == 1)
+            code = spl_e57_read(points->pages, at + packet_header + 2 * stream->index, size, sizeof size, err);
+        uint64_t bits = 8 * (uint64_t)spl_e57_get16(size);
+        if (code >= 0 && bits <= skip[i]) {
+            skip[i] -= bits;
+            stream->packet += length;
+            code = 1;
+        } else if (code >= 0 && (code = fill(points, stream, err)) > 0) {
+            stream->bit += (size_t)skip[i];
+            skip[i] = 0;
+        }
+    }
+    return code;
+}
+
+int spl_e57_points_skip(struct spl_e57_points *points, uint64_t to, struct spl_error *err)
+{
+    uint64_t skip[SPL_E57_ROLES] = {0}, at;
+    int code = 1;
+    for (int i = 0; i < SPL_E57_ROLES; i++) {
+        struct spl_e57_stream *stream = &points->streams[i];
+        uint64_t held = 8 * (uint64_t)stream->bytes - stream->bit;
+        skip[i] = stream->field ? (to - points->next) * stream->field->bits : 0;
+        uint64_t now = skip[i] < held ? skip[i] : held;
+        stream->bit += (size_t)now;
+        skip[i] -= now;
+    }
+    do { /* packets in their order, each once however many streams go over it */
+        at = UINT64_MAX;
+        for (int i = 0; i < SPL_E57_ROLES; i++)
+            if (skip[i] && points->streams[i].packet < at)
+                at = points->streams[i].packet;
+        if (at != UINT64_MAX)
+            code = skip_packet(points, at, skip, err);
+    } while (at != UINT64_MAX && code > 0);
+    points->next = to;
+    return code < 0 ? code : SPL_OK;
 }
 
 static inline uint64_t load64(const uint8_t *p)

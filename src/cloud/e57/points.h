@@ -32,6 +32,9 @@ void spl_e57_points_finish(struct spl_e57_points *points);
 /* Goes to the first point of a scan. Refuses a section that cannot hold as many points as the XML says. */
 int spl_e57_points_begin(struct spl_e57_points *points, const struct spl_e57_scan *scan, struct spl_error *err);
 
+/* Goes on to a later point of the scan, at the cost of its packets' heads. */
+int spl_e57_points_skip(struct spl_e57_points *points, uint64_t to, struct spl_error *err);
+
 /* The values of a role for the next `count` points; the caller asks each role for the same ones, then takes them. The
  * scan has this role, and that many points are left. */
 int spl_e57_points_read(struct spl_e57_points *points, enum spl_e57_role role, double *out, size_t count,

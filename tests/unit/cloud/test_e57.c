@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "cloud/e57/crc32c.h"
-#include "cloud/e57/pages.h"
+#include "cloud/e57/points.h"
 #include "support/e57_writer.h"
 
 enum { N = 1000 };
@@ -420,6 +420,81 @@ static void fields_that_are_kept(void **state)
     spl_cloud_destroy(cloud);
 }
 
+/* From any place to any later one, over streams that do not keep step. */
+static void points_are_skipped_to(void **state)
+{
+    struct e57_writer w;
+    struct spl_source source;
+    struct spl_e57_pages pages;
+    struct spl_e57_document document;
+    struct spl_e57_points points;
+    size_t length;
+    double got[5];
+    (void)state;
+    prepare_doubles();
+    fill(raw[1], -1000, 4000);
+    const struct e57_field fields[] = {
+        {.name = "cartesianX", .type = E57_DOUBLE, .values = value[0], .step = 8 * N},
+        {.name = "cartesianY", .type = E57_INTEGER, .least = -1000, .most = 4000, .raw = raw[1], .step = 5},
+        {.name = "cartesianZ", .type = E57_SINGLE, .values = value[2], .step = 33},
+    };
+    e57_begin(&w);
+    e57_add_scan(&w, &(struct e57_scan){"skipped", NULL, fields, 3, N, E57_OTHER_PACKETS});
+    uint8_t *file = e57_end(&w, NULL, &length);
+    write_scratch(file, length);
+    free(file);
+    assert_int_equal(spl_source_open(&source, scratch_path(), NULL), 0);
+    assert_int_equal(spl_e57_pages_init(&pages, &source, NULL), 0);
+    assert_int_equal(spl_e57_document_read(&document, &pages, NULL), 0);
+    assert_int_equal(spl_e57_points_init(&points, &pages, &document, NULL), 0);
+    for (uint64_t step = 1; step < 400; step += 13) {
+        assert_int_equal(spl_e57_points_begin(&points, document.scans, NULL), 0);
+        for (uint64_t to = 0; to + 5 <= N; to += 5 + step) {
+            assert_int_equal(spl_e57_points_skip(&points, to, NULL), 0);
+            for (unsigned k = 0; k < 3; k++) {
+                assert_int_equal(spl_e57_points_read(&points, SPL_E57_X + k, got, 5, NULL), 0);
+                for (size_t i = 0; i < 5; i++)
+                    assert_true(got[i] == (k == 1 ? (double)raw[1][to + i] : value[k][to + i]));
+            }
+            spl_e57_points_take(&points, 5);
+        }
+    }
+    spl_e57_points_finish(&points);
+    spl_e57_document_finish(&document);
+    spl_e57_pages_finish(&pages);
+    spl_source_close(&source);
+}
+
+/* Large scans: grey comes from samples all over them, and the first points are read all the same. */
+static void grey_of_large_scans(void **state)
+{
+    enum { MANY = 90000 };
+    int64_t *ramp = malloc(MANY * sizeof *ramp);
+    struct loaded l;
+    (void)state;
+    for (int i = 0; i < MANY; i++)
+        ramp[i] = i;
+    const struct e57_field fields[] = {
+        {.name = "cartesianX", .type = E57_INTEGER, .most = MANY, .raw = ramp, .step = 900},
+        {.name = "cartesianY", .type = E57_INTEGER, .most = MANY, .raw = ramp, .step = 20000},
+        {.name = "cartesianZ", .type = E57_INTEGER, .most = MANY, .raw = ramp, .step = 900},
+        {.name = "intensity", .type = E57_INTEGER, .most = MANY, .raw = ramp, .step = 1200},
+    };
+    const struct e57_scan scans[] = {{"a", NULL, fields, 4, MANY, 0}, {"b", NULL, fields, 4, 30, 0}};
+    load_scans(scans, 2, NULL, &l);
+    assert_int_equal(l.points, MANY + 30);
+    assert_point(&l, 7, 7, 7, 7);
+    assert_true(l.sum[0] == MANY / 2 * (MANY - 1.0) + 29 * 15);
+    loaded_finish(&l);
+    struct spl_cloud *cloud;
+    assert_int_equal(spl_cloud_open(scratch_path(), NULL, &cloud, NULL), 0);
+    const struct spl_cloud_colors *colors = &spl_cloud_get_info(cloud)->colors;
+    assert_int_equal(colors->from, SPL_COLORS_INTENSITY);
+    assert_true(fabs(colors->black - 0.01 * MANY) < 0.03 * MANY && fabs(colors->white - 0.99 * MANY) < 0.03 * MANY);
+    spl_cloud_destroy(cloud);
+    free(ramp);
+}
+
 static void a_prototype_may_be_nested_and_repeat_itself(void **state)
 {
     static const char xml[] =
@@ -580,6 +655,8 @@ int main(void)
         cmocka_unit_test(scans_of_different_limits_agree),
         cmocka_unit_test(classes_of_an_extension),
         cmocka_unit_test(fields_that_are_kept),
+        cmocka_unit_test(points_are_skipped_to),
+        cmocka_unit_test(grey_of_large_scans),
         cmocka_unit_test(a_prototype_may_be_nested_and_repeat_itself),
         cmocka_unit_test(what_the_header_must_not_say),
         cmocka_unit_test(what_sections_and_packets_must_not_say),
