@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "cloud/crs.h"
 #include "cloud/reader.h"
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err)
@@ -147,6 +148,7 @@ void spl_cloud_destroy(struct spl_cloud *cloud)
     if (cloud->state && cloud->reader->close)
         cloud->reader->close(cloud);
     spl_source_close(&cloud->source);
+    spl_crs_finish(&cloud->info.coordinates);
     free(cloud->info.stations);
     free(cloud->state);
     free(cloud);

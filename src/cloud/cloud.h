@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
  * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (ply.c, las.c, e57.c, ptx.c, text.c). Owned by one thread at a time. */
+ * one reader per format (readers.c). Owned by one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -36,12 +36,17 @@ struct spl_cloud_colors {
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
 };
 
-/* What a header says of its coordinates, as far as it does. */
+/* What a header says of its coordinates, as far as it does (crs.h). */
 struct spl_cloud_coordinates {
-    uint32_t epsg;  /* of the projected, else the geographic system; 0 = not said */
-    char name[64];  /* of the system; "" = not said. A header says it by number or by name */
-    double unit_m;  /* metres a unit; 0 = not said */
-    double step[3]; /* that they are multiples of; 0 = not said */
+    uint32_t epsg;        /* of the projected, else the geographic or compound system; 0 = not said */
+    uint32_t height_epsg; /* of the heights' own; 0 = not said */
+    char name[64];        /* of the system; "" = not said. A header says it by number or by name */
+    char *wkt;            /* where it has one; may be NULL. Owned by the cloud, where it is a cloud's */
+    double unit_m;        /* metres a unit of x and y; 0 = not said */
+    double height_unit_m; /* of z; 0 = not said: as x and y, metres where those are angles */
+    bool angles;          /* x and y are longitudes and latitudes */
+    double step[3];       /* that they are multiples of; 0 = not said */
+    bool floats;          /* of 32 bits, so that their steps grow with their size */
 };
 
 struct spl_cloud_options {
@@ -52,7 +57,7 @@ struct spl_cloud_options {
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PCD", "PTX", "PTS", "text" */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;

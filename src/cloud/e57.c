@@ -11,8 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "base/memory.h"
+#include "base/text.h"
+#include "cloud/crs.h"
 #include "cloud/e57/points.h"
+#include "cloud/fields.h"
 #include "cloud/reader.h"
 #include "geom/quaternion.h"
 
@@ -198,6 +202,37 @@ static void agree_on_ranges(struct spl_cloud *cloud)
     cloud->scan_colors = !e57->scale_colors;
 }
 
+/* E57 is in metres, whatever its system is in: one in other units cannot be that of its coordinates. */
+static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
+{
+    const struct e57 *e57 = cloud->state;
+    struct spl_cloud_coordinates *crs = &cloud->info.coordinates;
+    const char *text = e57->document.coordinates;
+    struct spl_error why = {0};
+    if (text && !spl_fields_blank(text, strlen(text))) {
+        int code = spl_crs_read_wkt(text, strlen(text), crs, &why);
+        if (code == SPL_E_NOMEM)
+            return spl_fail(err, code, "%s", why.message);
+        if (code < 0)
+            spl_text_show(text + strspn(text, " \t\r\n"), crs->name, sizeof crs->name);
+        spl_crs_settle(crs);
+        if (crs->angles || (crs->unit_m > 0 && crs->unit_m != 1)) {
+            spl_log_warn(
+                "%s: its coordinateMetadata names a system that is not in metres (%.63s), as E57 always is; it "
+                "is left out, --crs can say another",
+                cloud->source.path, crs->name);
+            spl_crs_finish(crs);
+        }
+    }
+    crs->unit_m = crs->height_unit_m = 1;
+    for (size_t i = 0; i < e57->document.scan_count; i++)
+        for (int k = 0; k < 3 && e57->document.scans[i].points && !e57->scans[i].posed; k++) {
+            const struct spl_e57_field *field = spl_e57_field(&e57->document, &e57->document.scans[i], SPL_E57_X + k);
+            crs->floats |= field && field->type == SPL_E57_SINGLE;
+        }
+    return SPL_OK;
+}
+
 static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct e57 *e57 = cloud->state = spl_alloc(1, sizeof *e57, err);
@@ -220,8 +255,7 @@ static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
             return code;
     agree_on_ranges(cloud);
     cloud->sampling = SPL_SAMPLE_INTENSITY;
-    cloud->info.coordinates.unit_m = 1;
-    return SPL_OK;
+    return read_coordinates(cloud, err);
 }
 
 /* What the colours of a scan are made from, where it lacks what most of the file has. */

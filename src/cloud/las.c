@@ -13,7 +13,7 @@
 #include "cloud/las_fields.h"
 #include "cloud/laz/stream.h"
 
-enum { format_mask = 0x3f };
+enum { format_mask = 0x3f, wkt_bit = 1 << 4 };
 /* The most symbols without surprise that a byte can hold are far more than a point has; less than this at any rate. */
 enum { compressed_points_a_byte = 1024 };
 
@@ -165,7 +165,12 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     code = check_transform(cloud, h, err);
     if (code < 0)
         return code;
-    if ((code = spl_las_read_coordinates(cloud, records, err)) < 0)
+    struct spl_las_record all[2] = {records, {.extended = true, .end = size}};
+    if (minor >= 4) {
+        all[1].at = get64(h + 235);
+        all[1].count = get32(h + 243);
+    }
+    if ((code = spl_las_read_coordinates(cloud, all, spl_las_get16(h + 6) & wkt_bit, err)) < 0)
         return code;
     code = spl_las_find_fields(&las->fields, cloud, records, las->format, formats[las->format].bytes, las->record_bytes,
                                err);

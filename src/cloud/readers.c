@@ -1,10 +1,11 @@
-/* The table of readers: which one a file needs, by its first bytes alone, in the order in which they are asked. A name's
- * ending decides nothing. Pure functions; any thread. */
+/* The table of readers: which one a file needs, by its first bytes alone, in the order in which they are asked. A
+ * name's ending decides nothing. Pure functions; any thread. */
 #include "cloud/reader.h"
 
 #include <string.h>
 
 #include "cloud/fields.h"
+#include "cloud/pcd.h"
 
 enum { first_bytes = 4096 };
 
@@ -27,6 +28,11 @@ static bool is_las(const uint8_t *bytes, size_t available)
 static bool is_e57(const uint8_t *bytes, size_t available)
 {
     return begins_with(bytes, available, "ASTM-E57");
+}
+
+static bool is_pcd(const uint8_t *bytes, size_t available)
+{
+    return spl_pcd_is_header((const char *)bytes, available);
 }
 
 static bool is_text(const uint8_t *bytes, size_t available)
@@ -58,11 +64,8 @@ static const struct {
     const struct spl_cloud_reader *reader;
     bool (*is)(const uint8_t *bytes, size_t available);
 } readers[] = {
-    {&spl_ply_reader, is_ply},
-    {&spl_las_reader, is_las},
-    {&spl_e57_reader, is_e57},
-    {&spl_ptx_reader, is_ptx},
-    {&spl_text_reader, is_text},
+    {&spl_ply_reader, is_ply}, {&spl_las_reader, is_las}, {&spl_e57_reader, is_e57},
+    {&spl_pcd_reader, is_pcd}, {&spl_ptx_reader, is_ptx}, {&spl_text_reader, is_text},
 };
 
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err)
@@ -73,14 +76,16 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
     if (code < 0)
         return code;
     if (begins_with(bytes, available, "SPLD\r\n"))
-        return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
-                               "is; pack takes the scans that it was made of");
+        return spl_source_fail(
+            source, SPL_E_INPUT, "", err,
+            "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
+            "is; pack takes the scans that it was made of");
     while (found < sizeof readers / sizeof *readers && !readers[found].is(bytes, available))
         found++;
     if (found == sizeof readers / sizeof *readers)
-        return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, LAZ, E57, PTX, PTS, or UTF-8 text with columns)");
+        return spl_source_fail(
+            source, SPL_E_INPUT, "", err,
+            "is no point cloud known here (PLY, LAS, LAZ, E57, PCD, PTX, PTS, or UTF-8 text with columns)");
     *reader = readers[found].reader;
     if ((*reader)->text && !memchr(bytes, '\n', available) && memchr(bytes, '\r', available))
         source->newline = '\r';

@@ -495,6 +495,42 @@ static void grey_of_large_scans(void **state)
     free(ramp);
 }
 
+#define METADATA(text) "<coordinateMetadata type=\"String\"><![CDATA[" text "]]></coordinateMetadata>"
+#define UTM(unit, epsg)                                                                                                \
+    "PROJCS[\"UTM 32\",GEOGCS[\"ETRS89\",DATUM[\"ETRS89\",SPHEROID[\"GRS 1980\",6378137,298.257222101]],PRIMEM["       \
+    "\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"]," unit epsg "]"
+
+/* Metres by definition: a system in other units is not that of the coordinates. */
+static void coordinates_are_in_metres(void **state)
+{
+    static const struct {
+        const char *root, *name;
+        uint32_t epsg;
+    } rows[] = {{NULL, "", 0},
+                {METADATA(" "), "", 0},
+                {METADATA(UTM("UNIT[\"metre\",1]", ",AUTHORITY[\"EPSG\",\"25832\"]")), "UTM 32", 25832},
+                {METADATA(UTM("UNIT[\"foot\",0.3048]", "")), "", 0},
+                {METADATA("GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
+                          "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]"),
+                 "", 0},
+                {METADATA("\nurn:ogc:def:crs:EPSG::25832"), "urn:ogc:def:crs:EPSG::25832", 0}};
+    (void)state;
+    prepare_doubles();
+    const struct e57_field fields[] = {doubles("cartesianX", 0), doubles("cartesianY", 1), doubles("cartesianZ", 2)};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_cloud *cloud;
+        struct loaded l;
+        load_scans(&(struct e57_scan){"crs", NULL, fields, 3, 2, 0}, 1, rows[i].root, &l);
+        loaded_finish(&l);
+        assert_int_equal(spl_cloud_open(scratch_path(), NULL, &cloud, NULL), 0);
+        const struct spl_cloud_coordinates *crs = &spl_cloud_get_info(cloud)->coordinates;
+        assert_string_equal(crs->name, rows[i].name);
+        assert_int_equal(crs->epsg, rows[i].epsg);
+        assert_true(crs->unit_m == 1 && !crs->angles);
+        spl_cloud_destroy(cloud);
+    }
+}
+
 static void a_prototype_may_be_nested_and_repeat_itself(void **state)
 {
     static const char xml[] =
@@ -657,6 +693,7 @@ int main(void)
         cmocka_unit_test(fields_that_are_kept),
         cmocka_unit_test(points_are_skipped_to),
         cmocka_unit_test(grey_of_large_scans),
+        cmocka_unit_test(coordinates_are_in_metres),
         cmocka_unit_test(a_prototype_may_be_nested_and_repeat_itself),
         cmocka_unit_test(what_the_header_must_not_say),
         cmocka_unit_test(what_sections_and_packets_must_not_say),
