@@ -20,8 +20,10 @@
 #include "base/sized.h"
 #include "dataset/dataset.h"
 #include "pack/emit.h"
+#include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
+#include "pack/part.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
 #include "pack/view.h"
@@ -32,6 +34,7 @@ struct pack {
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage *stage;
+    struct spl_keep keep;
     struct spl_scans scans;
     struct spl_points points;
     struct spl_wires wires;
@@ -138,6 +141,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
+    if (spl_part_of(&p->scans))
+        json_object_set_new(meta, "part_of", json_integer((json_int_t)spl_part_of(&p->scans)));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
@@ -164,6 +169,7 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
         .position_error = p->emitted.error.position_over_radius / (double)p->emitted.splats,
         .normal_error = p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI,
         .seconds = (double)(spl_now_ns() - begin_ns) / 1e9,
+        .part_of = spl_part_of(&p->scans),
     };
     for (size_t i = 0; p->points.linear && i < p->points.count; i++)
         report->linear += p->points.linear[i];
@@ -213,9 +219,18 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
+        rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, stage, err);
+        rc = spl_scans_init(&p.scans, inputs,
+                            &(struct spl_cloud_options){.columns = options->columns,
+                                                        .intensity = options->intensity,
+                                                        .keep = &p.keep,
+                                                        .max_points = options->max_points},
+                            stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p.scans, err);
     if (!rc) {
         plan(&p, photographs);
         rc = spl_points_gather(&p.points, &p.scans, stage, err);
