@@ -95,7 +95,10 @@ struct spl_pack_options {
     /* Each input that cannot be read, and why: the dataset is made of the others, META names it. NULL: the first one
      * fails all. */
     void (*left_out)(void *context, const struct spl_error *why);
-    /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others each n-th point. A
+    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
+     * those out. NULL = none of them. */
+    const char *keep;
+    /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others so many. A
      * scan gives one point at least. 0 = all. */
     uint64_t max_points;
 };

@@ -20,6 +20,7 @@
 #include "base/sized.h"
 #include "dataset/dataset.h"
 #include "pack/emit.h"
+#include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/part.h"
@@ -33,6 +34,7 @@ struct pack {
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage *stage;
+    struct spl_keep keep;
     struct spl_scans scans;
     struct spl_points points;
     struct spl_wires wires;
@@ -217,9 +219,18 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
+        rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, options->max_points, stage, err);
+        rc = spl_scans_init(&p.scans, inputs,
+                            &(struct spl_cloud_options){.columns = options->columns,
+                                                        .intensity = options->intensity,
+                                                        .keep = &p.keep,
+                                                        .max_points = options->max_points},
+                            stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p.scans, err);
     if (!rc) {
         plan(&p, photographs);
         rc = spl_points_gather(&p.points, &p.scans, stage, err);

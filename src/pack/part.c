@@ -11,16 +11,12 @@ uint64_t spl_part_of(const struct spl_scans *scans)
     return total > scans->max_points ? total : 0;
 }
 
-bool spl_part_share(struct spl_scans *scans)
+void spl_part_share(struct spl_scans *scans)
 {
     uint64_t total = spl_part_of(scans);
-    bool changed = false;
     for (size_t i = 0; i < scans->count; i++) {
         struct spl_scan *scan = &scans->list[i];
         uint64_t share = total ? (uint64_t)((wide)scans->max_points * scan->points_total / total) : 0;
-        share = total && share == 0 ? 1 : share;
-        changed |= share != scan->max_points;
-        scan->max_points = share;
+        scan->max_points = total && share == 0 ? 1 : share;
     }
-    return changed;
 }

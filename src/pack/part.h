@@ -4,8 +4,8 @@
 
 #include "pack/scans.h"
 
-/* Gives each scan its share of scans->max_points, by how many points it has. True: some give others than before. */
-bool spl_part_share(struct spl_scans *scans);
+/* Gives each scan its share of scans->max_points, by how many points it has. */
+void spl_part_share(struct spl_scans *scans);
 
 /* How many points the scans have where a part of them is taken, else 0. */
 uint64_t spl_part_of(const struct spl_scans *scans);

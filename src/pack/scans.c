@@ -17,8 +17,8 @@
 #include "pack/names.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
-static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
-static const double like_steps = 10;    /* times the finest step of coordinates: nothing to mention */
+static const double like_ranges = 8; /* times the smallest white less black: of one kind */
+static const double like_steps = 10; /* times the finest step of coordinates: nothing to mention */
 /* 32 bit floats: coarser than a millimetre, and than the scan's size alone would make them. */
 static const double float_step = 1e-3, float_step_diagonals = 1e-6;
 static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
@@ -44,10 +44,9 @@ static bool has_points(const struct spl_scan *scan)
     return scan->points_from[0] + scan->points_from[1] + scan->points_from[2] > 0;
 }
 
-bool spl_scans_share(struct spl_scans *scans)
+void spl_scans_share(struct spl_scans *scans)
 {
     double black = INFINITY, white = -INFINITY, least = INFINITY;
-    bool changed = false;
     for (size_t i = 0; i < scans->count; i++) {
         const struct spl_cloud_colors *own = &scans->list[i].own_colors;
         if (own->from != SPL_COLORS_INTENSITY || !own->guessed)
@@ -58,18 +57,19 @@ bool spl_scans_share(struct spl_scans *scans)
     }
     bool alike = white - black <= like_ranges * least;
     for (size_t i = 0; i < scans->count; i++) {
-        struct spl_cloud_colors *colors = &scans->list[i].colors, old = *colors;
+        struct spl_cloud_colors *colors = &scans->list[i].colors;
         *colors = scans->list[i].own_colors;
         if (colors->from == SPL_COLORS_INTENSITY && colors->guessed && alike) {
             colors->black = black;
             colors->white = white;
         }
-        changed |= colors->black != old.black || colors->white != old.white;
     }
-    return spl_part_share(scans) || changed;
+    spl_part_share(scans);
 }
 
-static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, struct spl_error *err)
+/* `fields`: room for the names of the scan's, or NULL. */
+static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
+                struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     int rc = spl_cloud_open(path, options, &cloud, err);
@@ -83,28 +83,36 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .own_colors = info->colors,
                               .coordinates = info->coordinates,
                               .attributes = info->attributes,
+                              .columns = info->columns,
+                              .scalars = info->scalars,
                               .points_total = info->points_total,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
                               .max = {-INFINITY, -INFINITY, -INFINITY}};
+    if (fields)
+        snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
     spl_cloud_destroy(cloud);
     return SPL_OK;
 }
 
-int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   uint64_t max_points, struct spl_stage *stage, struct spl_error *err)
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *options,
+                   struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .max_points = max_points};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .max_points = max_points};
+    *scans = (struct spl_scans){.inputs = inputs,
+                                .columns = options->columns,
+                                .intensity = options->intensity,
+                                .keep = options->keep,
+                                .max_points = options->max_points};
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, &why)))
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], options, scans->count ? NULL : scans->fields,
+                       &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;
