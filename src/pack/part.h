@@ -4,7 +4,7 @@
 
 #include "pack/scans.h"
 
-/* Gives each scan its share of scans->max_points, by how many points it has. */
+/* Gives each scan its share of scans->how.max_points, by how many points it has. */
 void spl_part_share(struct spl_scans *scans);
 
 /* How many points the scans have where a part of them is taken, else 0. */

@@ -30,18 +30,15 @@ struct spl_scans {
     struct spl_inputs *inputs; /* borrowed */
     struct spl_scan *list;     // owned; without what was left out
     size_t count;
-    const char *columns;           /* as of struct spl_cloud_options */
-    bool intensity;                /* likewise */
-    const struct spl_keep *keep;   /* likewise, never NULL */
-    uint64_t max_points;           /* of all together; 0 = all there are */
+    struct spl_cloud_options how;  /* each is read so, but for colours and what follows from a part; of all together
+                                    * at most max_points. `keep` is not NULL */
     char fields[SPL_SCANS_FIELDS]; /* names of the first scan's */
 };
 
 /* Opens each scan once, so that one that cannot be read is refused, or left out, before hours of work, and decides how
- * colours are taken. `inputs` and what `options` (with keep, without colors) point to are held. Points are counted by
- * spl_points_gather(). On failure nothing is held. Blocks.
+ * colours are taken. `inputs` is held. Points are counted by spl_points_gather(). On failure nothing is held. Blocks.
  */
-int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *options,
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
                    struct spl_stage *stage, struct spl_error *err);
 
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
