@@ -8,7 +8,7 @@
 
 enum { CHUNKS = 5, POINTS = 105, HEADER = 375, RECORD = 54 + SPL_COPC_INFO_BYTES, ENTRY = 32 };
 static const uint32_t chunk_points[CHUNKS + 1] = {5, 20, 30, 40, 10, 0};
-static const int chunk_level[CHUNKS] = {1, 0, 1, 2, 2};
+static const int chunk_level[CHUNKS] = {1, 0, 2, 1, 2}; /* chunks of two levels lie apart */
 static const size_t chunk_first[CHUNKS] = {0, 5, 25, 55, 95};
 
 struct node {
@@ -129,7 +129,7 @@ static void whole_levels(void **state)
         uint64_t most;
         unsigned levels;
         size_t points;
-    } rows[] = {{1000, 3, 105}, {105, 3, 105}, {104, 2, 55}, {55, 2, 55}, {54, 1, 20}, {20, 1, 20}};
+    } rows[] = {{1000, 3, 105}, {105, 3, 105}, {104, 2, 65}, {65, 2, 65}, {64, 1, 20}, {20, 1, 20}};
     static struct copc c;
     double all[POINTS][3], part[POINTS][3];
     (void)state;
