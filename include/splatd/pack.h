@@ -92,8 +92,8 @@ struct spl_pack_options {
     void (*warn)(void *context, const char *text);
     void *progress_context; /* of both */
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
-    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
-     * those out. NULL = none of them. */
+    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them
+     * leaves those out. NULL = no others. */
     const char *keep;
 };
 

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pack/kept.h"
 
 enum { names_listed = 3, bytes_a_line = 40 };
 static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
@@ -218,6 +219,15 @@ static void compare_attributes(const struct saying *s)
         if (with.count && without.count)
             say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count, list(&with),
                 list(&without), rows[r].done);
+    }
+    for (int scalar = 0; scalar < SPL_SCALAR_COUNT; scalar++) {
+        struct group with = {0}, without = {0};
+        for (size_t i = 0; i < s->scans->count; i++)
+            if (has_points(&s->scans->list[i]))
+                add(s->scans->list[i].scalars >> scalar & 1 ? &with : &without, &s->scans->list[i]);
+        if (with.count && without.count)
+            say(s, "%s is given in %zu (%s), points of the others (%s) have none",
+                spl_kept_name(s->scans->keep, scalar), with.count, list(&with), list(&without));
     }
 }
 
