@@ -76,8 +76,7 @@ static int append_scalars(struct spl_points *p, const struct spl_point_batch *ba
 }
 
 static int append(struct spl_points *p, const struct spl_point_batch *batch, const struct spl_cloud_info *info,
-                  uint32_t attributes, uint32_t first_station, const double *scan, const char *path,
-                  struct spl_error *err)
+                  uint32_t attributes, uint32_t first_station, const double *scan, struct spl_error *err)
 {
     int rc = reserve(p, batch->count, attributes, err);
     if (!rc)
@@ -88,11 +87,6 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
     for (size_t i = 0; i < batch->count; i++, at++) {
         for (int c = 0; c < 3; c++) {
             double v = batch->position[i][c];
-            if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(err, SPL_E_INPUT,
-                                "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
-                                "file's scale and columns",
-                                path, (unsigned long long)(p->points_read + i), "xyz"[c], v, SPL_COORDINATE_MAX);
             p->axis[c][at] = fabs(v) < nothing ? 0 : v;
         }
         uint32_t color = grey;
@@ -123,13 +117,22 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-static void grow_box(struct spl_scan *scan, const struct spl_point_batch *batch)
+/* The batch's first point is number `first` of the scan. */
+static int grow_box(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
 {
     for (size_t i = 0; i < batch->count; i++)
         for (int c = 0; c < 3; c++) {
-            scan->min[c] = fmin(scan->min[c], batch->position[i][c]);
-            scan->max[c] = fmax(scan->max[c], batch->position[i][c]);
+            double v = batch->position[i][c];
+            if (fabs(v) > SPL_COORDINATE_MAX)
+                return spl_fail(
+                    err, SPL_E_INPUT,
+                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
+                    "and columns",
+                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
+            scan->min[c] = fmin(scan->min[c], v);
+            scan->max[c] = fmax(scan->max[c], v);
         }
+    return SPL_OK;
 }
 
 /* The scan's number of each point of a batch: its station's, or that of the input. */
@@ -153,6 +156,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
+    uint64_t first = p->points_read;
     char name[128];
     bool stations;
     spl_kept_has_scan(scans, &stations);
@@ -163,10 +167,11 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
-        grow_box(scan, batch);
-        if (numbers)
+        rc = grow_box(scan, batch, p->points_read - first, err);
+        if (!rc && numbers)
             number_scan(p, batch, attributes, stations, (size_t)(scan - scans->list), numbers);
-        rc = append(p, batch, info, attributes, p->station_count, numbers, scan->path, err);
+        if (!rc)
+            rc = append(p, batch, info, attributes, p->station_count, numbers, err);
         if (!rc)
             rc = spl_stage_check(stage, err);
     }
@@ -202,22 +207,53 @@ static int settle_scalars(struct spl_points *p, struct spl_error *err)
     return rc;
 }
 
+/* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
+ * on only to find all that break. */
+static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
+                  double *numbers, struct spl_stage *stage, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (size_t i = 0; !rc && i < scans->count;) {
+        struct spl_scan *scan = &scans->list[i];
+        struct spl_error why = {0};
+        if (!(rc = gather_file(points, batch, scans, scan, numbers, stage, &why))) {
+            i++;
+            continue;
+        }
+        spl_points_finish(points);
+        if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
+            spl_scans_remove(scans, i);
+    }
+    return rc;
+}
+
+/* What breaks after some of it was read has left its mark: on the common range of grey, on which arrays there are. So
+ * that the result is that of a pack without it, all others are read once more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
     double *numbers = NULL;
     bool stations;
-    points->keep = scans->keep;
     int rc = spl_point_batch_init(&batch, batch_points, err);
     if (!rc && spl_kept_has_scan(scans, &stations) && !(numbers = spl_alloc_raw(batch_points, sizeof *numbers, err)))
         rc = SPL_E_NOMEM;
-    for (size_t i = 0; !rc && i < scans->count; i++)
-        rc = gather_file(points, &batch, scans, &scans->list[i], numbers, stage, err);
+    for (bool again = !rc; again;) {
+        size_t count = scans->count;
+        rc = gather(points, &batch, scans, numbers, stage, err);
+        again = !rc && scans->count < count;
+        if (again) {
+            spl_points_finish(points);
+            spl_scans_share(scans);
+        }
+    }
     spl_point_batch_finish(&batch);
     free(numbers);
+    points->keep = scans->keep;
     if (!rc)
         rc = settle_scalars(points, err);
+    if (!rc && !scans->count)
+        rc = spl_inputs_fail_empty(scans->inputs, err);
     if (!rc && !points->count)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",

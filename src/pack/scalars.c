@@ -78,7 +78,7 @@ static bool is_value(double v)
     return fabs(v) <= largest;
 }
 
-/* Is it, but for the rounding of how it was computed, a whole number of steps? Differences of numbers as large as `size`
+/* Is it a whole number of steps, but for the rounding of how it was computed? Differences of numbers as large as `size`
  * are as exact as those. */
 static bool is_multiple(double v, double steps_a_unit, double size)
 {
