@@ -123,7 +123,8 @@ struct spl_pack_report {
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
  * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
  * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
- * and about 30 MB, 80 bytes a point and 100 more for each point on a wire, a pole or a cable; photographs take
+ * and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for each point on a wire, a pole
+ * or a cable; photographs take
  * photos->memory_bytes beside them. `report` may be NULL. Any thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
