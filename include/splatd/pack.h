@@ -98,6 +98,9 @@ struct spl_pack_options {
     /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them
      * leaves those out. NULL = no others. */
     const char *keep;
+    /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others each n-th point. A
+     * scan gives one point at least. 0 = all. */
+    uint64_t max_points;
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
@@ -118,14 +121,14 @@ struct spl_pack_report {
     double normal_error;       /* measured mean, degrees */
     double seconds;
     struct spl_photo_report photos;
+    uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
  * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
  * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
  * and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for each point on a wire, a pole
- * or a cable; photographs take
- * photos->memory_bytes beside them. `report` may be NULL. Any thread. */
+ * or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 SPL_END_DECLARATIONS

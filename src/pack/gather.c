@@ -149,8 +149,10 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
                        struct spl_scan *scan, double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
-    struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors, .keep = scans->keep};
+    struct spl_cloud_options options = scans->how;
+    options.colors = &scan->colors;
+    options.max_points = scan->max_points;
+    options.points = scan->points_total;
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;
@@ -168,7 +170,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
         rc = grow_box(scan, batch, p->points_read - first, err);
-        if (!rc && numbers)
+        if (numbers)
             number_scan(p, batch, attributes, stations, (size_t)(scan - scans->list), numbers);
         if (!rc)
             rc = append(p, batch, info, attributes, p->station_count, numbers, err);
@@ -188,6 +190,27 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
+/* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
+ * on only to find all that break. */
+static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
+                  double *numbers, struct spl_stage *stage, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    points->keep = scans->how.keep;
+    for (size_t i = 0; !rc && i < scans->count;) {
+        struct spl_scan *scan = &scans->list[i];
+        struct spl_error why = {0};
+        if (!(rc = gather_file(points, batch, scans, scan, numbers, stage, &why))) {
+            i++;
+            continue;
+        }
+        spl_points_finish(points);
+        if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
+            spl_scans_remove(scans, i);
+    }
+    return rc;
+}
+
 /* Leaves out those that say nothing: all points have the same, and nobody named it. */
 static int settle_scalars(struct spl_points *p, struct spl_error *err)
 {
@@ -203,26 +226,6 @@ static int settle_scalars(struct spl_points *p, struct spl_error *err)
             free(scalar->values);
             *scalar = (struct spl_scalar_values){0};
         }
-    }
-    return rc;
-}
-
-/* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
- * on only to find all that break. */
-static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
-                  double *numbers, struct spl_stage *stage, struct spl_error *err)
-{
-    int rc = SPL_OK;
-    for (size_t i = 0; !rc && i < scans->count;) {
-        struct spl_scan *scan = &scans->list[i];
-        struct spl_error why = {0};
-        if (!(rc = gather_file(points, batch, scans, scan, numbers, stage, &why))) {
-            i++;
-            continue;
-        }
-        spl_points_finish(points);
-        if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
-            spl_scans_remove(scans, i);
     }
     return rc;
 }
@@ -249,11 +252,10 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
     }
     spl_point_batch_finish(&batch);
     free(numbers);
-    points->keep = scans->keep;
-    if (!rc)
-        rc = settle_scalars(points, err);
     if (!rc && !scans->count)
         rc = spl_inputs_fail_empty(scans->inputs, err);
+    if (!rc)
+        rc = settle_scalars(points, err);
     if (!rc && !points->count)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
