@@ -246,9 +246,8 @@ static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
-        "                   [--neighbours K]\n"
-        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
-        "                   [--no-clip-lines] [--max-points N] [--threads N]\n"
+        "                   [--neighbours K] [--position-error X] [--normal-error DEG] [--points-only]\n"
+        "                   [--no-linear] [--no-clip-lines] [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
