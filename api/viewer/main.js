@@ -5,7 +5,8 @@ import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
-import {Points, coordinates} from "./points.js";
+import {toWorld} from "./place.js";
+import {Points, coordinates, withUnit} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
@@ -92,6 +93,8 @@ async function open() {
     if (turn !== opening) return;
     choices($("dataset"), ids.includes(id) ? ids : [...ids, id], id);
     if (found instanceof Error) throw found;
+    Object.assign(wanted, await toWorld(found, wanted));
+    if (turn !== opening) return;
     dataset = found;
     parameters ??= new Controls($("method-help"));
     stage.pixels = limits.pixels;
@@ -105,7 +108,8 @@ async function open() {
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
-      `${thousands(dataset.points)} points, ${size} ${dataset.unit}, drawn by ${device.name.replace(/ \(.*/, "")}`;
+      `${thousands(dataset.points)} points, ${withUnit(size, dataset.unit)}, ` +
+      `drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
@@ -128,7 +132,9 @@ function showFrame({detail: frame}) {
   $("legend").hidden = !distances;
   const [near, far] = $("legend").querySelectorAll("span");
   if (distances)
-    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} ${dataset.unit}`);
+    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) =>
+      withUnit(x.toFixed(x < 10 ? 2 : 1), dataset.unit),
+    );
   const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
   const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
   $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;

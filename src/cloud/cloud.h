@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
- * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (readers.c). Owned by one thread at a time. */
+ * spl_cloud_open() recognises the format by content alone and dispatches to one reader per format (readers.c). Owned by
+ * one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -54,22 +54,38 @@ struct spl_cloud_options {
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
     const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
+    uint64_t max_points;                   /* an even part: of COPC whole levels, else each n-th point; 0 = all */
+    uint64_t points; /* info.points_total of an earlier open; 0 = find out, which may take a pass over the file */
+};
+
+/* An image that a scan's file holds. */
+struct spl_cloud_image {
+    const char *name;     /* printable; "" = it has none */
+    const char *kind;     /* static: "pinhole", "spherical", "cylindrical", or "visual reference": no projection */
+    const char *coding;   /* static: "JPEG", "PNG", "" = neither */
+    double width, height; /* pixels, as the file says */
+    uint64_t bytes;
+    bool posed;
 };
 
 struct spl_cloud_info {
     const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PCD", "PTX", "PTS", "text" */
+    const char *named;        /* static: the format that the name's ending is of, where it is another; else NULL */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
+    uint64_t points_total;    /* with those that max_points leaves out; 0 = unknown, never where it is set */
     uint64_t file_bytes;
     uint32_t station_count;         /* grows while a PTX is read; final at the end */
     double (*stations)[16];         /* row-major station-to-world; borrowed until the next read or destroy */
     struct spl_cloud_colors colors; /* of the points that come next: stations of a PTX may differ */
     uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
     struct spl_cloud_coordinates coordinates;
-    uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
-    uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
-    uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
-    const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
+    uint64_t points_skipped;              /* non-finite, or PTX "no return" cells */
+    uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
+    uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
+    uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
+    const struct spl_cloud_image *images; /* borrowed until destroy */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
@@ -87,6 +103,12 @@ struct spl_cloud;
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
+
+/* Whether a name ends as only scans do (".las"), so that a search of a folder takes it. */
+bool spl_cloud_is_named_scan(const char *path);
+
+/* These endings, ".ply, .las, …", into `text`, cut to `size`. */
+void spl_cloud_list_endings(char *text, size_t size);
 
 /* Opens and checks the header. Everything malformed gives SPL_E_INPUT with file,
  * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */

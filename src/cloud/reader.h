@@ -42,7 +42,8 @@ struct spl_cloud {
     char fields[400]; /* see info.fields */
     bool fields_cut;  /* there are more */
     struct spl_color_rule color;
-    uint64_t row; /* index of the next row */
+    uint64_t row;                 /* index of the next row */
+    uint64_t stride, points_seen; /* each stride-th of the points that there are is given */
     struct spl_rows rows;
 };
 
@@ -51,6 +52,9 @@ extern const struct spl_cloud_reader spl_e57_reader, spl_las_reader, spl_pcd_rea
 
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);
+
+/* The format that the path's ending is of, static, where `format` of `reader` is another one; else NULL. */
+const char *spl_cloud_find_wrong_ending(const char *path, const struct spl_cloud_reader *reader, const char *format);
 
 /* For readers whose fields have names, while they open: the column that a field fills, if any, which is then one of the
  * cloud's. Names end up in messages about fields that are not there. */

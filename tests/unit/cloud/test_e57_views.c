@@ -17,7 +17,7 @@
     "<principalPointY type=\"Float\">150</principalPointY>"
 
 static unsigned refused_count;
-static char refused_message[sizeof ((struct spl_error *)0)->message];
+static char refused_message[sizeof((struct spl_error *)0)->message];
 
 static void take_refusal(void *context, const struct spl_error *why)
 {
@@ -136,7 +136,7 @@ static void panoramas_are_cut_into_faces_around_their_pose(void **state)
     spl_view_list_finish(&list);
 }
 
-static void refused(const char *format, const char *pose, const char *part)
+static void hands_out(const char *format, const char *pose, const char *part)
 {
     struct e57_writer w;
     struct spl_view_list list;
@@ -164,22 +164,51 @@ static void what_cannot_be_a_photograph_is_refused(void **state)
     char keep[1024];
     (void)state;
     snprintf(keep, sizeof keep, "%s", pose);
-    refused(PINHOLE(FOCAL SIZES), "", "no pose");
-    refused(PINHOLE(SIZES), keep, "focalLength: 0");
-    refused(PINHOLE(FOCAL), keep, "imageWidth: 0");
+    hands_out(PINHOLE(FOCAL SIZES), "", "no pose");
+    hands_out(PINHOLE(SIZES), keep, "focalLength: 0");
+    hands_out(PINHOLE(FOCAL), keep, "imageWidth: 0");
     snprintf(keep, sizeof keep, "%s", e57_pose(0, 0, 0, 0, 0, 0, 0));
-    refused(PINHOLE(FOCAL SIZES), keep, "no rotation");
-    refused("<name type=\"String\">%s</name>%s<sphericalRepresentation>" SIZES JPEG "</sphericalRepresentation>", "",
-            "no pose, and names no scan");
+    hands_out(PINHOLE(FOCAL SIZES), keep, "no rotation");
+    hands_out("<name type=\"String\">%s</name>%s<sphericalRepresentation>" SIZES JPEG "</sphericalRepresentation>", "",
+              "no pose, and names no scan");
     snprintf(keep, sizeof keep, "%s", e57_pose(1, 0, 0, 0, 0, 0, 0));
-    refused("<name type=\"String\">%s</name>%s<cylindricalRepresentation>" SIZES JPEG "</cylindricalRepresentation>",
-            keep, "radius: 0");
-    refused("<name type=\"String\">%s</name>%s<sphericalRepresentation><imageWidth type=\"Integer\">64</imageWidth>"
-            "<imageHeight type=\"Integer\">64</imageHeight><pixelWidth type=\"Float\">0.2</pixelWidth><pixelHeight "
-            "type=\"Float\">0.1</pixelHeight>" JPEG "</sphericalRepresentation>",
-            keep, "more than once around");
+    hands_out("<name type=\"String\">%s</name>%s<cylindricalRepresentation>" SIZES JPEG "</cylindricalRepresentation>",
+              keep, "radius: 0");
+    hands_out("<name type=\"String\">%s</name>%s<sphericalRepresentation><imageWidth type=\"Integer\">64</imageWidth>"
+              "<imageHeight type=\"Integer\">64</imageHeight><pixelWidth type=\"Float\">0.2</pixelWidth><pixelHeight "
+              "type=\"Float\">0.1</pixelHeight>" JPEG "</sphericalRepresentation>",
+              keep, "more than once around");
 }
 #pragma GCC diagnostic pop
+
+static void images_are_listed(void **state)
+{
+    struct e57_writer w;
+    struct spl_view_list list;
+    struct spl_cloud *cloud;
+    unsigned long long blob;
+    (void)state;
+    begin(&w, &blob);
+    e57_add_image(&w, PINHOLE(FOCAL SIZES), "a\033[2J", e57_pose(1, 0, 0, 0, 0, 0, 0), blob);
+    e57_add_image(&w, "<visualReferenceRepresentation>" SIZES JPEG "</visualReferenceRepresentation>", blob);
+    assert_int_equal(end(&w, &handing_out, &list, NULL), SPL_E_INPUT); /* a control character is no XML */
+    begin(&w, &blob);
+    e57_add_image(&w, PINHOLE(FOCAL SIZES), "a\xe2\x80\xae", e57_pose(1, 0, 0, 0, 0, 0, 0), blob);
+    e57_add_image(&w, "<visualReferenceRepresentation>" SIZES JPEG "</visualReferenceRepresentation>", blob);
+    assert_int_equal(end(&w, &handing_out, &list, NULL), 0);
+    spl_view_list_finish(&list);
+    assert_int_equal(spl_cloud_open(scratch_path(), NULL, &cloud, NULL), 0);
+    const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+    assert_int_equal(info->image_count, 2);
+    assert_string_equal(info->images[0].name, "a?");
+    assert_string_equal(info->images[0].kind, "pinhole");
+    assert_string_equal(info->images[0].coding, "JPEG");
+    assert_true(info->images[0].posed && info->images[0].width == 640 && info->images[0].height == 320);
+    assert_int_equal(info->images[0].bytes, 9);
+    assert_string_equal(info->images[1].kind, "visual reference");
+    assert_false(info->images[1].posed);
+    spl_cloud_destroy(cloud);
+}
 
 static void no_image_and_no_memory(void **state)
 {
@@ -217,6 +246,7 @@ int main(void)
         cmocka_unit_test(a_pinhole_looks_along_its_negative_z),
         cmocka_unit_test(panoramas_are_cut_into_faces_around_their_pose),
         cmocka_unit_test(what_cannot_be_a_photograph_is_refused),
+        cmocka_unit_test(images_are_listed),
         cmocka_unit_test(no_image_and_no_memory),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);

@@ -24,7 +24,7 @@ static struct spl_encoded make_png(void)
     static uint8_t texels[height][width][4];
     struct spl_image image = {
         .layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = width, .height = height, .pixels = texels};
-    const struct spl_encode_options options = {.format = SPL_FORMAT_PNG};
+    const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
     struct spl_encoded out;
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
