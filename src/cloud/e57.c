@@ -45,6 +45,7 @@ struct e57 {
     const struct spl_e57_scan *named; /* the first one with points: its fields' names are known */
     bool begun;
     bool scale_colors, scale_intensity;
+    uint64_t room;                /* bytes of the file that no scan has claimed: none is told of twice */
     struct spl_cloud_colors base; /* of the file as a whole */
     double state[SPL_ROWS];
 };
@@ -119,7 +120,7 @@ static void find_columns(struct spl_cloud *cloud, struct spl_e57_scan *scan)
     for (size_t i = 0; i < scan->fields; i++) {
         const struct spl_e57_field *field = &e57->document.fields[scan->first_field + i];
         const char *name = field->name, *colon = strchr(name, ':');
-        if (!first || !has_field(&e57->document, first, name))
+        if (!cloud->fields_cut && (!first || !has_field(&e57->document, first, name)))
             spl_cloud_name_field(cloud, name, strlen(name));
         bool free = field->role == SPL_E57_OTHER || field->role == SPL_E57_ROW || field->role == SPL_E57_COLUMN;
         if (!free || field->type == SPL_E57_STRING)
@@ -159,10 +160,11 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
         memcpy(cloud->info.stations[cloud->info.station_count++], scan->pose, sizeof scan->pose);
         cloud->info.attributes |= SPL_CLOUD_STATION;
     }
-    if (__builtin_add_overflow(cloud->info.points_expected, from->points, &cloud->info.points_expected))
-        return fail_scan(cloud, from, "recordCount", err, "more points in all than 64 bits can count");
     if (!from->points)
         return SPL_OK;
+    if ((code = spl_e57_check_count(&cloud->source, document, from, &e57->room, err)) < 0)
+        return code;
+    cloud->info.points_expected += from->points;
     for (int k = 0; colors && k < 3; k++)
         scan->color[k] = range_of(spl_e57_field(document, from, SPL_E57_RED + k), from->color_limits[k], true);
     if (colors)
@@ -270,6 +272,7 @@ static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
     cloud->info.stations = spl_alloc(count, sizeof *cloud->info.stations, err);
     if (!e57->scans || !cloud->info.stations)
         return SPL_E_NOMEM;
+    e57->room = spl_e57_logical_bytes(&e57->pages);
     for (size_t i = 0; i < count; i++)
         if ((code = set_scan(cloud, i, err)) < 0)
             return code;

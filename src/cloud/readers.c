@@ -75,16 +75,22 @@ static const struct {
 static const struct ending {
     const char *ending;
     const struct spl_cloud_reader *reader;
-    const char *format;  /* for people */
-    const char *formats; // may be NULL: all of the reader
-    bool loose;          /* other things are called so too: no folder is searched for it */
+    const char *format;                    /* for people */
+    const char *formats;                   // may be NULL: all of the reader
+    bool loose;                            /* other things are called so too: no folder is searched for it */
 } endings[] = {
-    {"ply", &spl_ply_reader, "PLY", NULL, false},       {"las", &spl_las_reader, "LAS", "LAS", false},
-    {"laz", &spl_las_reader, "LAZ", "LAZ COPC", false}, {"e57", &spl_e57_reader, "E57", NULL, false},
-    {"pcd", &spl_pcd_reader, "PCD", NULL, false},       {"ptx", &spl_ptx_reader, "PTX", NULL, false},
-    {"pts", &spl_text_reader, "PTS", NULL, false},      {"xyz", &spl_text_reader, "text", NULL, false},
-    {"xyzrgb", &spl_text_reader, "text", NULL, false},  {"txt", &spl_text_reader, "text", NULL, true},
-    {"csv", &spl_text_reader, "text", NULL, true},      {"asc", &spl_text_reader, "text", NULL, true},
+    {"ply", &spl_ply_reader, "PLY", NULL, false},
+    {"las", &spl_las_reader, "LAS", "LAS", false},
+    {"laz", &spl_las_reader, "LAZ", "LAZ COPC", false},
+    {"e57", &spl_e57_reader, "E57", NULL, false},
+    {"pcd", &spl_pcd_reader, "PCD", NULL, false},
+    {"ptx", &spl_ptx_reader, "PTX", NULL, false},
+    {"pts", &spl_text_reader, "PTS", NULL, false},
+    {"xyz", &spl_text_reader, "text", NULL, false},
+    {"xyzrgb", &spl_text_reader, "text", NULL, false},
+    {"txt", &spl_text_reader, "text", NULL, true},
+    {"csv", &spl_text_reader, "text", NULL, true},
+    {"asc", &spl_text_reader, "text", NULL, true},
 };
 
 static const struct ending *find_ending(const char *path)

@@ -1,8 +1,9 @@
-/* Photographs inside an E57 file (images2D): pinholes, which look along -z with y up, and panorama around the eye, of
+/* Photographs inside an E57 file (images2D): pinholes, which look along -z with y up, and panoramas around the eye, of
  * which each face of 90 degrees that shows something is a view. What has no projection (a visual reference) is no view.
  *
  * Names are the images', with their number in the file, since most writers call all of them the same; of what no file
  * name can carry '_' remains. A spherical or cylindrical image without a pose has that of its scan. Any thread. */
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,10 +30,10 @@ struct reading {
 bool spl_view_list_is_e57(const char *path)
 {
     char magic[8] = "";
-    FILE *file = fopen(path, "rbe");
-    bool is = file && fread(magic, 1, sizeof magic, file) == sizeof magic && !memcmp(magic, "ASTM-E57", sizeof magic);
-    if (file)
-        fclose(file);
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO is not waited for */
+    bool is = file >= 0 && read(file, magic, sizeof magic) == sizeof magic && !memcmp(magic, "ASTM-E57", sizeof magic);
+    if (file >= 0)
+        close(file);
     return is;
 }
 
