@@ -58,6 +58,16 @@ struct spl_cloud_options {
     uint64_t points; /* info.points_total of an earlier open; 0 = find out, which may take a pass over the file */
 };
 
+/* An image that a scan's file holds. */
+struct spl_cloud_image {
+    const char *name;     /* printable; "" = it has none */
+    const char *kind;     /* static: "pinhole", "spherical", "cylindrical", or "visual reference": no projection */
+    const char *coding;   /* static: "JPEG", "PNG", "" = neither */
+    double width, height; /* pixels, as the file says */
+    uint64_t bytes;
+    bool posed;
+};
+
 struct spl_cloud_info {
     const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PCD", "PTX", "PTS", "text" */
     const char *named;        /* static: the format that the name's ending is of, where it is another; else NULL */
@@ -70,10 +80,12 @@ struct spl_cloud_info {
     struct spl_cloud_colors colors; /* of the points that come next: stations of a PTX may differ */
     uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
     struct spl_cloud_coordinates coordinates;
-    uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
-    uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
-    uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
-    const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
+    uint64_t points_skipped;              /* non-finite, or PTX "no return" cells */
+    uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
+    uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
+    uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
+    const struct spl_cloud_image *images; /* borrowed until destroy */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
