@@ -31,9 +31,10 @@ static int read_byte(struct spl_laz_model **models, unsigned k, unsigned changed
     return (expected + (int)spl_laz_symbol(coder, spl_laz_model_get(arena, &models[k], 256))) & 255;
 }
 
-void spl_laz_color_read(struct spl_laz_color *c, struct spl_laz_coder *coder, struct spl_laz_arena *arena,
-                        uint16_t rgb[3])
+SPL_LAZ_HOT void spl_laz_color_read(struct spl_laz_color *c, struct spl_laz_coder *shared, struct spl_laz_arena *arena,
+                                    uint16_t rgb[3])
 {
+    struct spl_laz_coder local = *shared, *coder = &local;
     unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &c->changed, 128));
     int before[6], now[6];
     for (int k = 0; k < 6; k++)
@@ -52,6 +53,7 @@ void spl_laz_color_read(struct spl_laz_color *c, struct spl_laz_coder *coder, st
     }
     for (int k = 0; k < 3; k++)
         rgb[k] = (uint16_t)(now[2 * k] | now[2 * k + 1] << 8);
+    *shared = local;
 }
 
 void spl_laz_infrared_read(struct spl_laz_infrared *c, struct spl_laz_coder *coder, struct spl_laz_arena *arena,
