@@ -47,7 +47,7 @@ class Dataset:
         return View(*self.ask(self.info["view"], params))
 
     def depth(self, layer="depth", **params):
-        """(width, height, array of floats row by row): metres, NaN where nothing is."""
+        """(width, height, array of floats row by row): in the dataset's unit, NaN where nothing is."""
         view = self.view(**params, layer=layer, format="raw")
         values = array.array("f", view.bytes)
         if sys.byteorder == "big":

@@ -5,7 +5,7 @@ import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
-import {Points, coordinates, metres} from "./points.js";
+import {Points, coordinates} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
@@ -105,7 +105,7 @@ async function open() {
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
-      `${thousands(dataset.points)} points, ${size} m, drawn by ${device.name.replace(/ \(.*/, "")}`;
+      `${thousands(dataset.points)} points, ${size} ${dataset.unit}, drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
@@ -128,7 +128,7 @@ function showFrame({detail: frame}) {
   $("legend").hidden = !distances;
   const [near, far] = $("legend").querySelectorAll("span");
   if (distances)
-    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} m`);
+    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} ${dataset.unit}`);
   const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
   const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
   $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;
@@ -145,7 +145,7 @@ function showFrame({detail: frame}) {
 
 function showPoints({detail}) {
   const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
-  if (points.distance !== null) rows.push(["A – B", metres(points.distance)]);
+  if (points.distance !== null) rows.push(["A – B", points.distanceText]);
   $("points").replaceChildren(
     ...rows.flat().map((text, i) => {
       const cell = document.createElement(i % 2 ? "dd" : "dt");
@@ -159,7 +159,7 @@ function showPoints({detail}) {
     say(
       points.distance === null
         ? `Point at ${coordinates(detail.position)}`
-        : `Point at ${coordinates(detail.position)}; distance ${metres(points.distance)}`,
+        : `Point at ${coordinates(detail.position)}; distance ${points.distanceText}`,
     );
 }
 

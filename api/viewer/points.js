@@ -14,8 +14,9 @@ function shape(name, attributes, text = "") {
   return element;
 }
 
-/** Metres as people read them. */
-export const metres = (x) => (x < 1 ? `${(x * 1000).toFixed(1)} mm` : `${x.toFixed(3)} m`);
+/** A length in the dataset's unit, as people read it. */
+export const lengthText = (x, unit) =>
+  unit === "m" && x < 1 ? `${(x * 1000).toFixed(1)} mm` : `${x < 1 ? x.toPrecision(4) : x.toFixed(3)} ${unit}`;
 export const coordinates = (p) => p.map((x) => (Math.round(x * 1000) / 1000 + 0).toFixed(3)).join(", ");
 
 export class Points extends EventTarget {
@@ -33,6 +34,11 @@ export class Points extends EventTarget {
 
   get distance() {
     return this.list.length === 2 ? length(sub(this.list[1].position, this.list[0].position)) : null;
+  }
+
+  /** The same for people; null without two points. */
+  get distanceText() {
+    return this.distance === null ? null : lengthText(this.distance, this.stage.dataset.unit);
   }
 
   /** Where a pixel of the stage lies, or null. */
@@ -91,7 +97,7 @@ export class Points extends EventTarget {
       const [x, y] = [(x1 + x2) / 2, (y1 + y2) / 2 - 8];
       shapes.push(
         shape("line", {x1, y1, x2, y2}),
-        shape("text", {x, y, "text-anchor": "middle"}, metres(this.distance)),
+        shape("text", {x, y, "text-anchor": "middle"}, this.distanceText),
       );
     }
     at.forEach((p, i) => {

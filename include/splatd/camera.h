@@ -1,6 +1,6 @@
 /* A pinhole camera, and the conventions it can be given in.
  *
- * World coordinates are doubles in the dataset's unit (metres). The camera frame is x right, y down, z forward (COLMAP,
+ * World coordinates are doubles in the dataset's unit. The camera frame is x right, y down, z forward (COLMAP,
  * OpenCV, ROS); a world point p lands on the pixel
  *     c = R (p - eye),   u = fx c.x / c.z + cx,   v = fy c.y / c.z + cy
  * where the first pixel's centre is (0.5, 0.5). Pure functions; any thread. */

@@ -47,6 +47,7 @@ struct spl_encode_options {
     int quality;          /* JPEG and WebP, 1..100; 0 = 90 */
     int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
+    char unit[32];        /* of distances, for the note that a 16 bit PNG carries: "m", "ft"; "" = "unit" */
 };
 
 static inline void spl_encode_options_init(struct spl_encode_options *options)

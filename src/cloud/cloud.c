@@ -2,9 +2,12 @@
  * Owned by one thread at a time; two clouds share nothing. */
 #include "cloud/cloud.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
+#include "cloud/crs.h"
 #include "cloud/reader.h"
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err)
@@ -15,7 +18,12 @@ int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct 
     batch->normal = spl_alloc(capacity, sizeof *batch->normal, err);
     batch->classification = spl_alloc(capacity, sizeof *batch->classification, err);
     batch->station = spl_alloc(capacity, sizeof *batch->station, err);
-    if (batch->position && batch->color && batch->normal && batch->classification && batch->station)
+    bool complete = batch->position && batch->color && batch->normal && batch->classification && batch->station;
+    for (int s = 0; complete && s < SPL_SCALAR_COUNT; s++) { /* those that are not used take no memory */
+        batch->scalar[s] = spl_alloc(capacity, sizeof *batch->scalar[s], err);
+        complete = batch->scalar[s];
+    }
+    if (complete)
         return SPL_OK;
     spl_point_batch_finish(batch);
     return SPL_E_NOMEM;
@@ -28,6 +36,8 @@ void spl_point_batch_finish(struct spl_point_batch *batch)
     free(batch->normal);
     free(batch->classification);
     free(batch->station);
+    for (int s = 0; s < SPL_SCALAR_COUNT; s++)
+        free(batch->scalar[s]);
     *batch = (struct spl_point_batch){0};
 }
 
@@ -41,6 +51,9 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
     cloud->source.fd = -1;
     cloud->options = options ? options : &defaults;
     cloud->intensity = cloud->options->intensity;
+    if (cloud->options->keep)
+        cloud->keep = *cloud->options->keep;
+    cloud->info.fields = cloud->fields;
     int code = spl_source_open(&cloud->source, path, err);
     if (code < 0)
         goto fail;
@@ -60,6 +73,43 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
 fail:
     spl_cloud_destroy(cloud);
     return code;
+}
+
+void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t length)
+{
+    static const char more[] = ", …";
+    size_t used = strlen(cloud->fields), room = sizeof cloud->fields - used - sizeof more; /* never less than 0 */
+    if (cloud->fields_cut)
+        return;
+    cloud->fields_cut = length + 2 > room;
+    if (cloud->fields_cut)
+        memcpy(cloud->fields + used, more, sizeof more);
+    else
+        snprintf(cloud->fields + used, room, "%s%.*s", used ? ", " : "", (int)length, name);
+}
+
+int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length)
+{
+    int column = spl_keep_find_column(&cloud->keep, cloud->columns, name, length);
+    spl_cloud_name_field(cloud, name, length);
+    if (column >= 0)
+        cloud->columns |= 1u << column;
+    return column;
+}
+
+const char *spl_cloud_column_name(const struct spl_cloud *cloud, int column)
+{
+    return column < SPL_COLUMN_KEPT ? spl_column_name(column) : cloud->keep.names[column - SPL_COLUMN_KEPT];
+}
+
+void spl_cloud_keep_columns(struct spl_cloud *cloud)
+{
+    uint32_t named = cloud->keep.named | ~0u << SPL_COLUMN_KEPT;
+    uint32_t kept = cloud->columns & (cloud->keep.none ? named : ~0u);
+    cloud->info.columns = cloud->columns;
+    cloud->info.scalars = kept >> SPL_COLUMN_INTENSITY;
+    if (!(kept >> SPL_COLUMN_CLASS & 1))
+        cloud->info.attributes &= ~(uint32_t)SPL_CLOUD_CLASS;
 }
 
 const struct spl_cloud_info *spl_cloud_get_info(const struct spl_cloud *cloud)
@@ -98,6 +148,7 @@ void spl_cloud_destroy(struct spl_cloud *cloud)
     if (cloud->state && cloud->reader->close)
         cloud->reader->close(cloud);
     spl_source_close(&cloud->source);
+    spl_crs_finish(&cloud->info.coordinates);
     free(cloud->info.stations);
     free(cloud->state);
     free(cloud);

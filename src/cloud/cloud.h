@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
  * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
+ * one reader per format (readers.c). Owned by one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -10,12 +10,22 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "cloud/keep.h"
 
 enum spl_cloud_attribute {
     SPL_CLOUD_COLOR = 1 << 0, /* measured colour, or intensity as grey when the file has no colour */
     SPL_CLOUD_NORMAL = 1 << 1,
     SPL_CLOUD_CLASS = 1 << 2,
     SPL_CLOUD_STATION = 1 << 3, /* batch.station indexes info.stations */
+};
+
+/* Numbers that a point may have. */
+enum spl_scalar {
+    SPL_SCALAR_INTENSITY,
+    SPL_SCALAR_RETURN,
+    SPL_SCALAR_RETURNS,
+    SPL_SCALAR_KEPT, /* the first of SPL_KEPT_MAX, in the order of struct spl_keep */
+    SPL_SCALAR_COUNT = SPL_SCALAR_KEPT + SPL_KEPT_MAX
 };
 
 /* What a file's colours are made from, and the values that are black and white. */
@@ -26,22 +36,28 @@ struct spl_cloud_colors {
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
 };
 
-/* What a header says of its coordinates, as far as it does. */
+/* What a header says of its coordinates, as far as it does (crs.h). */
 struct spl_cloud_coordinates {
-    uint32_t epsg;  /* of the projected, else the geographic system; 0 = not said */
-    char name[64];  /* of the system; "" = not said. A header says it by number or by name */
-    double unit_m;  /* metres a unit; 0 = not said */
-    double step[3]; /* that they are multiples of; 0 = not said */
+    uint32_t epsg;        /* of the projected, else the geographic or compound system; 0 = not said */
+    uint32_t height_epsg; /* of the heights' own; 0 = not said */
+    char name[64];        /* of the system; "" = not said. A header says it by number or by name */
+    char *wkt;            /* where it has one; may be NULL. Owned by the cloud, where it is a cloud's */
+    double unit_m;        /* metres a unit of x and y; 0 = not said */
+    double height_unit_m; /* of z; 0 = not said: as x and y, metres where those are angles */
+    bool angles;          /* x and y are longitudes and latitudes */
+    double step[3];       /* that they are multiples of; 0 = not said */
+    bool floats;          /* of 32 bits, so that their steps grow with their size */
 };
 
 struct spl_cloud_options {
     const char *columns; /* text formats: e.g. "x,y,z,intensity,r,g,b,class,nx,ny,nz,-"; NULL = recognise */
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
+    const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "LAZ", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "PCD", "PTX", "PTS", "text" */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;
@@ -51,6 +67,9 @@ struct spl_cloud_info {
     uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
     struct spl_cloud_coordinates coordinates;
     uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
+    uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
+    uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
@@ -61,6 +80,7 @@ struct spl_point_batch {
     float (*normal)[3];    /* unit; zero where the file has none or it is degenerate */
     uint8_t *classification;
     uint16_t *station;
+    double *scalar[SPL_SCALAR_COUNT]; /* of info.scalars; NaN = the point has none */
 };
 
 struct spl_cloud;

@@ -178,5 +178,6 @@ int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err)
         cloud->info.attributes |= SPL_CLOUD_COLOR;
     cloud->info.points_skipped = 0;
     cloud->row = 0;
+    spl_cloud_keep_columns(cloud); /* not before: to look at colours takes no other columns */
     return cloud->reader->seek(cloud, 0, 1, err);
 }

@@ -10,10 +10,10 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "cloud/las_records.h"
+#include "cloud/las_fields.h"
 #include "cloud/laz/stream.h"
 
-enum { format_mask = 0x3f };
+enum { format_mask = 0x3f, wkt_bit = 1 << 4 };
 /* The most symbols without surprise that a byte can hold are far more than a point has; less than this at any rate. */
 enum { compressed_points_a_byte = 1024 };
 
@@ -21,6 +21,7 @@ struct las {
     uint64_t start, count, next;
     unsigned format, record_bytes;
     double scale[3], offset[3];
+    struct spl_las_fields fields;
     struct spl_laz_stream *stream; // may be NULL: records lie in the file as they are
 };
 
@@ -164,7 +165,16 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     code = check_transform(cloud, h, err);
     if (code < 0)
         return code;
-    if ((code = spl_las_read_coordinates(cloud, records, err)) < 0)
+    struct spl_las_record all[2] = {records, {.extended = true, .end = size}};
+    if (minor >= 4) {
+        all[1].at = get64(h + 235);
+        all[1].count = get32(h + 243);
+    }
+    if ((code = spl_las_read_coordinates(cloud, all, spl_las_get16(h + 6) & wkt_bit, err)) < 0)
+        return code;
+    code = spl_las_find_fields(&las->fields, cloud, records, las->format, formats[las->format].bytes, las->record_bytes,
+                               err);
+    if (code < 0)
         return code;
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     cloud->info.format = compressed ? "LAZ" : "LAS";
@@ -173,22 +183,29 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_INTENSITY;
-    cloud->columns = 1u << SPL_COLUMN_INTENSITY | 1u << SPL_COLUMN_CLASS;
     cloud->scan_colors = cloud->integer_colors = formats[las->format].color != 0;
     if (cloud->scan_colors)
         cloud->columns |= 7u << SPL_COLUMN_RED;
     return SPL_OK;
 }
 
-/* Layers that a batch can show: of colour and intensity the one that decides the colour, once that is known. */
+/* Does a batch show it? Intensity is also what grey is made of. */
+static bool is_wanted(const struct spl_cloud *cloud, const struct spl_las_field *field)
+{
+    if (field->column == SPL_COLUMN_CLASS)
+        return cloud->info.attributes & SPL_CLOUD_CLASS;
+    return cloud->info.scalars >> (field->column - SPL_COLUMN_INTENSITY) & 1 ||
+           (field->column == SPL_COLUMN_INTENSITY && cloud->color.kind != SPL_COLOR_RGB);
+}
+
+/* Layers that a batch can show, of the colour only until it is known that intensity decides it. */
 static uint32_t wanted_layers(const struct spl_cloud *cloud)
 {
-    uint32_t wanted = SPL_LAZ_WANT_Z | SPL_LAZ_WANT_CLASS;
-    if (cloud->color.kind != SPL_COLOR_RGB)
-        wanted |= SPL_LAZ_WANT_INTENSITY;
-    if (cloud->color.kind != SPL_COLOR_GREY)
-        wanted |= SPL_LAZ_WANT_COLOR;
-    return wanted;
+    const struct las *las = cloud->state;
+    uint32_t wanted = SPL_LAZ_WANT_Z;
+    for (unsigned i = 0; i < las->fields.count; i++)
+        wanted |= is_wanted(cloud, &las->fields.list[i]) ? las->fields.list[i].layer : 0;
+    return cloud->color.kind == SPL_COLOR_GREY ? wanted : wanted | SPL_LAZ_WANT_COLOR;
 }
 
 /* The next records as they lie in the file. */
@@ -208,19 +225,20 @@ static int peek_records(struct spl_cloud *cloud, const uint8_t **records, size_t
 static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
 {
     struct las *las = cloud->state;
-    unsigned color = formats[las->format].color, class_at = las->format < 6 ? 15 : 16;
-    uint8_t class_mask = las->format < 6 ? 0x1f : 0xff;
+    unsigned color = formats[las->format].color;
     size_t count = limit;
     const uint8_t *p;
     int code = las->stream ? spl_laz_stream_read(las->stream, wanted_layers(cloud), &p, limit, &count, err)
                            : peek_records(cloud, &p, &count, err);
     if (code < 0)
         return code;
+    for (unsigned i = 0; i < las->fields.count; i++)
+        if (is_wanted(cloud, &las->fields.list[i]))
+            spl_las_read_field(&las->fields.list[i], p, las->record_bytes, count,
+                               rows->value[las->fields.list[i].column]);
     for (size_t r = 0; r < count; r++, p += las->record_bytes) {
         for (unsigned k = 0; k < 3; k++)
             rows->value[SPL_COLUMN_X + k][r] = (int32_t)get32(p + 4 * k) * las->scale[k] + las->offset[k];
-        rows->value[SPL_COLUMN_INTENSITY][r] = spl_las_get16(p + 12);
-        rows->value[SPL_COLUMN_CLASS][r] = p[class_at] & class_mask;
         for (unsigned k = 0; color && k < 3; k++)
             rows->value[SPL_COLUMN_RED + k][r] = spl_las_get16(p + color + 2 * k);
     }

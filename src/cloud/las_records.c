@@ -1,80 +1,137 @@
-/* What LAS files say beside their points. Of their coordinate system only as much is read as tells two files apart:
- * the EPSG numbers among GeoTIFF keys, or the name at the head of a WKT. What is odd there is no reason to refuse
- * points: it counts as not said. Owned by the cloud's thread. */
+/* What LAS files say beside their points: records before them and, since LAS 1.4, behind them. What is odd about
+ * coordinates is no reason to refuse points: it counts as not said. Owned by the cloud's thread. */
 #include "cloud/las_records.h"
 
-enum { head_bytes = 54, content_max = 4096, user_defined = 32767 };
-enum { record_keys = 34735, record_wkt = 2112 };
-enum { key_geographic = 2048, key_projected = 3072, key_unit = 3076 };
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "cloud/crs.h"
+#include "geom/unit.h"
+
+enum { head_bytes = 54, extended_head_bytes = 60 };
+enum { record_wkt = 2112, record_keys = 34735, record_doubles = 34736, record_text = 34737 };
 
 int spl_las_find(struct spl_cloud *cloud, struct spl_las_record *record, const char *user, uint16_t id, bool *found,
                  struct spl_error *err)
 {
+    const size_t heads = record->extended ? extended_head_bytes : head_bytes;
     *found = false;
-    while (record->count > 0 && record->at + head_bytes <= record->end && !*found) {
+    while (record->count > 0 && record->at <= record->end && record->end - record->at >= heads && !*found) {
         const uint8_t *head;
         size_t available;
         spl_source_seek(&cloud->source, record->at);
-        int code = spl_source_peek(&cloud->source, head_bytes, &head, &available, err);
+        int code = spl_source_peek(&cloud->source, heads, &head, &available, err);
         if (code < 0)
             return code;
-        if (available < head_bytes)
+        if (available < heads)
             break;
+        uint64_t length = spl_las_get16(head + 20);
+        if (record->extended)
+            memcpy(&length, head + 20, sizeof length);
+        length = record->extended ? le64toh(length) : length;
         *found = memcmp(head + 2, user, strlen(user)) == 0 && (!id || spl_las_get16(head + 18) == id);
-        record->content = record->at + head_bytes;
+        record->content = record->at + heads;
         uint64_t left = record->end - record->content;
-        record->bytes = spl_las_get16(head + 20) < left ? spl_las_get16(head + 20) : (uint32_t)left;
-        record->at = record->content + spl_las_get16(head + 20);
+        record->bytes = length < left ? length : left;
+        record->at = length < left ? record->content + length : record->end;
         record->count--;
     }
     return SPL_OK;
 }
 
-/* Keys of 8 bytes after a head of 8: number, where its value lies (0: here), how many, value. */
-static void read_keys(struct spl_cloud_coordinates *out, const uint8_t *keys, size_t bytes)
+/* The first record of number `id`, before the points or behind them: its content, which the caller frees; NULL where
+ * there is none, or one that is too long to be of use. */
+static int read_record(struct spl_cloud *cloud, const struct spl_las_record records[2], uint16_t id, uint8_t **content,
+                       size_t *bytes, struct spl_error *err)
 {
-    uint16_t projected = 0, geographic = 0;
-    for (size_t at = 8; at + 8 <= bytes; at += 8) {
-        uint16_t key = spl_las_get16(keys + at), value = spl_las_get16(keys + at + 6);
-        if (spl_las_get16(keys + at + 2) || value == user_defined)
-            continue;
-        if (key == key_projected)
-            projected = value;
-        else if (key == key_geographic)
-            geographic = value;
-        else if (key == key_unit)
-            out->unit_m = value == 9001 ? 1 : value == 9002 ? 0.3048 : value == 9003 ? 1200.0 / 3937 : 0;
-    }
-    out->epsg = projected ? projected : geographic;
-}
-
-/* KIND["name",…: printable ASCII alone, since it ends up in messages. */
-static void read_name(struct spl_cloud_coordinates *out, const uint8_t *text, size_t bytes)
-{
-    const uint8_t *quote = memchr(text, '"', bytes);
-    size_t left = quote ? bytes - (size_t)(quote + 1 - text) : 0, length = 0;
-    for (; length < left && length + 1 < sizeof out->name && quote[1 + length] != '"'; length++)
-        out->name[length] = quote[1 + length] >= ' ' && quote[1 + length] < 0x7f ? (char)quote[1 + length] : '?';
-    out->name[length] = 0;
-}
-
-int spl_las_read_coordinates(struct spl_cloud *cloud, struct spl_las_record records, struct spl_error *err)
-{
-    for (int wkt = 0; wkt < 2; wkt++) {
-        struct spl_las_record record = records;
-        const uint8_t *content;
-        size_t available;
-        bool found;
-        int code = spl_las_find(cloud, &record, "LASF_Projection", wkt ? record_wkt : record_keys, &found, err);
+    bool found = false;
+    struct spl_las_record record;
+    *content = NULL;
+    *bytes = 0;
+    for (int i = 0; i < 2 && !found; i++) {
+        record = records[i];
+        int code = spl_las_find(cloud, &record, "LASF_Projection", id, &found, err);
         if (code < 0)
             return code;
-        if (!found)
-            continue;
-        spl_source_seek(&cloud->source, record.content);
-        size_t bytes = record.bytes < content_max ? record.bytes : content_max;
-        if ((code = spl_source_peek(&cloud->source, bytes, &content, &available, err)) < 0)
-            return code;
-        (wkt ? read_name : read_keys)(&cloud->info.coordinates, content, available < bytes ? available : bytes);
     }
+    if (!found || !record.bytes || record.bytes > SPL_CRS_TEXT_MAX)
+        return SPL_OK;
+    if (!(*content = spl_alloc_raw((size_t)record.bytes, 1, err)))
+        return SPL_E_NOMEM;
+    *bytes = (size_t)record.bytes;
+    return spl_source_read_at(&cloud->source, record.content, *content, *bytes, err);
+}
+
+static int read_wkt(struct spl_cloud *cloud, const struct spl_las_record records[2], struct spl_cloud_coordinates *crs,
+                    struct spl_error *err)
+{
+    uint8_t *text;
+    size_t bytes;
+    int code = read_record(cloud, records, record_wkt, &text, &bytes, err);
+    if (!code && text) {
+        struct spl_error why = {0};
+        code = spl_crs_read_wkt((const char *)text, bytes, crs, &why);
+        code = code == SPL_E_NOMEM ? spl_fail(err, code, "%s", why.message) : SPL_OK;
+    }
+    free(text);
+    return code;
+}
+
+static int read_keys(struct spl_cloud *cloud, const struct spl_las_record records[2], struct spl_cloud_coordinates *crs,
+                     struct spl_error *err)
+{
+    static const uint16_t ids[3] = {record_keys, record_doubles, record_text};
+    uint8_t *contents[3] = {NULL};
+    size_t bytes[3] = {0};
+    int code = SPL_OK;
+    for (int i = 0; i < 3 && !code; i++)
+        code = read_record(cloud, records, ids[i], &contents[i], &bytes[i], err);
+    if (!code && contents[0])
+        spl_crs_read_keys(
+            &(struct spl_crs_keys){contents[0], contents[1], contents[2], bytes[0], bytes[1], bytes[2]}, crs);
+    for (int i = 0; i < 3; i++)
+        free(contents[i]);
+    return code;
+}
+
+/* What `a` leaves open is taken from `b`, unless it contradicts `a`; `b` is used up. */
+static void complete(struct spl_cloud_coordinates *a, struct spl_cloud_coordinates *b)
+{
+    bool same = !a->epsg || !b->epsg || a->epsg == b->epsg;
+    if (!spl_crs_is_said(a) && a->unit_m == 0 && (spl_crs_is_said(b) || b->unit_m > 0)) {
+        struct spl_cloud_coordinates swapped = *a;
+        *a = *b;
+        *b = swapped;
+    } else if (same && a->angles == b->angles && (a->unit_m == 0 || b->unit_m == 0 || spl_unit_is_same(a->unit_m, b->unit_m))) {
+        a->epsg = a->epsg ? a->epsg : b->epsg;
+        a->unit_m = a->unit_m > 0 ? a->unit_m : b->unit_m;
+        if (a->height_unit_m == 0 && a->height_epsg == 0) {
+            a->height_unit_m = b->height_unit_m;
+            a->height_epsg = b->height_epsg;
+        }
+        if (!a->name[0])
+            memcpy(a->name, b->name, sizeof a->name);
+        if (!a->wkt) {
+            a->wkt = b->wkt;
+            b->wkt = NULL;
+        }
+    }
+    spl_crs_finish(b);
+}
+
+int spl_las_read_coordinates(struct spl_cloud *cloud, const struct spl_las_record records[2], bool wkt_first,
+                             struct spl_error *err)
+{
+    struct spl_cloud_coordinates wkt = {0}, keys = {0};
+    int code = read_wkt(cloud, records, &wkt, err);
+    if (!code)
+        code = read_keys(cloud, records, &keys, err);
+    if (code) {
+        spl_crs_finish(&wkt);
+        spl_crs_finish(&keys);
+        return code;
+    }
+    complete(wkt_first ? &wkt : &keys, wkt_first ? &keys : &wkt);
+    cloud->info.coordinates = wkt_first ? wkt : keys;
     return SPL_OK;
 }

@@ -18,8 +18,9 @@ static inline uint16_t spl_las_get16(const uint8_t *p)
 struct spl_las_record {
     uint64_t at, end;
     uint32_t count;
+    bool extended;    /* those behind the points, whose lengths have 64 bits */
     uint64_t content; /* of the one that was found: where it begins */
-    uint32_t bytes;   /* and how long it is, up to `end` */
+    uint64_t bytes;   /* and how long it is, up to `end` */
 };
 
 /* The next record of `user`, and of number `id` unless that is 0; a chain that leaves its range just ends. Moves the
@@ -27,7 +28,10 @@ struct spl_las_record {
 int spl_las_find(struct spl_cloud *cloud, struct spl_las_record *record, const char *user, uint16_t id, bool *found,
                  struct spl_error *err);
 
-/* Fills info.coordinates from GeoTIFF keys or WKT, as far as they are there and whole. Moves the cursor. */
-int spl_las_read_coordinates(struct spl_cloud *cloud, struct spl_las_record records, struct spl_error *err);
+/* Fills info.coordinates but for their step, from WKT and GeoTIFF keys among the records before the points and the
+ * extended ones: as far as they are there and whole, and of two that contradict each other from the first. Moves the
+ * cursor. */
+int spl_las_read_coordinates(struct spl_cloud *cloud, const struct spl_las_record records[2], bool wkt_first,
+                             struct spl_error *err);
 
 #endif

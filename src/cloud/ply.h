@@ -2,27 +2,16 @@
 #ifndef SPL_CLOUD_PLY_H
 #define SPL_CLOUD_PLY_H
 
+#include "cloud/numbers.h"
 #include "cloud/reader.h"
-
-enum spl_ply_type {
-    SPL_PLY_NONE,
-    SPL_PLY_INT8,
-    SPL_PLY_UINT8,
-    SPL_PLY_INT16,
-    SPL_PLY_UINT16,
-    SPL_PLY_INT32,
-    SPL_PLY_UINT32,
-    SPL_PLY_FLOAT32,
-    SPL_PLY_FLOAT64
-};
 
 enum { SPL_PLY_ELEMENTS = 64, SPL_PLY_PROPERTIES = 1024 }; /* over all elements; more is refused */
 
 struct spl_ply_property {
-    char name[24];      /* shortened, for messages */
-    uint8_t type;       /* enum spl_ply_type; of the items when it is a list */
-    uint8_t count_type; /* of a list's length, SPL_PLY_NONE when it is no list */
-    int8_t column;      /* enum spl_column; SKIP for all but the vertices' known ones */
+    char name[48];      /* shortened, for messages */
+    uint8_t type;       /* enum spl_number; of the items when it is a list */
+    uint8_t count_type; /* of a list's length, SPL_NUMBER_NONE when it is no list */
+    int8_t column;      /* enum spl_column; SKIP for what is not kept */
     uint16_t offset;    /* in the row, where no list precedes it */
 };
 
@@ -43,9 +32,8 @@ struct spl_ply_header {
     uint64_t vertex_line; /* of its declaration, for messages */
 };
 
-unsigned spl_ply_type_bytes(enum spl_ply_type type);
-
-/* Reads the header; the cursor is then at the first byte of the data. */
-int spl_ply_parse_header(struct spl_source *source, struct spl_ply_header *header, struct spl_error *err);
+/* Reads the header, and takes columns from the vertices' properties; the cursor is then at the first byte of the data.
+ */
+int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header, struct spl_error *err);
 
 #endif

@@ -9,12 +9,14 @@
 
 static const struct {
     const char *name;
-    enum spl_ply_type type;
+    enum spl_number type;
 } types[] = {
-    {"char", SPL_PLY_INT8},     {"int8", SPL_PLY_INT8},       {"uchar", SPL_PLY_UINT8},    {"uint8", SPL_PLY_UINT8},
-    {"short", SPL_PLY_INT16},   {"int16", SPL_PLY_INT16},     {"ushort", SPL_PLY_UINT16},  {"uint16", SPL_PLY_UINT16},
-    {"int", SPL_PLY_INT32},     {"int32", SPL_PLY_INT32},     {"uint", SPL_PLY_UINT32},    {"uint32", SPL_PLY_UINT32},
-    {"float", SPL_PLY_FLOAT32}, {"float32", SPL_PLY_FLOAT32}, {"double", SPL_PLY_FLOAT64}, {"float64", SPL_PLY_FLOAT64},
+    {"char", SPL_NUMBER_INT8},       {"int8", SPL_NUMBER_INT8},       {"uchar", SPL_NUMBER_UINT8},
+    {"uint8", SPL_NUMBER_UINT8},     {"short", SPL_NUMBER_INT16},     {"int16", SPL_NUMBER_INT16},
+    {"ushort", SPL_NUMBER_UINT16},   {"uint16", SPL_NUMBER_UINT16},   {"int", SPL_NUMBER_INT32},
+    {"int32", SPL_NUMBER_INT32},     {"uint", SPL_NUMBER_UINT32},     {"uint32", SPL_NUMBER_UINT32},
+    {"float", SPL_NUMBER_FLOAT32},   {"float32", SPL_NUMBER_FLOAT32}, {"double", SPL_NUMBER_FLOAT64},
+    {"float64", SPL_NUMBER_FLOAT64},
 };
 
 struct words {
@@ -22,12 +24,6 @@ struct words {
     size_t length[5];
     size_t count;
 };
-
-unsigned spl_ply_type_bytes(enum spl_ply_type type)
-{
-    static const uint8_t bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
-    return bytes[type];
-}
 
 static bool word_is(const struct words *words, size_t i, const char *text)
 {
@@ -42,17 +38,17 @@ static void split(const char *line, size_t length, struct words *words)
         words->word[words->count++] = fields.start;
 }
 
-static enum spl_ply_type find_type(const struct words *words, size_t i)
+static enum spl_number find_type(const struct words *words, size_t i)
 {
     for (size_t k = 0; k < sizeof types / sizeof *types; k++)
         if (word_is(words, i, types[k].name))
             return types[k].type;
-    return SPL_PLY_NONE;
+    return SPL_NUMBER_NONE;
 }
 
-static void copy_name(char name[24], const struct words *words, size_t i)
+static void copy_name(char *name, size_t room, const struct words *words, size_t i)
 {
-    snprintf(name, 24, "%.*s", (int)words->length[i], words->word[i]);
+    snprintf(name, room, "%.*s", (int)words->length[i], words->word[i]);
     for (char *p = name; *p; p++)
         if (*p < ' ' || *p > '~')
             *p = '?';
@@ -94,15 +90,16 @@ static int parse_element(const struct spl_source *source, const struct words *wo
         header->vertex_line = source->line;
     }
     struct spl_ply_element *element = &header->elements[header->element_count++];
-    copy_name(element->name, words, 1);
+    copy_name(element->name, sizeof element->name, words, 1);
     element->count = count;
     element->first = header->property_count;
     return SPL_OK;
 }
 
-static int parse_property(const struct spl_source *source, const struct words *words, struct spl_ply_header *header,
+static int parse_property(struct spl_cloud *cloud, const struct words *words, struct spl_ply_header *header,
                           struct spl_error *err)
 {
+    const struct spl_source *source = &cloud->source;
     bool list = word_is(words, 1, "list");
     size_t name = list ? 4 : 2;
     if (words->count != name + 1)
@@ -116,7 +113,7 @@ static int parse_property(const struct spl_source *source, const struct words *w
     struct spl_ply_property p = {.type = find_type(words, name - 1), .column = SPL_COLUMN_SKIP};
     if (list) {
         p.count_type = find_type(words, 2);
-        if (!p.count_type || p.count_type >= SPL_PLY_FLOAT32)
+        if (!p.count_type || p.count_type >= SPL_NUMBER_FLOAT32)
             return spl_source_fail_line(source, source->line, "property", err,
                                         "\"%.*s\" is no type for a list's length", (int)words->length[2],
                                         words->word[2]);
@@ -125,16 +122,11 @@ static int parse_property(const struct spl_source *source, const struct words *w
         return spl_source_fail_line(source, source->line, "property", err, "unknown type \"%.*s\"",
                                     (int)words->length[name - 1], words->word[name - 1]);
     struct spl_ply_element *element = &header->elements[header->element_count - 1];
-    copy_name(p.name, words, name);
+    copy_name(p.name, sizeof p.name, words, name);
     p.offset = (uint16_t)element->row_bytes;
-    if (!list && header->vertex_line && element == &header->elements[header->vertex]) {
-        int column = spl_column_from_name(words->word[name], words->length[name]);
-        p.column = (int8_t)column;
-        for (unsigned i = element->first; i < header->property_count; i++)
-            if (header->properties[i].column == column)
-                p.column = SPL_COLUMN_SKIP; /* "red" beside "diffuse_red": the first counts */
-    }
-    element->row_bytes += spl_ply_type_bytes(list ? p.count_type : p.type);
+    if (!list && header->vertex_line && element == &header->elements[header->vertex])
+        p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
+    element->row_bytes += spl_number_bytes(list ? p.count_type : p.type);
     element->lists |= list;
     element->properties++;
     header->properties[header->property_count++] = p;
@@ -157,8 +149,9 @@ static int find_newline(struct spl_source *source, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_ply_parse_header(struct spl_source *source, struct spl_ply_header *header, struct spl_error *err)
+int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header, struct spl_error *err)
 {
+    struct spl_source *source = &cloud->source;
     const char *line;
     size_t length;
     struct words words;
@@ -185,7 +178,7 @@ int spl_ply_parse_header(struct spl_source *source, struct spl_ply_header *heade
         } else if (word_is(&words, 0, "element")) {
             code = parse_element(source, &words, header, err);
         } else if (word_is(&words, 0, "property")) {
-            code = parse_property(source, &words, header, err);
+            code = parse_property(cloud, &words, header, err);
         } else {
             struct spl_fields shown = spl_fields_begin(line, length, ' ');
             char text[32];

@@ -254,6 +254,8 @@ static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     ptx->first_fields = ptx->fields;
+    if (ptx->fields > 3)
+        spl_cloud_take_column(cloud, "intensity", strlen("intensity"));
     cloud->info.attributes |= SPL_CLOUD_STATION;
     return SPL_OK;
 }

@@ -38,15 +38,29 @@ struct spl_cloud {
     bool scan_colors;    /* the range of the colours is not fixed by their type */
     bool integer_colors; /* 1 is then the darkest grey, not white */
     bool intensity;      /* wanted, whatever colours there are */
+    struct spl_keep keep;
+    char fields[400]; /* see info.fields */
+    bool fields_cut;  /* there are more */
     struct spl_color_rule color;
     uint64_t row; /* index of the next row */
     struct spl_rows rows;
 };
 
-extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
+extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_pcd_reader, spl_ptx_reader, spl_text_reader;
 
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);
+
+/* For readers whose fields have names, while they open: the column that a field fills, if any, which is then one of the
+ * cloud's. Names end up in messages about fields that are not there. */
+int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length);
+void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t length);
+
+/* For messages. */
+const char *spl_cloud_column_name(const struct spl_cloud *cloud, int column);
+
+/* Decides which of the columns batches have. */
+void spl_cloud_keep_columns(struct spl_cloud *cloud);
 
 /* Takes colours from the next rows on as `colors` say. */
 void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors);

@@ -19,8 +19,10 @@ static const struct {
     {"nx", SPL_COLUMN_NX},
     {"ny", SPL_COLUMN_NY},
     {"nz", SPL_COLUMN_NZ},
-    {"intensity", SPL_COLUMN_INTENSITY},
     {"class", SPL_COLUMN_CLASS},
+    {"intensity", SPL_COLUMN_INTENSITY},
+    {"return_number", SPL_COLUMN_RETURN},
+    {"number_of_returns", SPL_COLUMN_RETURNS},
     /* above: the columns' own names, in their order; below: what other programs write */
     {"r", SPL_COLUMN_RED},
     {"g", SPL_COLUMN_GREEN},
@@ -41,6 +43,9 @@ static const struct {
     {"reflectance", SPL_COLUMN_INTENSITY},
     {"classification", SPL_COLUMN_CLASS},
     {"label", SPL_COLUMN_CLASS},
+    {"returnnumber", SPL_COLUMN_RETURN},
+    {"numberofreturns", SPL_COLUMN_RETURNS},
+    {"returncount", SPL_COLUMN_RETURNS},
 };
 
 int spl_column_from_name(const char *name, size_t length)
@@ -58,7 +63,7 @@ int spl_column_from_name(const char *name, size_t length)
 
 const char *spl_column_name(int column)
 {
-    return column < 0 ? "-" : names[column].name;
+    return column < 0 ? "-" : column < SPL_COLUMN_KEPT ? names[column].name : "kept";
 }
 
 struct spl_color_rule spl_color_rule_rgb(double white)
@@ -115,7 +120,7 @@ int spl_rows_emit(const struct spl_rows *rows, uint64_t first, const struct spl_
                   const struct spl_source *source, struct spl_cloud_info *info, struct spl_point_batch *batch,
                   struct spl_error *err)
 {
-    size_t n = batch->count;
+    size_t n = batch->count, of[SPL_ROWS]; /* of[i]: the row of batch's point n + i */
     bool normals = info->attributes & SPL_CLOUD_NORMAL, classes = info->attributes & SPL_CLOUD_CLASS;
 
     spl_assert(batch->capacity - n >= rows->count);
@@ -140,8 +145,12 @@ int spl_rows_emit(const struct spl_rows *rows, uint64_t first, const struct spl_
         double class = classes ? rows->value[SPL_COLUMN_CLASS][r] : 0;
         batch->classification[n] = class >= 0 && class < 255.5 ? (uint8_t) class : 0;
         batch->station[n] = rows->station;
+        of[n - batch->count] = r;
         n++;
     }
+    for (int s = 0; s < SPL_SCALAR_COUNT; s++)
+        for (size_t i = batch->count; info->scalars >> s & 1 && i < n; i++)
+            batch->scalar[s][i] = rows->value[SPL_COLUMN_INTENSITY + s][of[i - batch->count]];
     batch->count = n;
     return SPL_OK;
 }

@@ -17,12 +17,15 @@ enum spl_column {
     SPL_COLUMN_NX,
     SPL_COLUMN_NY,
     SPL_COLUMN_NZ,
-    SPL_COLUMN_INTENSITY,
     SPL_COLUMN_CLASS,
-    SPL_COLUMN_COUNT
+    SPL_COLUMN_INTENSITY, /* from here on: as enum spl_scalar */
+    SPL_COLUMN_RETURN,
+    SPL_COLUMN_RETURNS,
+    SPL_COLUMN_KEPT, /* the first of SPL_KEPT_MAX, in the order of struct spl_keep */
+    SPL_COLUMN_COUNT = SPL_COLUMN_KEPT + SPL_KEPT_MAX
 };
 
-enum { SPL_ROWS = 256 }; /* so that all columns stay in the first-level cache */
+enum { SPL_ROWS = 256 }; /* so that the columns of a file stay in the first-level cache */
 
 struct spl_rows {
     size_t count;
@@ -38,7 +41,8 @@ struct spl_color_rule {
     double limit; /* RGB: values above it contradict the rule */
 };
 
-/* The column that a property or header name means ("Red", "diffuse_red", "scalar_Intensity", "nx", …), else SKIP. */
+/* The column that a property or header name means ("Red", "diffuse_red", "scalar_Intensity", "nx", …), else SKIP; what
+ * is kept beside them is known by spl_keep_find_column(). */
 int spl_column_from_name(const char *name, size_t length);
 const char *spl_column_name(int column);
 

@@ -4,6 +4,7 @@
  * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
 #include "cloud/text.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -68,13 +69,27 @@ static int check_count(const struct spl_source *source, uint64_t count, struct s
     return SPL_OK;
 }
 
+/* The names that columns are found by. */
+static void name_fields(struct spl_cloud *cloud, const char *line, size_t length)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
+    size_t name;
+    cloud->fields[0] = 0;
+    cloud->fields_cut = false;
+    while (spl_fields_text(&fields, &name) == SPL_FIELD_OK)
+        spl_cloud_name_field(cloud, fields.start, name);
+}
+
 /* A comment before the first line may carry the names ("//X Y Z R G B"). */
-static bool names_in_comment(struct spl_layout *layout, const char *line, size_t length)
+static bool names_in_comment(struct spl_cloud *cloud, struct spl_layout *layout, const char *line, size_t length)
 {
     const char *end = line + length;
     while (line < end && (*line == '/' || *line == '#' || *line == ' ' || *line == '\t'))
         line++;
-    return spl_layout_from_names(layout, line, (size_t)(end - line)) && spl_layout_lacks(layout) < 0;
+    if (!spl_layout_from_names(layout, &cloud->keep, line, (size_t)(end - line)) || spl_layout_lacks(layout) >= 0)
+        return false;
+    name_fields(cloud, line, (size_t)(end - line));
+    return true;
 }
 
 /* A header that names no x, y or z. */
@@ -105,8 +120,10 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
     int code;
 
     *named = option;
-    if (option && (code = spl_layout_from_option(layout, cloud->options->columns, err)) < 0)
+    if (option && (code = spl_layout_from_option(layout, &cloud->keep, cloud->options->columns, err)) < 0)
         return code;
+    if (option)
+        name_fields(cloud, cloud->options->columns, strlen(cloud->options->columns));
     for (;;) {
         text->start = spl_source_tell(source);
         text->start_line = source->line;
@@ -118,7 +135,7 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
         if (spl_fields_blank(*line, *length))
             continue;
         if (comment_mark(*line, *length)) {
-            if (!*named && names_in_comment(&commented, *line, *length)) {
+            if (!*named && names_in_comment(cloud, &commented, *line, *length)) {
                 *layout = commented;
                 *named = true;
             }
@@ -138,10 +155,11 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
         header = true;
         if (option)
             continue;
-        if (!spl_layout_from_names(layout, *line, *length))
+        if (!spl_layout_from_names(layout, &cloud->keep, *line, *length))
             return spl_source_fail_line(source, source->line, "", err, "more than %d columns", SPL_TEXT_FIELDS);
         if (spl_layout_lacks(layout) >= 0)
             return refuse_names(cloud, *line, *length, err);
+        name_fields(cloud, *line, *length);
         *named = true;
     }
 }
@@ -219,17 +237,33 @@ static bool is_decimal_comma(const struct spl_fields *fields)
     return parted && p < end && *p && strchr(digits, *p);
 }
 
-static int refuse_number(const struct spl_source *source, const struct spl_layout *layout, unsigned column,
+static int refuse_number(const struct spl_cloud *cloud, const struct spl_layout *layout, unsigned column,
                          const struct spl_fields *fields, struct spl_error *err)
 {
+    const struct spl_source *source = &cloud->source;
     char shown[32];
     const char *text = spl_fields_show(fields, shown);
-    return spl_source_fail_line(source, source->line, spl_column_name(layout->column[column]), err,
+    return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, layout->column[column]), err,
                                 "\"%s\" in column %u is not a number%s", text, column + 1,
                                 is_decimal_comma(fields)
                                     ? "; decimal commas are not read: write 1.5 for 1,5 (sed 's/,/./g' where commas do "
                                       "not separate the columns)"
                                     : "");
+}
+
+/* Is the field that no number was found in a blank between separators, or behind the line's last,
+ * where one more is due? */
+static bool is_empty(const struct spl_fields *fields, bool is_last, const char *line, size_t length)
+{
+    if (fields->separator == ' ')
+        return false;
+    if (fields->start < fields->end)
+        return *fields->start == fields->separator;
+    if (!is_last)
+        return false;
+    while (length > 0 && (line[length - 1] == ' ' || line[length - 1] == '\t'))
+        length--;
+    return length > 0 && line[length - 1] == fields->separator;
 }
 
 static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char *line, size_t length,
@@ -245,11 +279,16 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
         int column = layout->column[i];
         enum spl_field got =
             column >= 0 ? spl_fields_number(&fields, &rows->value[column][row]) : spl_fields_text(&fields, &ignored);
+        if (got != SPL_FIELD_OK && column >= SPL_COLUMN_INTENSITY &&
+            is_empty(&fields, i + 1 == layout->fields, line, length)) {
+            rows->value[column][row] = (double)NAN;
+            got = spl_fields_text(&fields, &ignored) == SPL_FIELD_BAD ? SPL_FIELD_BAD : SPL_FIELD_OK;
+        }
         if (got == SPL_FIELD_END)
-            return spl_source_fail_line(source, source->line, spl_column_name(column), err,
+            return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, column), err,
                                         "column %u of %u is missing", i + 1, layout->fields);
         if (got == SPL_FIELD_BAD)
-            return refuse_number(source, layout, i, &fields, err);
+            return refuse_number(cloud, layout, i, &fields, err);
     }
     if (layout->exact && !spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))
         return spl_source_fail_line(source, source->line, "", err, "has more than the %u columns of the lines before",

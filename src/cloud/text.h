@@ -17,13 +17,14 @@ struct spl_layout {
 char spl_text_separator(const char *line, size_t length);
 
 /* From a line of names. False when there are more than SPL_TEXT_FIELDS; unknown names are skipped columns. */
-bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t length);
+bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *keep, const char *line, size_t length);
 
 /* Does a header line name longitudes or latitudes? */
 bool spl_text_names_degrees(const char *line, size_t length);
 
 /* From the option "x,y,z,-,…": unknown names are refused, SPL_E_USAGE, field "columns". */
-int spl_layout_from_option(struct spl_layout *layout, const char *columns, struct spl_error *err);
+int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
+                           struct spl_error *err);
 
 /* What the first lines look like, from which nameless columns are recognised. Zero-initialised. */
 struct spl_text_sample {

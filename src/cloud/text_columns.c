@@ -22,6 +22,14 @@ static bool has_column(const struct spl_layout *layout, int column)
     return false;
 }
 
+static uint32_t taken(const struct spl_layout *layout)
+{
+    uint32_t columns = 0;
+    for (unsigned i = 0; i < layout->fields; i++)
+        columns |= layout->column[i] >= 0 ? 1u << layout->column[i] : 0;
+    return columns;
+}
+
 int spl_layout_lacks(const struct spl_layout *layout)
 {
     for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
@@ -68,7 +76,7 @@ bool spl_text_names_degrees(const char *line, size_t length)
     return false;
 }
 
-bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t length)
+bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *keep, const char *line, size_t length)
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length)), again = fields;
     size_t name;
@@ -76,8 +84,7 @@ bool spl_layout_from_names(struct spl_layout *layout, const char *line, size_t l
     while (spl_fields_text(&fields, &name) == SPL_FIELD_OK) {
         if (layout->fields == SPL_TEXT_FIELDS)
             return false;
-        int column = spl_column_from_name(fields.start, name);
-        layout->column[layout->fields] = (int8_t)(has_column(layout, column) ? SPL_COLUMN_SKIP : column);
+        layout->column[layout->fields] = (int8_t)spl_keep_find_column(keep, taken(layout), fields.start, name);
         layout->fields++;
     }
     take_synonyms(layout, again);
@@ -102,23 +109,25 @@ static int check_threes(const struct spl_layout *layout, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_layout_from_option(struct spl_layout *layout, const char *columns, struct spl_error *err)
+int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
+                           struct spl_error *err)
 {
     struct spl_fields fields = spl_fields_begin(columns, strlen(columns), ',');
     enum spl_field got;
     size_t length;
     *layout = (struct spl_layout){0};
     while ((got = spl_fields_text(&fields, &length)) == SPL_FIELD_OK) {
-        int column = spl_column_from_name(fields.start, length);
+        int known = spl_column_from_name(fields.start, length);
+        int column = spl_keep_find_column(keep, taken(layout), fields.start, length);
         if (layout->fields == SPL_TEXT_FIELDS)
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: more than %d names", SPL_TEXT_FIELDS);
-        if (column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
+        if (known == SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
             return spl_fail_field(err, SPL_E_USAGE, "columns",
-                                  "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class, or - "
-                                  "to skip a column",
+                                  "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class "
+                                  "return_number number_of_returns, nor named by --keep; - skips a column",
                                   length < 40 ? (int)length : 40, fields.start);
-        if (column != SPL_COLUMN_SKIP && has_column(layout, column))
-            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is named twice", spl_column_name(column));
+        if (known != SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP)
+            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s is named twice", spl_column_name(known));
         layout->column[layout->fields++] = (int8_t)column;
     }
     int lacks = spl_layout_lacks(layout);

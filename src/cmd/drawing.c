@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "dataset/dataset.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -13,6 +14,12 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
     spl_renderer_options_init(&drawing->renderer);
     spl_view_init(&drawing->view);
     drawing->view.layers = 1u << SPL_LAYER_COLOR;
+}
+
+void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset)
+{
+    snprintf(drawing->encode.unit, sizeof drawing->encode.unit, "%s",
+             spl_unit_word(spl_dataset_get_info(dataset)));
 }
 
 static const char *name_of_layer(int layer)

@@ -23,6 +23,9 @@ struct spl_cmd_drawing {
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height);
 
+/* What a depth PNG says that its steps are of. */
+void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
+
 /* `take` of rows. */
 int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err);

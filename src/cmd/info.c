@@ -16,6 +16,7 @@
 #include "cmd/info_report.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/dataset.h"
 
 static const char bar[] = "########################################";
 enum { bar_max = sizeof bar - 1 };
@@ -184,7 +185,7 @@ static void print_table(const struct spl_info_report *report)
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
-    printf("  splat radius  %.4g (median)\n", info->splat_radius);
+    printf("  splat radius  %.4g %s (median)\n", info->splat_radius, spl_unit_word(info));
     printf("  pages         %s, %.1f MB resident\n\n", grouped(info->pages, a), (double)info->page_bytes / 1e6);
 
     printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");

@@ -14,6 +14,7 @@
 
 #include "cmd/drawing.h"
 #include "cmd/output.h"
+#include "dataset/dataset.h"
 #include "geom/size.h"
 
 struct arguments {
@@ -57,9 +58,9 @@ static const struct spl_cmd_table table = {
         "Renders one view of a packed dataset. Without a camera it is the dataset's default view.\n\n"
         "A first look:\n"
         "  splatd render courtyard.spld -o view.jpg\n"
-        "From a place, towards a place, metric depth in millimetres:\n"
+        "From a place, towards a place, depth in thousandths of the dataset's unit:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --fov 70 --layer depth -o depth.png\n"
-        "A calibrated camera, float depth in metres, nothing = NaN:\n"
+        "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
         "Cut out, four samples a pixel side, to another program:\n"
@@ -135,7 +136,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
     if (encoded->far > 0 && a->drawing.layer != SPL_LAYER_COVERAGE)
-        fprintf(stderr, "splatd: colours from %g (light) to %g (dark)\n", (double)encoded->near, (double)encoded->far);
+        fprintf(stderr, "splatd: colours from %g (light) to %g %s (dark)\n", (double)encoded->near,
+                (double)encoded->far, spl_unit_word(info));
 }
 
 static int render(struct arguments *a, struct spl_error *err)
@@ -147,6 +149,8 @@ static int render(struct arguments *a, struct spl_error *err)
     int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_camera(a, dataset, err);
+    if (!rc)
+        spl_cmd_drawing_set_unit(&a->drawing, dataset);
     if (!rc)
         rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
     if (!rc)

@@ -83,7 +83,7 @@ static const struct spl_cmd_table table = {
         "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
         "Ten seconds between keyframes, slow at both ends, at another size:\n"
         "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
-        "Metric depth images of a recorded trajectory, one a pose, into a folder:\n"
+        "Depth images of a recorded trajectory, one a pose, into a folder:\n"
         "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n",
     .options = options,
     .count = sizeof options / sizeof *options,
@@ -215,6 +215,8 @@ static int run(struct arguments *a, struct spl_error *err)
     int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_cameras(a, dataset, err);
+    if (!rc)
+        spl_cmd_drawing_set_unit(&a->drawing, dataset);
     if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
         rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->drawing.output);
     if (!rc)

@@ -5,6 +5,7 @@
 #include <splatd/dataset.h>
 
 #include <stdatomic.h>
+#include <string.h>
 
 #include <jansson.h>
 
@@ -13,6 +14,12 @@
 #include "dataset/streams.h"
 #include "dataset/tables.h"
 #include "sparse/dictionary.h"
+
+/* The unit of info's lengths, for people and programs alike: "m", "ft" …, "unit" where nobody knows. */
+static inline const char *spl_unit_word(const struct spl_dataset_info *info)
+{
+    return !*info->unit || !strcmp(info->unit, "unknown") ? "unit" : info->unit;
+}
 
 /* How to open one. */
 struct spl_dataset_opening {

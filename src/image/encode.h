@@ -11,7 +11,9 @@ int spl_encode_jpeg(const struct spl_image *image, int quality, int chroma, stru
                     struct spl_error *err);
 int spl_encode_webp(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err);
 extern const bool spl_webp_is_built;
-int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err);
+/* depth_scale and unit of `options` count; the scale is above 0. */
+int spl_encode_png(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                   struct spl_error *err);
 int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
 int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
 

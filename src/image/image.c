@@ -132,7 +132,7 @@ static int encode(const struct spl_image *image, const struct spl_encode_options
                              out, err);
         break;
     case SPL_FORMAT_PNG:
-        rc = spl_encode_png(image, options->depth_scale > 0 ? options->depth_scale : default_depth_scale, out, err);
+        rc = spl_encode_png(image, options, out, err);
         break;
     case SPL_FORMAT_WEBP:
         rc = spl_encode_webp(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
@@ -171,6 +171,8 @@ int spl_image_encode(const struct spl_image *image, const struct spl_encode_opti
         rc = check(image, &known, err);
     if (rc)
         return rc;
+    if (known.depth_scale == 0)
+        known.depth_scale = default_depth_scale;
     if (!image->row_bytes)
         return encode(image, &known, out, err);
     struct spl_image packed;

@@ -63,7 +63,7 @@ static int fail(const struct spl_image *image, int status, struct spl_error *err
     return spl_fail(err, SPL_E_INTERNAL, "PNG encoding failed: %s", spng_strerror(status));
 }
 
-static int compress(const struct spl_image *image, const struct shape *shape, double depth_scale,
+static int compress(const struct spl_image *image, const struct shape *shape, const struct spl_encode_options *options,
                     struct spl_encoded *out, struct spl_error *err)
 {
     struct spng_alloc allocator = {allocate, reallocate, allocate_zeroed, free};
@@ -75,9 +75,9 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
         .width = image->width, .height = image->height, .bit_depth = shape->bit_depth, .color_type = shape->color_type};
     size_t bytes = (size_t)image->width * image->height * shape->pixel_bytes;
     /* what the numbers of a depth image mean travels with the file; libspng borrows the text until it is encoded */
-    char text[96];
-    int length =
-        snprintf(text, sizeof text, "%.17g steps per unit, 0 = nothing, 65535 = that far or farther", depth_scale);
+    char text[128];
+    int length = snprintf(text, sizeof text, "%.17g steps per %.*s, 0 = nothing, 65535 = that far or farther",
+                          options->depth_scale, (int)sizeof options->unit, *options->unit ? options->unit : "unit");
     struct spng_text note = {.keyword = "Depth-Scale", .type = SPNG_TEXT, .length = (size_t)length, .text = text};
 
     int status = spng_set_png_stream(ctx, append, &sink);
@@ -99,11 +99,12 @@ static int compress(const struct spl_image *image, const struct shape *shape, do
     return status ? fail(image, sink.refused ? SPNG_EMEM : status, err) : SPL_OK;
 }
 
-int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl_encoded *out, struct spl_error *err)
+int spl_encode_png(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                   struct spl_error *err)
 {
     struct shape shape = {SPNG_COLOR_TYPE_TRUECOLOR_ALPHA, 8, image->pixels, 4};
     if (image->layer == SPL_LAYER_COLOR || image->layer == SPL_LAYER_ID)
-        return compress(image, &shape, depth_scale, out, err);
+        return compress(image, &shape, options, out, err);
 
     size_t count = (size_t)image->width * image->height;
     shape.color_type = image->layer == SPL_LAYER_NORMAL ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_GRAYSCALE;
@@ -117,10 +118,10 @@ int spl_encode_png(const struct spl_image *image, double depth_scale, struct spl
         spl_convert_coverage(image->pixels, count, picture);
     } else {
         shape.bit_depth = 16;
-        out->saturated = spl_convert_depth16(image->pixels, count, depth_scale, picture);
+        out->saturated = spl_convert_depth16(image->pixels, count, options->depth_scale, picture);
     }
     shape.pixels = picture;
-    int rc = compress(image, &shape, depth_scale, out, err);
+    int rc = compress(image, &shape, options, out, err);
     free(picture);
     return rc;
 }

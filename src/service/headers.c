@@ -49,7 +49,7 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
     spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
-    spl_headers_add(headers, "Splatd-Depth-Unit", "m");
+    spl_headers_add(headers, "Splatd-Depth-Unit", "%s", request->encode.unit);
     switch (format) {
     case SPL_FORMAT_PNG:
         spl_headers_add(headers, "Splatd-Depth-Scale", "%.17g", request->encode.depth_scale);
@@ -93,5 +93,6 @@ void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_req
         spl_headers_add(headers, "Content-Type", "%s", spl_container_media_type(request->container));
     else
         spl_headers_add_layer(headers, request, request->layer, encoded);
+    spl_headers_add(headers, "Splatd-Unit", "%s", request->encode.unit);
     spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
 }

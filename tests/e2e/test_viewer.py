@@ -243,8 +243,10 @@ def test_clicks_give_coordinates_and_a_distance():
             assert abs(px - 0.2 * math.sin(py)) < 0.03, "not on the wall"
             assert abs(py - u * (3 - px) / focal) < 0.01 and abs(pz - (1 - v * (3 - px) / focal)) < 0.01, (a, b)
         said = tab.text("#said")
-        told = float(re.search(r"distance ([\d.]+) mm", said).group(1)) / 1000
+        told = float(re.search(r"distance ([\d.]+) us-ft$", said).group(1))
         assert abs(told - far(a, b)) < 0.003, (said, a, b)
+        assert tab.text(".marks text") == f"{said.rpartition('distance ')[2]}"
+        assert re.search(r"[\d.]+ × [\d.]+ × [\d.]+ us-ft, drawn", tab.text("#about")), tab.text("#about")
         circle = tab.run("+document.querySelector('.marks circle').getAttribute('cx')")
         tab.drag((x, y), (x + 50, y))
         assert tab.run("+document.querySelector('.marks circle').getAttribute('cx')") != circle
@@ -267,10 +269,9 @@ def test_layers_methods_and_budgets():
         tab.choose("#layer", "depth")
         digest = settled(tab, digest)
         tab.until("!document.querySelector('#legend').hidden")
-        near, distant = (
-            float(x.split()[0])
-            for x in tab.run("[...document.querySelectorAll('#legend span')].map(e => e.textContent)")
-        )
+        ends = tab.run("[...document.querySelectorAll('#legend span')].map(e => e.textContent)")
+        assert all(x.endswith(" us-ft") for x in ends), ends
+        near, distant = (float(x.split()[0]) for x in ends)
         assert 2.7 < near < distant < 3.3, (near, distant)
         tab.choose("#layer", "color")
         digest = settled(tab, digest)

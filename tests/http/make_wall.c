@@ -1,7 +1,7 @@
-/* make_wall [--small | --large | --textured | --knot | --tree] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
+/* make_wall [--small | --large | --textured | --knot | --tree | --unit=UNIT] [--crs=CRS] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
  * half; --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16
  * atoms. --knot makes what once took long to open, --tree a ground of
- * several levels on many small pages. */
+ * several levels on many small pages. --unit= and --crs= are what the dataset says, nothing where they are empty. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +15,14 @@ enum { side_usual = 40, side_large = 600 };
 
 int main(int argc, char **argv)
 {
+    if (argc > 1 && !strncmp(argv[1], "--unit=", 7)) {
+        make_dataset_unit = argv[1][7] ? argv[1] + 7 : NULL;
+        argc--, argv++;
+    }
+    if (argc > 1 && !strncmp(argv[1], "--crs=", 6)) {
+        make_dataset_crs = argv[1][6] ? argv[1] + 6 : NULL;
+        argc--, argv++;
+    }
     const char *kind = argc > 1 ? argv[1] : "";
     int small = !strcmp(kind, "--small"), textured = !strcmp(kind, "--textured"), large = !strcmp(kind, "--large");
     int side = large ? side_large : side_usual;

@@ -6,6 +6,8 @@ import os
 import pathlib
 import re
 import struct
+import subprocess
+import tempfile
 import zipfile
 import zlib
 
@@ -56,7 +58,7 @@ def test_datasets_are_described():
         [short] = d.ask("/v1/datasets").json()["datasets"]
         full = d.ask("/v1/datasets/wall").json()
         assert {k: full[k] for k in short} == short
-        assert full["id"] == "wall" and full["view"] == VIEW and full["unit"] == "m"
+        assert full["id"] == "wall" and full["view"] == VIEW and full["unit"] == "us-ft"
         assert full["splats"] > 1600 and full["leaf_splats"] == 1600 and full["levels"] == 2
         assert full["bytes"] == os.path.getsize(WALL)
         assert re.fullmatch("[0-9a-f]{16}", full["version"])
@@ -143,14 +145,31 @@ def test_depth_headers_say_what_pixels_mean():
     with Daemon(REAL) as d:
         png = d.view(**LOOK, layer="depth", width=64, height=48).headers
         assert (png["Content-Type"], png["Splatd-Depth-Unit"], png["Splatd-Depth-Scale"], png["Splatd-Depth-Invalid"],
-                png["Splatd-Depth-Saturated"]) == ("image/png", "m", "1000", "0", "0")
+                png["Splatd-Depth-Saturated"]) == ("image/png", "us-ft", "1000", "0", "0")
         fine = d.view(**LOOK, layer="range", width=64, height=48, depth_scale=50000).headers
         assert fine["Splatd-Depth-Scale"] == "50000" and int(fine["Splatd-Depth-Saturated"]) > 100
         npy = d.view(**LOOK, layer="depth", width=64, height=48, format="npy").headers
-        assert (npy["Splatd-Depth-Unit"], npy["Splatd-Depth-Scale"], npy["Splatd-Depth-Invalid"]) == ("m", "1", "NaN")
+        assert (npy["Splatd-Depth-Unit"], npy["Splatd-Depth-Scale"], npy["Splatd-Depth-Invalid"]) == ("us-ft", "1", "NaN")
         jpeg = d.view(**LOOK, layer="depth", width=64, height=48, format="jpeg").headers
         assert 2 < float(jpeg["Splatd-Depth-Near"]) < float(jpeg["Splatd-Depth-Far"]) < 4
-        assert d.view(width=64, height=48).headers["Splatd-Depth-Unit"] is None
+        color = d.view(width=64, height=48)
+        assert color.headers["Splatd-Depth-Unit"] is None and color.headers["Splatd-Unit"] == "us-ft"
+        body = d.view(**LOOK, layer="depth", width=64, height=48).body
+        assert b"1000 steps per us-ft, 0 = nothing" in body
+        parts = d.view(**LOOK, layers="color,depth", width=64, height=48)
+        assert parts.headers["Splatd-Unit"] == "us-ft" and b"Splatd-Depth-Unit: us-ft" in parts.body
+        assert d.ask(f"{VIEW.replace('/view', '/pick')}?x=2&y=2").json()["unit"] == "us-ft"
+
+
+def test_who_does_not_know_the_unit_says_so():
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "wall.spld"
+        subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--unit=", "--crs=", path], check=True)
+        with Daemon(REAL, datasets=[str(path)]) as d:
+            assert d.ask("/v1/datasets/wall").json()["unit"] == "unit"
+            view = d.view(**LOOK, layer="depth", width=64, height=48)
+            assert view.headers["Splatd-Unit"] == view.headers["Splatd-Depth-Unit"] == "unit"
+            assert b"1000 steps per unit," in view.body
 
 
 def test_depth_is_metres_along_the_axis():

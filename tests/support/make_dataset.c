@@ -43,6 +43,7 @@ static void *must_have(void *p)
 
 double make_dataset_normal_error = M_PI / 180;
 size_t make_dataset_page_bytes = SPL_PAGE_BYTES;
+const char *make_dataset_unit = "us-ft", *make_dataset_crs = "EPSG:2263";
 
 /* Class and uncertainty of chunk `index`; returns the words that they take. */
 static uint32_t add_streams(struct build *b, size_t index, const struct make_splat *splats, uint32_t count,
@@ -202,13 +203,13 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
     else
         add_two_levels(&b, splats, count);
     json_t *meta =
-        json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:s, s:s, "
-                  "s:[s], s:{}}",
+        json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:s*, "
+                  "s:s*, s:[s], s:{}}",
                   "points", (json_int_t)discs, "leaf_splats", (json_int_t)discs, "levels", levels, "splat_radius",
                   (double)splats[discs / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
                   high[2], "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target",
                   middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "unit",
-                  "us-ft", "crs", "EPSG:2263", "sources", "made by a test", "pack");
+                  make_dataset_unit, "crs", make_dataset_crs, "sources", "made by a test", "pack");
     must_have(meta);
     spl_dataset_writer_set_streams(b.writer, streams, SPL_STREAM_KNOWN_COUNT);
     must(spl_dataset_writer_finish(b.writer, b.nodes, b.node_count, b.chunks, b.chunk_count, meta, &err), &err);

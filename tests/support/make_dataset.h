@@ -30,6 +30,9 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
 /* Mean error of the normals that follow, radians; default 1 degree. */
 extern double make_dataset_normal_error;
 
+/* What META of files that follow says; default "us-ft" and "EPSG:2263". NULL = nothing. */
+extern const char *make_dataset_unit, *make_dataset_crs;
+
 /* Bytes of the pages of files that follow; default SPL_PAGE_BYTES. 0 = a page for each node. */
 extern size_t make_dataset_page_bytes;
 

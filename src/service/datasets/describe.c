@@ -72,7 +72,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "state", json_string("ready"));
     set(json, "uri", json_string(entry->uri));
     set(json, "view", json_sprintf("%s/view", entry->uri));
-    set(json, "unit", json_string("m"));
+    set(json, "unit", json_string(spl_unit_word(info)));
     set(json, "splats", count(info->splats));
     set(json, "points", count(info->points));
     set(json, "bytes", count(info->file_bytes));

@@ -214,6 +214,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
     job->plan = entry->plan;
     job->request = tour->spec.view;
     job->request.view.camera = tour->spec.cameras[frame];
+    spl_view_set_unit(&job->request, entry->info);
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = SPL_NEVER; // views go first, however long that takes
     job->behind = true;

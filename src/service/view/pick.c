@@ -38,7 +38,7 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
     struct spl_pick pick;
     *out = (struct spl_encoded){.media_type = "application/json"};
     spl_pick_read(&request->pick.camera, x, y, frame, dataset, &pick);
-    json_t *json = json_pack("{s:f, s:f, s:s}", "x", x, "y", y, "unit", "m");
+    json_t *json = json_pack("{s:f, s:f, s:s}", "x", x, "y", y, "unit", request->encode.unit);
     if (json)
         fill(json, &pick);
     char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;

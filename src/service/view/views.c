@@ -1,10 +1,12 @@
 /* The life of the room of views, and what its routes check alike. Owned by the loop's thread, but for wake(). */
 #include "service/view/views.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "dataset/dataset.h"
 #include "service/datasets/library.h"
 #include "service/http.h"
 #include "service/ops/ops.h"
@@ -87,8 +89,14 @@ void spl_views_complete(struct spl_service *service)
     spl_http_pump(service);
 }
 
+void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_info *info)
+{
+    snprintf(view->encode.unit, sizeof view->encode.unit, "%s", spl_unit_word(info));
+}
+
 int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
+    spl_view_set_unit(view, info);
     if (view->versioned && view->version != info->version)
         return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);

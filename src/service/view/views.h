@@ -34,6 +34,9 @@ void spl_views_finish(struct spl_service *service);
 /* Hands out every job that is done. */
 void spl_views_complete(struct spl_service *service);
 
+/* What lengths of the view are in, for its headers and files: view->encode.unit. check_dataset() does it as well. */
+void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_info *info);
+
 /* What views, batches and tours of them check alike. The first: a URL that names a version means that one, whatever is
  * served by now; layers that the dataset does not have are refused, or, of picks, left out. */
 int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err);

@@ -115,6 +115,11 @@ static void png_depth_is_16_bit_with_scale_and_saturation(void **state)
     free(decoded);
     spl_encoded_finish(&png);
 
+    png = ENCODE(&image, .format = SPL_FORMAT_PNG, .unit = "us-ft");
+    free(decode_png(&png, &header, note));
+    assert_string_equal(note, "1000 steps per us-ft, 0 = nothing, 65535 = that far or farther");
+    spl_encoded_finish(&png);
+
     /* TUM's scale; 13.2 m no longer fits */
     image.layer = SPL_LAYER_RANGE;
     depth[3] = 13.2f;
