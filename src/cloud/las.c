@@ -178,7 +178,9 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     cloud->info.format = compressed ? "LAZ" : "LAS";
-    if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count, 0, err)) < 0)
+    cloud->slow_rows = compressed;
+    if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count,
+                                                  cloud->options->threads, cloud->options->cancelled, err)) < 0)
         return code;
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;

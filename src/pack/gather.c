@@ -112,17 +112,33 @@ static void grow_box(struct spl_scan *scan, const struct spl_point_batch *batch)
         }
 }
 
+/* A scan's points, of which `first` was the first one. */
+static void forget(struct spl_points *p, size_t first, struct spl_scan *scan, struct spl_stage *stage)
+{
+    p->points_read -= p->count - first;
+    p->count = first;
+    for (int c = 0; c < 3; c++) {
+        scan->min[c] = INFINITY;
+        scan->max[c] = -INFINITY;
+    }
+    atomic_store(&stage->done, 0);
+}
+
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
                        struct spl_scan *scan, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
-    struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors};
+    struct spl_cloud_options options = {.columns = scans->columns,
+                                        .intensity = scans->intensity,
+                                        .colors = &scan->colors,
+                                        .threads = stage->threads,
+                                        .cancelled = stage->cancelled};
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
+    size_t first = p->count;
     char name[128];
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
@@ -130,6 +146,12 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     if (info->points_expected && info->points_expected < UINT32_MAX - 1 - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
+        if (rc == SPL_CLOUD_AGAIN) {
+            forget(p, first, scan, stage);
+            scan->colors = info->colors;
+            rc = 0;
+            continue;
+        }
         spl_stage_add(stage, batch->count, 0);
         grow_box(scan, batch);
         rc = append(p, batch, attributes, p->station_count, scan->path, err);

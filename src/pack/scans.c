@@ -86,7 +86,11 @@ static void share_intensities(struct spl_scans *scans)
 int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
                    bool intensity, struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    const struct spl_cloud_options options = {.columns = columns,
+                                              .intensity = intensity,
+                                              .threads = stage->threads,
+                                              .cancelled = stage->cancelled,
+                                              .sample_colors = true};
     int rc = SPL_OK;
     *scans = (struct spl_scans){.count = count, .columns = columns, .intensity = intensity};
     scans->list = spl_alloc(count, sizeof *scans->list, err);

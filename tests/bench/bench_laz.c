@@ -58,7 +58,7 @@ static int measure(struct opened *f, uint32_t wanted, unsigned threads, double *
             const uint8_t *records;
             size_t count;
             struct spl_error err = {0};
-            if (spl_laz_stream_open(&stream, &f->source, &f->format, f->points_at, f->points, threads, &err))
+            if (spl_laz_stream_open(&stream, &f->source, &f->format, f->points_at, f->points, threads, NULL, &err))
                 return -1;
             do {
                 if (spl_laz_stream_read(stream, wanted, &records, 65536, &count, &err))

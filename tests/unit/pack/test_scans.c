@@ -14,6 +14,8 @@
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "pack/points.h"
+#include "support/laz_writer.h"
 
 static char folder[] = "/tmp/splatd-scans-XXXXXX";
 static char said[8192];
@@ -314,6 +316,48 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
+/* 6000 points in chunks of 2000, their red 7 but for `high` at point 5000. */
+static char *write_laz(const char *name, uint16_t high)
+{
+    static const uint32_t chunks[] = {2000, 2000, 2000, 0};
+    struct spl_laz_format format = laz_format(2, 0, 2, 2000);
+    uint8_t *records = laz_make_records(&format, 6000, 1);
+    char *path = path_of(name);
+    for (size_t i = 0; i < 6000; i++) {
+        memset(records + i * 26 + 20, 0, 6);
+        records[i * 26 + 20] = i == 5000 ? high & 255 : 7;
+        records[i * 26 + 21] = i == 5000 ? high >> 8 : 0;
+    }
+    struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(file.bytes, 1, file.count, f), file.count);
+    assert_int_equal(fclose(f), 0);
+    free(file.bytes);
+    free(records);
+    return path;
+}
+
+/* A file whose first colours mislead is read again, and what was read of it is forgotten; that of others is not. */
+static void test_brighter_than_the_first(void **state)
+{
+    const char *inputs[] = {write_laz("dark.laz", 8), write_laz("late.laz", 65535)};
+    struct spl_stage stage = {.threads = 1};
+    struct spl_scans scans;
+    struct spl_points points = {0};
+    (void)state;
+    assert_int_equal(spl_scans_init(&scans, inputs, 2, NULL, false, &stage, NULL), 0);
+    assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
+    assert_int_equal(points.count, 12000);
+    assert_int_equal(points.points_read, 12000);
+    assert_true(scans.list[0].colors.white == 255 && scans.list[1].colors.white == 65535);
+    assert_int_equal(scans.list[1].points_from[SPL_COLORS_RGB], 6000);
+    for (size_t i = 0; i < 12000; i++)
+        assert_int_equal(points.color_class[i] & 0xffffff, i == 11000 ? 255 : i == 5000 ? 8 : i < 6000 ? 7 : 0);
+    spl_points_finish(&points);
+    spl_scans_finish(&scans);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -325,6 +369,7 @@ int main(void)
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
         cmocka_unit_test(test_coarse_floats),
+        cmocka_unit_test(test_brighter_than_the_first),
     };
     if (!mkdtemp(folder))
         return 1;
