@@ -52,18 +52,17 @@ struct spl_laz_model *spl_laz_model_create(struct spl_laz_arena *arena, struct s
     return *slot = m;
 }
 
-/* The symbol of each entry's least place. */
+/* The symbol of each entry's least place: each symbol marks the first entry from its start on, and holds up to the
+ * next mark. */
 static void fill_firsts(struct spl_laz_model *m)
 {
-    unsigned entries = firsts_for(m->symbols), next = 0;
-    for (unsigned i = 0; i < m->symbols; i++) {
-        /* the first entry whose least place is not below the symbol's */
-        unsigned from = (unsigned)(m->start[i] + 32768 + (1 << m->shift) - 1) >> m->shift;
-        for (; next < from; next++)
-            m->first[next] = (uint16_t)(i - 1);
-    }
-    for (; next < entries; next++)
-        m->first[next] = (uint16_t)(m->symbols - 1);
+    unsigned entries = firsts_for(m->symbols);
+    uint16_t now = 0;
+    memset(m->first, 0, entries * sizeof *m->first);
+    for (unsigned i = 0; i < m->symbols; i++)
+        m->first[(unsigned)(m->start[i] + 32768 + (1 << m->shift) - 1) >> m->shift] = (uint16_t)i;
+    for (unsigned e = 0; e < entries; e++)
+        m->first[e] = now = m->first[e] > now ? m->first[e] : now;
 }
 
 /* The last symbol is none, since what rounding leaves over is its own too. */
