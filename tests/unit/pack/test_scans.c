@@ -199,7 +199,7 @@ static void test_kinds_are_said_and_remembered(void **state)
     assert_null(strstr(pack_two(b, b, true, NULL), "--intensity"));
     char *bare = write_ply("bare.ply", 10, "", ""); /* names are lent for a few calls */
     assert_non_null(strstr(pack_two(bare, NULL, true, NULL), "--intensity changes nothing"));
-    assert_non_null(strstr(pack_two(bare, bare, true, NULL), "colours are none at all in 2"));
+    assert_non_null(strstr(pack_two(bare, bare, true, NULL), "colours are none at all in 1"));
     assert_null(strstr(pack_two(bare, NULL, false, NULL), "--intensity"));
 }
 
@@ -341,12 +341,14 @@ static char *write_laz(const char *name, uint16_t high)
 /* A file whose first colours mislead is read again, and what was read of it is forgotten; that of others is not. */
 static void test_brighter_than_the_first(void **state)
 {
-    const char *inputs[] = {write_laz("dark.laz", 8), write_laz("late.laz", 65535)};
+    const char *paths[] = {write_laz("dark.laz", 8), write_laz("late.laz", 65535)};
+    struct spl_inputs inputs;
     struct spl_stage stage = {.threads = 1};
     struct spl_scans scans;
     struct spl_points points = {0};
     (void)state;
-    assert_int_equal(spl_scans_init(&scans, inputs, 2, NULL, false, &stage, NULL), 0);
+    assert_int_equal(spl_inputs_find(&inputs, paths, 2, &(struct spl_inputs_listener){0}, NULL), 0);
+    assert_int_equal(spl_scans_init(&scans, &inputs, NULL, false, NULL, &stage, NULL), 0);
     assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
     assert_int_equal(points.count, 12000);
     assert_int_equal(points.points_read, 12000);
@@ -356,6 +358,7 @@ static void test_brighter_than_the_first(void **state)
         assert_int_equal(points.color_class[i] & 0xffffff, i == 11000 ? 255 : i == 5000 ? 8 : i < 6000 ? 7 : 0);
     spl_points_finish(&points);
     spl_scans_finish(&scans);
+    spl_inputs_finish(&inputs);
 }
 
 int main(void)
