@@ -348,7 +348,7 @@ static void test_brighter_than_the_first(void **state)
     struct spl_points points = {0};
     (void)state;
     assert_int_equal(spl_inputs_find(&inputs, paths, 2, &(struct spl_inputs_listener){0}, NULL), 0);
-    assert_int_equal(spl_scans_init(&scans, &inputs, NULL, false, NULL, &stage, NULL), 0);
+    assert_int_equal(spl_scans_init(&scans, &inputs, NULL, false, &(struct spl_keep){0}, &stage, NULL), 0);
     assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
     assert_int_equal(points.count, 12000);
     assert_int_equal(points.points_read, 12000);
