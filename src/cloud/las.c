@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "base/memory.h"
 #include "cloud/las_fields.h"
 #include "cloud/laz/stream.h"
@@ -112,6 +113,21 @@ static int check_transform(struct spl_cloud *cloud, const uint8_t *h, struct spl
     return SPL_OK;
 }
 
+/* Of a table that is done without whoever opens the file first is told. */
+static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *format, uint64_t points_at,
+                       struct spl_error *err)
+{
+    const struct spl_cloud_options *options = cloud->options;
+    struct las *las = cloud->state;
+    int code = spl_laz_stream_open(&las->stream, &cloud->source, format, points_at, las->count, options->threads,
+                                   options->cancelled, err);
+    const struct spl_laz_fault *wrong = code < 0 || options->colors ? NULL : spl_laz_stream_get_warning(las->stream);
+    if (wrong)
+        spl_log_warn("%s: offset %llu: %s: %s; chunks are read one after the other", cloud->source.path,
+                     (unsigned long long)wrong->at, wrong->field, wrong->reason);
+    return code;
+}
+
 static int las_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct spl_source *source = &cloud->source;
@@ -179,8 +195,7 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     cloud->info.format = compressed ? "LAZ" : "LAS";
     cloud->slow_rows = compressed;
-    if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count,
-                                                  cloud->options->threads, cloud->options->cancelled, err)) < 0)
+    if (compressed && (code = open_stream(cloud, &format, points_at, err)) < 0)
         return code;
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;

@@ -7,7 +7,6 @@
 
 #include <stdlib.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/work.h"
@@ -30,6 +29,7 @@ struct spl_laz_stream {
     struct spl_source *source; // borrowed
     struct spl_laz_format format;
     struct spl_laz_table table;
+    struct spl_laz_fault warning; /* of the table; field NULL: none */
     bool has_table, few;
     uint64_t begin, points, next; /* offset of the first chunk; points in all; the one to give */
     uint32_t wanted;
@@ -128,10 +128,15 @@ static int open_table(struct spl_laz_stream *s, uint64_t points_at, struct spl_e
     if (s->format.chunk_points == 0)
         return spl_source_fail_at(source, at + fault.at, fault.field, err, "%s; chunks of varying size need one",
                                   fault.reason);
+    fault.at += at;
     if (!interrupted)
-        spl_log_warn("%s: offset %llu: %s: %s; chunks are read one after the other", source->path,
-                     (unsigned long long)(at + fault.at), fault.field, fault.reason);
+        s->warning = fault;
     return SPL_OK;
+}
+
+const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stream *s)
+{
+    return s->warning.field ? &s->warning : NULL;
 }
 
 int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, const struct spl_laz_format *format,

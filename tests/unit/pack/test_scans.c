@@ -10,8 +10,10 @@
 
 #include <cmocka.h>
 
+#include <splatd/log.h>
 #include <splatd/pack.h>
 
+#include "cloud/laz/items.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "pack/points.h"
@@ -316,8 +318,8 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
-/* 6000 points in chunks of 2000, their red 7 but for `high` at point 5000. */
-static char *write_laz(const char *name, uint16_t high)
+/* 6000 points in chunks of 2000, their red 7 but for `high` at point 5000; the table's offset beyond the file or not. */
+static char *write_laz(const char *name, uint16_t high, bool lost)
 {
     static const uint32_t chunks[] = {2000, 2000, 2000, 0};
     struct spl_laz_format format = laz_format(2, 0, 2, 2000);
@@ -329,6 +331,7 @@ static char *write_laz(const char *name, uint16_t high)
         records[i * 26 + 21] = i == 5000 ? high >> 8 : 0;
     }
     struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
+    file.bytes[spl_laz_get32(file.bytes + 96) + 3] ^= lost ? 0x40 : 0;
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     assert_int_equal(fwrite(file.bytes, 1, file.count, f), file.count);
@@ -338,18 +341,29 @@ static char *write_laz(const char *name, uint16_t high)
     return path;
 }
 
-/* A file whose first colours mislead is read again, and what was read of it is forgotten; that of others is not. */
+static void count_warnings(void *context, enum spl_log_level level, const char *message)
+{
+    if (level == SPL_LOG_WARN && strstr(message, "dark.laz: offset") && strstr(message, "chunk table"))
+        ++*(unsigned *)context;
+}
+
+/* A file whose first colours mislead is read again, and what was read of it is forgotten; that of others is not. Each
+ * is opened twice; that a table is lost is said once. */
 static void test_brighter_than_the_first(void **state)
 {
-    const char *paths[] = {write_laz("dark.laz", 8), write_laz("late.laz", 65535)};
+    const char *paths[] = {write_laz("dark.laz", 8, true), write_laz("late.laz", 65535, false)};
+    unsigned warnings = 0;
     struct spl_inputs inputs;
     struct spl_stage stage = {.threads = 1};
     struct spl_scans scans;
     struct spl_points points = {0};
     (void)state;
+    spl_log_set_callback(count_warnings, &warnings);
     assert_int_equal(spl_inputs_find(&inputs, paths, 2, &(struct spl_inputs_listener){0}, NULL), 0);
     assert_int_equal(spl_scans_init(&scans, &inputs, NULL, false, &(struct spl_keep){0}, &stage, NULL), 0);
     assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
+    spl_log_set_callback(NULL, NULL);
+    assert_int_equal(warnings, 1);
     assert_int_equal(points.count, 12000);
     assert_int_equal(points.points_read, 12000);
     assert_true(scans.list[0].colors.white == 255 && scans.list[1].colors.white == 65535);
