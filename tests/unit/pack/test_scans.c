@@ -318,17 +318,19 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
-/* 6000 points in chunks of 2000, their red 7 but for `high` at point 5000; the table's offset beyond the file or not. */
+enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */
+
+/* Points in chunks of 10000, their red 7 but for `high` at one; the table's offset beyond the file or not. */
 static char *write_laz(const char *name, uint16_t high, bool lost)
 {
-    static const uint32_t chunks[] = {2000, 2000, 2000, 0};
-    struct spl_laz_format format = laz_format(2, 0, 2, 2000);
-    uint8_t *records = laz_make_records(&format, 6000, 1);
+    static const uint32_t chunks[] = {10000, 10000, 10000, 10000, 10000, 10000, 10000, 0};
+    struct spl_laz_format format = laz_format(2, 0, 2, 10000);
+    uint8_t *records = laz_make_records(&format, laz_points, 1);
     char *path = path_of(name);
-    for (size_t i = 0; i < 6000; i++) {
+    for (size_t i = 0; i < laz_points; i++) {
         memset(records + i * 26 + 20, 0, 6);
-        records[i * 26 + 20] = i == 5000 ? high & 255 : 7;
-        records[i * 26 + 21] = i == 5000 ? high >> 8 : 0;
+        records[i * 26 + 20] = i == laz_bright ? high & 255 : 7;
+        records[i * 26 + 21] = i == laz_bright ? high >> 8 : 0;
     }
     struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
     file.bytes[spl_laz_get32(file.bytes + 96) + 3] ^= lost ? 0x40 : 0;
@@ -364,12 +366,14 @@ static void test_brighter_than_the_first(void **state)
     assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
     spl_log_set_callback(NULL, NULL);
     assert_int_equal(warnings, 1);
-    assert_int_equal(points.count, 12000);
-    assert_int_equal(points.points_read, 12000);
+    assert_int_equal(points.count, 2 * laz_points);
+    assert_int_equal(points.points_read, 2 * laz_points);
     assert_true(scans.list[0].colors.white == 255 && scans.list[1].colors.white == 65535);
-    assert_int_equal(scans.list[1].points_from[SPL_COLORS_RGB], 6000);
-    for (size_t i = 0; i < 12000; i++)
-        assert_int_equal(points.color_class[i] & 0xffffff, i == 11000 ? 255 : i == 5000 ? 8 : i < 6000 ? 7 : 0);
+    assert_int_equal(scans.list[1].points_from[SPL_COLORS_RGB], laz_points);
+    for (size_t i = 0; i < laz_points; i++) {
+        assert_int_equal(points.color_class[i] & 0xffffff, i == laz_bright ? 8 : 7);
+        assert_int_equal(points.color_class[laz_points + i] & 0xffffff, i == laz_bright ? 255 : 0);
+    }
     spl_points_finish(&points);
     spl_scans_finish(&scans);
     spl_inputs_finish(&inputs);
