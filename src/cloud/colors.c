@@ -115,7 +115,8 @@ static struct spl_cloud_colors find_grey(double *sample, size_t count)
 static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
 {
     struct ranges ranges = {.colors = true};
-    bool sample = cloud->slow_rows && cloud->options->sample_colors;
+    /* of a part all points have a say, those too that are not read */
+    bool sample = cloud->slow_rows && cloud->options->sample_colors && !cloud->options->max_points;
     int code = sample ? cloud->reader->seek(cloud, 0, PARTS, err) : SPL_OK;
     if (code == SPL_OK && sample)
         code = scan(cloud, &ranges, FIRST_ROWS, true, err);
@@ -170,7 +171,7 @@ int spl_cloud_begin_again(struct spl_cloud *cloud, struct spl_point_batch *batch
     spl_cloud_set_colors(cloud, &colors);
     memset(cloud->info.points_from, 0, sizeof cloud->info.points_from);
     cloud->info.points_skipped = 0;
-    cloud->row = 0;
+    cloud->row = cloud->points_seen = 0;
     batch->count = 0;
     int code = cloud->reader->seek(cloud, 0, 1, err);
     return code < 0 ? code : SPL_CLOUD_AGAIN;

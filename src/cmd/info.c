@@ -160,7 +160,10 @@ static void print_table(const struct spl_info_report *report)
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
+    const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     printf("  points        %s read, %s kept\n", grouped(info->points, a), grouped(info->leaf_splats, b));
+    if (whole)
+        printf("  a part of     %s points of the sources\n", grouped((uint64_t)json_integer_value(whole), a));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);

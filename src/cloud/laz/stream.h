@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 
 #include "cloud/laz/decoder.h"
+#include "cloud/laz/table.h"
 #include "cloud/source.h"
 
 struct spl_laz_stream;
@@ -23,6 +24,12 @@ const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stre
 
 /* NULL-safe. */
 void spl_laz_stream_destroy(struct spl_laz_stream *stream);
+
+/* The table of chunks, NULL where there is none that can be trusted. Valid until the next call. */
+const struct spl_laz_table *spl_laz_stream_get_table(const struct spl_laz_stream *stream);
+
+/* Before the first read: leaves only the chunks with wanted[i] != 0 of its table; points are numbered anew. */
+void spl_laz_stream_choose(struct spl_laz_stream *stream, const uint8_t *wanted);
 
 /* The next 1 to `most` records, record_bytes each, valid until the next call; *count 0 at the end. Of layers only the
  * `wanted` ones (enum spl_laz_want); those may change after a seek alone. SPL_E_CANCELLED some ten

@@ -356,13 +356,14 @@ static void test_brighter_than_the_first(void **state)
     const char *paths[] = {write_laz("dark.laz", 8, true), write_laz("late.laz", 65535, false)};
     unsigned warnings = 0;
     struct spl_inputs inputs;
+    const struct spl_cloud_options how = {.keep = &(struct spl_keep){0}};
     struct spl_stage stage = {.threads = 1};
     struct spl_scans scans;
     struct spl_points points = {0};
     (void)state;
     spl_log_set_callback(count_warnings, &warnings);
     assert_int_equal(spl_inputs_find(&inputs, paths, 2, &(struct spl_inputs_listener){0}, NULL), 0);
-    assert_int_equal(spl_scans_init(&scans, &inputs, NULL, false, &(struct spl_keep){0}, &stage, NULL), 0);
+    assert_int_equal(spl_scans_init(&scans, &inputs, &how, &stage, NULL), 0);
     assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
     spl_log_set_callback(NULL, NULL);
     assert_int_equal(warnings, 1);
