@@ -171,7 +171,8 @@ int spl_cloud_begin_again(struct spl_cloud *cloud, struct spl_point_batch *batch
     spl_cloud_set_colors(cloud, &colors);
     memset(cloud->info.points_from, 0, sizeof cloud->info.points_from);
     cloud->info.points_skipped = 0;
-    cloud->row = cloud->points_seen = 0;
+    cloud->row = 0;
+    cloud->part_sum = cloud->part_of - cloud->part;
     batch->count = 0;
     int code = cloud->reader->seek(cloud, 0, 1, err);
     return code < 0 ? code : SPL_CLOUD_AGAIN;
