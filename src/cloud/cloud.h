@@ -71,6 +71,9 @@ struct spl_cloud_info {
     uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
     uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
     const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
+    char version[48];        /* of the format, and its kind: "1.4, point format 7"; "" = it has none */
+    double bounds[2][3];     /* least and most of the coordinates, as the header says, which may be wrong */
+    bool has_bounds;         /* it does */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */

@@ -98,24 +98,6 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-/* The batch's first point is number `first` of the scan. */
-static int grow_box(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
-{
-    for (size_t i = 0; i < batch->count; i++)
-        for (int c = 0; c < 3; c++) {
-            double v = batch->position[i][c];
-            if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(
-                    err, SPL_E_INPUT,
-                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
-                    "and columns",
-                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
-            scan->min[c] = fmin(scan->min[c], v);
-            scan->max[c] = fmax(scan->max[c], v);
-        }
-    return SPL_OK;
-}
-
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
                        struct spl_scan *scan, struct spl_stage *stage, struct spl_error *err)
 {
@@ -136,7 +118,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
-        rc = grow_box(scan, batch, p->points_read - first, err);
+        rc = spl_scan_grow(scan, batch, p->points_read - first, err);
         if (!rc)
             rc = append(p, batch, attributes, p->station_count, err);
         if (!rc)

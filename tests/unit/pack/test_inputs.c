@@ -300,7 +300,7 @@ static void test_what_is_missing_is_left_out(void **state)
     spl_inputs_finish(&inputs);
     write_text(path_of("list"), "b.ply\nnone\n");
     assert_int_equal(find(&inputs, at, true, &err), SPL_E_INPUT);
-    assert_non_null(strstr(err.message, "no scan is left of 2; the first: "));
+    assert_non_null(strstr(err.message, "none of the inputs can be used; the first of 2: "));
     /* a list that is none is nobody's to leave out */
     err = (struct spl_error){0};
     write_text(path_of("list"), "@a\na.ply");
@@ -452,7 +452,7 @@ static void test_the_broken_are_as_never_named(void **state)
         const char *broken[] = {all[0], all[first]};
         err = (struct spl_error){0};
         assert_int_equal(pack(broken, 2, true, path_of("none.spld"), &err), SPL_E_INPUT);
-        assert_non_null(strstr(err.message, "no scan is left of 2; the first: "));
+        assert_non_null(strstr(err.message, "none of the inputs can be used; the first of 2: "));
         assert_int_equal(files_like("none.spld"), 0);
     }
 }
@@ -532,7 +532,7 @@ static void test_the_command(void **state)
     assert_non_null(strstr(end, "0?[2J.ply: line 2: "));
     assert_null(strchr(output, '\033'));
     assert_int_equal(run("gone.ply none.ply --skip-broken -o none.spld", output, sizeof output), 2);
-    assert_non_null(strstr(output, "no scan is left of 2; the first: gone.ply: there is no such file"));
+    assert_non_null(strstr(output, "none of the inputs can be used; the first of 2: gone.ply: there is no such file"));
     assert_null(strstr(output, "were left out:"));
     assert_int_equal(files_like("none.spld"), 0);
     /* over a scan of the folder, whatever it is called */
