@@ -95,6 +95,9 @@ struct spl_pack_options {
     /* Each input that cannot be read, and why: the dataset is made of the others, META names it. NULL: the first one
      * fails all. */
     void (*left_out)(void *context, const struct spl_error *why);
+    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
+     * those out. NULL = none of them. */
+    const char *keep;
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)

@@ -194,6 +194,10 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, pack.columns)},
     {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
      SPL_CMD_FLAG(struct arguments, pack.intensity)},
+    {"keep", "NAME,…",
+     "fields of the scans beside class, intensity, return_number, number_of_returns and scan, as they are called "
+     "there: gps_time, scan_angle, extra bytes, properties, columns; 'none' among them leaves out what is not named",
+     SPL_CMD_TEXT(struct arguments, pack.keep)},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -236,7 +240,8 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
-        "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--neighbours K]\n"
+        "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
+        "                   [--neighbours K]\n"
         "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
         "                   [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"

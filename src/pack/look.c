@@ -13,7 +13,7 @@ int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool rea
                   struct spl_stage *stage, struct spl_cloud **out, struct spl_error *err)
 {
     const struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors};
+        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors, .keep = scans->keep};
     struct spl_cloud *cloud = NULL;
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)

@@ -20,6 +20,7 @@
 #include "base/sized.h"
 #include "dataset/dataset.h"
 #include "pack/emit.h"
+#include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/texture/pass.h"
@@ -32,6 +33,7 @@ struct pack {
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage *stage;
+    struct spl_keep keep;
     struct spl_scans scans;
     struct spl_points points;
     struct spl_wires wires;
@@ -213,9 +215,13 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
+        rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, stage, err);
+        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, &p.keep, stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p.scans, err);
     if (!rc) {
         plan(&p, photographs);
         rc = spl_points_gather(&p.points, &p.scans, stage, err);

@@ -65,7 +65,9 @@ void spl_scans_share(struct spl_scans *scans)
     }
 }
 
-static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, struct spl_error *err)
+/* `fields`: room for the names of the scan's, or NULL. */
+static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
+                struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     int rc = spl_cloud_open(path, options, &cloud, err);
@@ -79,27 +81,31 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .own_colors = info->colors,
                               .coordinates = info->coordinates,
                               .attributes = info->attributes,
+                              .columns = info->columns,
+                              .scalars = info->scalars,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
                               .max = {-INFINITY, -INFINITY, -INFINITY}};
+    if (fields)
+        snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
     spl_cloud_destroy(cloud);
     return SPL_OK;
 }
 
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   struct spl_stage *stage, struct spl_error *err)
+                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .keep = keep};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity};
+    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .keep = keep};
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, &why)))
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, scans->count ? NULL : scans->fields, &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;

@@ -98,9 +98,10 @@ int main(int argc, char **argv)
                *out = argc > 2 && !strcmp(argv[argc - 2], "-o") ? argv[argc - 1] : NULL;
     struct spl_scans scans = {0};
     struct spl_inputs inputs;
+    const struct spl_keep keep = {0};
     int rc = spl_inputs_find(&inputs, &scan, 1, &(struct spl_inputs_listener){0}, &err);
     if (!rc)
-        rc = spl_scans_init(&scans, &inputs, NULL, false, &stage, &err);
+        rc = spl_scans_init(&scans, &inputs, NULL, false, &keep, &stage, &err);
     if (!rc)
         rc = spl_points_gather(&points, &scans, &stage, &err);
     if (!rc && argc > (out ? 4 : 2))
