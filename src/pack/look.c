@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* With leaf splats, levels and headers, of the tile, the trees, the power line and the lion's head: 8.5 to 10.2. */
+/* Of leaves, levels and headers together. */
 static const double dataset_bytes_a_point = 10;
 static const double memory_bytes_a_point = 80, memory_bytes_least = 30e6;
 
