@@ -98,6 +98,9 @@ struct spl_pack_options {
     /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
      * those out. NULL = none of them. */
     const char *keep;
+    /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others each n-th point. A
+     * scan gives one point at least. 0 = all. */
+    uint64_t max_points;
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
@@ -118,6 +121,7 @@ struct spl_pack_report {
     double normal_error;       /* measured mean, degrees */
     double seconds;
     struct spl_photo_report photos;
+    uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,

@@ -155,7 +155,10 @@ static void print_table(const struct spl_info_report *report)
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
+    const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     printf("  points        %s read, %s kept\n", spl_cmd_group(info->points, a), spl_cmd_group(info->leaf_splats, b));
+    if (whole)
+        printf("  a part of     %s points of the sources\n", spl_cmd_group((uint64_t)json_integer_value(whole), a));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", spl_cmd_group(info->splats, a),
            spl_cmd_group(info->leaf_splats, b), spl_cmd_group(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);

@@ -327,12 +327,13 @@ int spl_info_print_scans(const char *const *given, size_t count, const struct sp
     const struct spl_inputs_listener listener = {say_warning, say_left_out, &s};
     struct spl_stage stage = {.callback = isatty(STDERR_FILENO) ? say_progress : NULL, .context = &s, .threads = 1};
     const struct spl_keep keep = {0};
+    const struct spl_cloud_options how = {.columns = options->columns, .keep = &keep};
     struct spl_scans scans = {0};
     struct spl_inputs inputs = {0};
     struct spl_error err = {0};
     int rc = spl_inputs_find(&inputs, given, count, &listener, &err);
     if (!rc)
-        rc = spl_scans_init(&scans, &inputs, options->columns, false, &keep, &stage, &err);
+        rc = spl_scans_init(&scans, &inputs, &how, &stage, &err);
     if (!rc)
         rc = tell_all(&s, &scans, &stage, &err);
     spl_cmd_progress_finish(&s.progress);

@@ -12,8 +12,8 @@ static const double memory_bytes_a_point = 80, memory_bytes_least = 30e6;
 int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool read, struct spl_point_batch *batch,
                   struct spl_stage *stage, struct spl_cloud **out, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors, .keep = scans->keep};
+    struct spl_cloud_options options = scans->how;
+    options.colors = &scan->colors;
     struct spl_cloud *cloud = NULL;
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)

@@ -23,6 +23,7 @@
 #include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
+#include "pack/part.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
 #include "pack/view.h"
@@ -140,6 +141,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
+    if (spl_part_of(&p->scans))
+        json_object_set_new(meta, "part_of", json_integer((json_int_t)spl_part_of(&p->scans)));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
@@ -166,6 +169,7 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
         .position_error = p->emitted.error.position_over_radius / (double)p->emitted.splats,
         .normal_error = p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI,
         .seconds = (double)(spl_now_ns() - begin_ns) / 1e9,
+        .part_of = spl_part_of(&p->scans),
     };
     for (size_t i = 0; p->points.linear && i < p->points.count; i++)
         report->linear += p->points.linear[i];
@@ -219,7 +223,12 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, &p.keep, stage, err);
+        rc = spl_scans_init(&p.scans, inputs,
+                            &(struct spl_cloud_options){.columns = options->columns,
+                                                        .intensity = options->intensity,
+                                                        .keep = &p.keep,
+                                                        .max_points = options->max_points},
+                            stage, err);
     if (!rc)
         rc = spl_kept_check(&p.scans, err);
     if (!rc) {

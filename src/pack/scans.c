@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pack/part.h"
 #include "pack/names.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
@@ -63,6 +64,7 @@ void spl_scans_share(struct spl_scans *scans)
             colors->white = white;
         }
     }
+    spl_part_share(scans);
 }
 
 /* `fields`: room for the names of the scan's, or NULL. */
@@ -83,6 +85,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .attributes = info->attributes,
                               .columns = info->columns,
                               .scalars = info->scalars,
+                              .points_total = info->points_total,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
@@ -93,19 +96,18 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
     return SPL_OK;
 }
 
-int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err)
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
+                   struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .keep = keep};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .keep = keep};
+    *scans = (struct spl_scans){.inputs = inputs, .how = *how};
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, scans->count ? NULL : scans->fields, &why)))
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], how, scans->count ? NULL : scans->fields, &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;
@@ -175,12 +177,12 @@ static void compare_kinds(const struct saying *s)
     }
     if (blank.count && s->scans->count > 1)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", spl_names_list(&blank));
-    if (s->scans->intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
+    if (s->scans->how.intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
         say(s,
             "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours "
             "are %s",
             text);
-    else if (kinds > 1 && s->scans->intensity) {
+    else if (kinds > 1 && s->scans->how.intensity) {
         struct spl_names lack = {0};
         for (size_t i = 0; i < s->scans->count; i++)
             if (s->scans->list[i].points_from[SPL_COLORS_RGB] || s->scans->list[i].points_from[SPL_COLORS_CONSTANT])
