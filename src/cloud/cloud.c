@@ -42,12 +42,11 @@ void spl_point_batch_finish(struct spl_point_batch *batch)
 }
 
 /* Decides which points make the part that is wanted. Not before colours are known, which all points have a say in. */
-static int find_stride(struct spl_cloud *cloud, struct spl_error *err)
+static int find_part(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct spl_cloud_info *info = &cloud->info;
     uint64_t most = cloud->options->max_points, given = info->points_expected;
     int code = SPL_OK;
-    cloud->stride = 1;
     if (most && (!given || cloud->sampling == SPL_SAMPLE_ALL)) /* a text's count is that of its first block */
         given = cloud->options->points;
     if (most && !given) {
@@ -61,9 +60,12 @@ static int find_stride(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     if (!info->points_total)
         info->points_total = given;
-    if (most && given > most)
-        cloud->stride = given / most + (given % most != 0);
-    info->points_expected = given / cloud->stride + (given % cloud->stride != 0);
+    info->points_expected = given;
+    if (!most || given <= most)
+        return SPL_OK;
+    cloud->part = info->points_expected = most;
+    cloud->part_of = given;
+    cloud->part_sum = given - most;
     return SPL_OK;
 }
 
@@ -92,7 +94,7 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
     if (code == SPL_OK)
         code = spl_cloud_find_colors(cloud, err);
     if (code == SPL_OK)
-        code = find_stride(cloud, err);
+        code = find_part(cloud, err);
     if (code < 0)
         goto fail;
     cloud->info.named = spl_cloud_find_wrong_ending(path, cloud->reader, cloud->info.format);
@@ -151,13 +153,15 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud)
     return spl_source_tell(&cloud->source);
 }
 
-/* Of the points from `from` on, leaves those that belong to the part. */
+/* Of the points from `from` on, leaves those that belong to the part, as even as whole numbers can be. */
 static void thin(struct spl_cloud *cloud, struct spl_point_batch *batch, size_t from)
 {
     size_t to = from;
     for (size_t i = from; i < batch->count; i++) {
-        if (cloud->points_seen++ % cloud->stride)
+        cloud->part_sum += cloud->part;
+        if (cloud->part_sum < cloud->part_of)
             continue;
+        cloud->part_sum -= cloud->part_of;
         memcpy(batch->position[to], batch->position[i], sizeof batch->position[i]);
         memcpy(batch->color[to], batch->color[i], sizeof batch->color[i]);
         memcpy(batch->normal[to], batch->normal[i], sizeof batch->normal[i]);
@@ -184,7 +188,7 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
             break;
         if (code < 0)
             return code;
-        if (cloud->stride > 1)
+        if (cloud->part)
             thin(cloud, batch, before);
         cloud->row += cloud->rows.count;
         cloud->info.points_from[cloud->info.colors.from] += batch->count - before;

@@ -54,7 +54,7 @@ struct spl_cloud_options {
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
     const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
-    uint64_t max_points;                   /* an even part: of COPC whole levels, else each n-th point; 0 = all */
+    uint64_t max_points;                   /* an even part: of COPC whole levels, of others so many; 0 = all */
     uint64_t points; /* info.points_total of an earlier open; 0 = find out, which may take a pass over the file */
 };
 

@@ -42,8 +42,8 @@ struct spl_cloud {
     char fields[400]; /* see info.fields */
     bool fields_cut;  /* there are more */
     struct spl_color_rule color;
-    uint64_t row;                 /* index of the next row */
-    uint64_t stride, points_seen; /* each stride-th of the points that there are is given */
+    uint64_t row;                     /* index of the next row */
+    uint64_t part, part_of, part_sum; /* so many of so many points are given, 0 = all; the sum decides on the next */
     struct spl_rows rows;
 };
 

@@ -236,7 +236,7 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, photos.device)},
     {"skip-broken", NULL, "scans that cannot be read are named and left out",
      SPL_CMD_FLAG(struct arguments, skip_broken)},
-    {"max-points", "N", "an even part of the scans: coarse levels of COPC, each n-th point of other files",
+    {"max-points", "N", "an even part of the scans: the coarse levels of COPC, so many points of other files",
      .otherwise = "all", SPL_CMD_COUNT(struct arguments, pack.max_points, 1, UINT64_MAX)},
     {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
      SPL_CMD_COUNT_32(struct arguments, pack.threads, 1, 64)},
@@ -246,9 +246,8 @@ static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
-        "                   [--neighbours K]\n"
-        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
-        "                   [--no-clip-lines] [--max-points N] [--threads N]\n"
+        "                   [--neighbours K] [--position-error X] [--normal-error DEG] [--points-only]\n"
+        "                   [--no-linear] [--no-clip-lines] [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"

@@ -13,8 +13,9 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "pack/part.h"
+#include "pack/kept.h"
 #include "pack/names.h"
+#include "pack/part.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
 static const double like_ranges = 8; /* times the smallest white less black: of one kind */
@@ -259,6 +260,16 @@ static void compare_attributes(const struct saying *s)
         if (with.count && without.count)
             say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count,
                 spl_names_list(&with), spl_names_list(&without), rows[r].done);
+    }
+    for (int scalar = 0; scalar < SPL_SCALAR_COUNT; scalar++) {
+        struct spl_names with = {0}, without = {0};
+        for (size_t i = 0; i < s->scans->count; i++)
+            if (has_points(&s->scans->list[i]))
+                spl_names_add(s->scans->list[i].scalars >> scalar & 1 ? &with : &without, s->scans->list[i].name);
+        if (with.count && without.count)
+            say(s, "%s is given in %zu (%s), points of the others (%s) have none",
+                spl_kept_name(s->scans->how.keep, scalar), with.count, spl_names_list(&with),
+                spl_names_list(&without));
     }
 }
 

@@ -18,7 +18,8 @@ static inline void fuzz_cloud(const uint8_t *data, size_t size, const char *pref
 {
     static struct spl_point_batch batch;
     static int file = -1;
-    const struct spl_cloud_options options = {.columns = columns};
+    static const struct spl_keep keep = {.count = 3, .names = {"extra", "gps_time", "scan_angle"}};
+    const struct spl_cloud_options options = {.columns = columns, .keep = &keep};
     struct spl_cloud *cloud = NULL;
     struct spl_error err = {0};
     uint64_t points = 0;

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -184,13 +185,15 @@ def test_what_is_wrong_is_said():
 
 def test_what_a_dataset_does_not_say_is_not_guessed():
     bad = ["PROJCS[\"x\",EXTENSION[\"PROJ4\",\"+proj=utm +zone=1\"]]", "+proj=utm +zone=18", "/etc/passwd", "EPSG:2263+x",
-           "GEOGCS[\"@/etc/passwd\"]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
+           "GEOGCS[\"@/etc/passwd\"]", "BOUNDCRS[x,PARAMETERFILE[\"a\",\"/etc/passwd\"]]", "GEOGCS[\"x\",GRIDS]",
+           "CONVERSION[METHOD[\"PROJ-based operation method: utm\"]]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
     with tempfile.TemporaryDirectory() as folder:
         paths = [make(folder, "m", crs, f"bad{i}") for i, crs in enumerate(bad)]
         paths.append(make(folder, "", "", "none"))
         with Daemon(REAL, datasets=paths) as d:
             for i in range(len(bad)):
-                refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs")
+                why = "extensions" if re.search(r"EXTENSION|@|grids|PARAMETERFILE|PROJ-based", bad[i]) else "own" if "[" in bad[i] else "--crs"
+                refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs", why)
                 assert d.ask(f"/v1/datasets/bad{i}").json()["crs"] == bad[i]
             refused(d.ask("/v1/datasets/none/place?crs=EPSG:4326&world=1,2,3"), 400, "crs", "--crs")
             refused(d.ask("/v1/datasets/none/view?crs=EPSG:4326&eye=1,2,3"), 400, "crs", "--crs")

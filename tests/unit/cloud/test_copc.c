@@ -1,5 +1,5 @@
 /* COPC: a part of the points is whole coarse levels, and only their chunks are read; a hierarchy that is wrong in any
- * way is named and done without. Other files give each n-th point. */
+ * way is named and done without. Other files give as many as are wanted. */
 #include "laz_file.h"
 
 #include "base/memory.h"
@@ -8,7 +8,7 @@
 
 enum { CHUNKS = 5, POINTS = 105, HEADER = 375, RECORD = 54 + SPL_COPC_INFO_BYTES, ENTRY = 32 };
 static const uint32_t chunk_points[CHUNKS + 1] = {5, 20, 30, 40, 10, 0};
-static const int chunk_level[CHUNKS] = {1, 0, 1, 2, 2};
+static const int chunk_level[CHUNKS] = {1, 0, 2, 1, 2}; /* chunks of two levels lie apart */
 static const size_t chunk_first[CHUNKS] = {0, 5, 25, 55, 95};
 
 struct node {
@@ -117,13 +117,19 @@ static size_t load_built(const struct copc *c, uint64_t most, double position[PO
     return count;
 }
 
+/* Whether point `i` is among `most` of `total`, as evenly as they can be. */
+static bool is_given(uint64_t i, uint64_t most, uint64_t total)
+{
+    return i == 0 || i * most / total > (i - 1) * most / total;
+}
+
 static void whole_levels(void **state)
 {
     static const struct {
         uint64_t most;
         unsigned levels;
         size_t points;
-    } rows[] = {{1000, 3, 105}, {105, 3, 105}, {104, 2, 55}, {55, 2, 55}, {54, 1, 20}, {20, 1, 20}};
+    } rows[] = {{1000, 3, 105}, {105, 3, 105}, {104, 2, 65}, {65, 2, 65}, {64, 1, 20}, {20, 1, 20}};
     static struct copc c;
     double all[POINTS][3], part[POINTS][3];
     (void)state;
@@ -137,11 +143,13 @@ static void whole_levels(void **state)
                 assert_memory_equal(part[n++], all[chunk_first[chunk] + p], sizeof part[0]);
         assert_int_equal(n, rows[i].points);
     }
-    for (uint64_t most = 1; most < 20; most++) { /* of the first level, each n-th point */
-        size_t step = (20 + most - 1) / most, count = load_built(&c, most, part);
-        assert_int_equal(count, (20 + step - 1) / step);
-        for (size_t p = 0; p < count; p++)
-            assert_memory_equal(part[p], all[chunk_first[1] + p * step], sizeof part[0]);
+    for (uint64_t most = 1; most < 20; most++) { /* of the first level, so many */
+        size_t n = 0;
+        assert_int_equal(load_built(&c, most, part), most);
+        for (size_t p = 0; p < 20; p++)
+            if (is_given(p, most, 20))
+                assert_memory_equal(part[n++], all[chunk_first[1] + p], sizeof part[0]);
+        assert_int_equal(n, most);
     }
 }
 
@@ -261,7 +269,7 @@ static void memory_refused_at_any_allocation(void **state)
 }
 
 /* Formats without levels, whether or not a header counts their points. */
-static void each_nth_point(void **state)
+static void so_many_of_other_files(void **state)
 {
     static const char *const heads[] = {"", "105\n", "60\n", "# .PCD v.7\nFIELDS x y z\nWIDTH 105\nDATA ascii\n",
                                         "ply\nformat ascii 1.0\nelement vertex 105\nproperty int x\nproperty int y\n"
@@ -277,12 +285,15 @@ static void each_nth_point(void **state)
             for (int i = 0; i < POINTS; i++)
                 put_text(&b, "%s%d %d %d\n", h == 2 && i == 60 ? "45\n" : "", i, 2 * i, 3 * i); /* PTS of two blocks */
             write_scratch(b.data, b.length);
-            size_t step = (POINTS + most - 1) / most, count = load(scratch_path(), most, part, &total);
+            size_t n = 0, given = most < POINTS ? most : POINTS;
+            assert_int_equal(load(scratch_path(), most, part, &total), given);
             assert_int_equal(total, POINTS);
-            assert_int_equal(count, (POINTS + step - 1) / step);
-            assert_true(count <= most);
-            for (size_t p = 0; p < count; p++)
-                assert_true(part[p][0] == (double)(p * step) && part[p][2] == (double)(3 * p * step));
+            for (uint64_t i = 0; i < POINTS; i++)
+                if (is_given(i, given, POINTS)) {
+                    assert_true(part[n][0] == (double)i && part[n][2] == (double)(3 * i));
+                    n++;
+                }
+            assert_int_equal(n, given);
         }
 }
 
@@ -338,7 +349,7 @@ int main(void)
         cmocka_unit_test(other_chunks_are_not_read),
         cmocka_unit_test(wrong_hierarchies_are_done_without),
         cmocka_unit_test(memory_refused_at_any_allocation),
-        cmocka_unit_test(each_nth_point),
+        cmocka_unit_test(so_many_of_other_files),
         cmocka_unit_test(real_files),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
