@@ -210,7 +210,8 @@ static int search(struct finder *f, const char *path, unsigned depth, struct spl
         finish_entries(&entries);
         return spl_inputs_leave_out(f->inputs, path, rc, &why, err);
     }
-    qsort(entries.list, entries.count, sizeof *entries.list, by_name);
+    if (entries.count)
+        qsort(entries.list, entries.count, sizeof *entries.list, by_name);
     f->pending += entries.count;
     for (size_t i = 0; !rc && i < entries.count; i++) {
         const char *slash = path[strlen(path) - 1] == '/' ? "" : "/";
