@@ -11,7 +11,6 @@
 #include "pack/scans.h"
 
 #define SPL_NO_STATION UINT16_MAX
-#define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */

@@ -135,6 +135,23 @@ void spl_scans_remove(struct spl_scans *scans, size_t place)
     memmove(&scans->list[place], &scans->list[place + 1], (scans->count - place) * sizeof *scans->list);
 }
 
+int spl_scan_grow(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
+{
+    for (size_t i = 0; i < batch->count; i++)
+        for (int c = 0; c < 3; c++) {
+            double v = batch->position[i][c];
+            if (fabs(v) > SPL_COORDINATE_MAX)
+                return spl_fail(
+                    err, SPL_E_INPUT,
+                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
+                    "and columns",
+                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
+            scan->min[c] = fmin(scan->min[c], v);
+            scan->max[c] = fmax(scan->max[c], v);
+        }
+    return SPL_OK;
+}
+
 void spl_scans_finish(struct spl_scans *scans)
 {
     free(scans->list);
@@ -333,7 +350,7 @@ static void look_at_floats(const struct saying *s)
         double largest = 0;
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fmax(fabs(scan->min[k]), fabs(scan->max[k])));
-        if (!scan->coordinates.floats || !has_points(scan))
+        if (!scan->coordinates.floats || !has_points(scan) || !isfinite(largest))
             continue;
         double own = nextafterf((float)largest, INFINITY) - (float)largest;
         if (own <= float_step || own <= float_step_diagonals * diagonal(scan))
