@@ -92,6 +92,8 @@ struct spl_pack_options {
     void (*warn)(void *context, const char *text);
     void *progress_context; /* of both */
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
+    const char *unit;          /* of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say */
+    const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)

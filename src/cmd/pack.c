@@ -153,6 +153,12 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, pack.columns)},
     {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
      SPL_CMD_FLAG(struct arguments, pack.intensity)},
+    {"unit", "U", "of coordinates, whatever scans say: " "m, ft, us-ft, km, cm, mm, yd, in, unknown, or metres a unit, such as \"0.2 m\"", .otherwise = "what the scans say",
+     SPL_CMD_TEXT(struct arguments, pack.unit)},
+    {"crs", "WHICH",
+     "the scans' coordinate system, whatever they say: EPSG:25832, EPSG:2994+EPSG:6360 with that of heights, a file of "
+     "WKT, or none",
+     .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.crs)},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -193,8 +199,8 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
-        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--neighbours K]\n"
-        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
+        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--unit U] [--crs WHICH]\n"
+        "                   [--neighbours K] [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
         "                   [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"

@@ -19,9 +19,11 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/dataset.h"
+#include "geom/unit.h"
 #include "pack/emit.h"
 #include "pack/linear.h"
 #include "pack/median.h"
+#include "pack/system.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
 #include "pack/view.h"
@@ -33,6 +35,7 @@ struct pack {
     unsigned neighbours;
     struct spl_stage *stage;
     struct spl_scans scans;
+    struct spl_system system;
     struct spl_points points;
     struct spl_wires wires;
     struct spl_tree tree;
@@ -96,6 +99,7 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
 {
     const struct spl_points *points = &p->points;
     json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
+    char unit[SPL_UNIT_TEXT_MAX];
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
     for (uint32_t s = 0; s < p->emitted.streams.count; s++)
@@ -108,13 +112,14 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
             json_array_append_new(pose, json_real(points->stations[s][i]));
         json_array_append_new(stations, pose);
     }
-    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:n, s:o, s:o,"
+    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:s?, s:o, s:o,"
                      " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
-                     (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit", "unknown", "crs",
+                     (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit",
+                     spl_unit_print(p->system.unit_m, unit), "crs", p->system.crs,
                      "sources", sources, "stations", stations, "color",
                      spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",
                      p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
@@ -208,6 +213,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
                      struct spl_stage *stage, struct spl_pack_report *report, struct spl_error *err)
 {
     struct pack p = {.options = options, .stage = stage};
+    const struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
@@ -215,6 +221,8 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     if (!rc)
         rc = spl_scans_init(&p.scans, options->inputs, options->input_count, options->columns, options->intensity,
                             stage, err);
+    if (!rc)
+        rc = spl_system_find(&p.system, &p.scans, &said, err);
     if (!rc) {
         plan(&p, photographs);
         rc = spl_points_gather(&p.points, &p.scans, stage, err);
@@ -247,6 +255,7 @@ static int pack_scan(const struct spl_pack_options *options, const char *output,
     spl_tree_finish(&p.tree);
     spl_wires_finish(&p.wires);
     spl_points_finish(&p.points);
+    spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
     return rc;
 }
