@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
  * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (ply.c, las.c, ptx.c, text.c). Owned by one thread at a time. */
+ * one reader per format (readers.c). Owned by one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -46,6 +46,7 @@ struct spl_cloud_coordinates {
     double height_unit_m; /* of z; 0 = not said: as x and y, metres where those are angles */
     bool angles;          /* x and y are longitudes and latitudes */
     double step[3];       /* that they are multiples of; 0 = not said */
+    bool floats;          /* of 32 bits, so that their steps grow with their size */
 };
 
 struct spl_cloud_options {
@@ -56,7 +57,7 @@ struct spl_cloud_options {
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "LAZ", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "PCD", "PTX", "PTS", "text" */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;

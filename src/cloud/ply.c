@@ -5,7 +5,6 @@
  * Invariant: the source's cursor is at the start of a vertex row between calls. Owned by the cloud's thread. */
 #include "cloud/ply.h"
 
-#include <endian.h>
 #include <math.h>
 #include <string.h>
 
@@ -31,81 +30,19 @@ static size_t block_rows(const struct spl_ply_element *element, uint64_t left)
     return left < most ? (size_t)left : most;
 }
 
-#define DECODE(TYPE, BITS, TO_HOST)                                                                                    \
-    for (size_t i = 0; i < count; i++, p += stride) {                                                                  \
-        uint##BITS##_t bits;                                                                                           \
-        TYPE v;                                                                                                        \
-        memcpy(&bits, p, sizeof bits);                                                                                 \
-        bits = TO_HOST(bits);                                                                                          \
-        memcpy(&v, &bits, sizeof v);                                                                                   \
-        out[i] = (double)v;                                                                                            \
-    }                                                                                                                  \
-    break
-
-#define AS_IS(bits) (bits)
-
-/* One property of `count` rows that are `stride` bytes apart. */
-static void decode(enum spl_ply_type type, bool big, const uint8_t *p, size_t stride, size_t count, double *out)
-{
-    switch (type) {
-    case SPL_PLY_NONE:
-        break;
-    case SPL_PLY_INT8:
-        DECODE(int8_t, 8, AS_IS);
-    case SPL_PLY_UINT8:
-        DECODE(uint8_t, 8, AS_IS);
-    case SPL_PLY_INT16:
-        if (big) {
-            DECODE(int16_t, 16, be16toh);
-        } else {
-            DECODE(int16_t, 16, le16toh);
-        }
-    case SPL_PLY_UINT16:
-        if (big) {
-            DECODE(uint16_t, 16, be16toh);
-        } else {
-            DECODE(uint16_t, 16, le16toh);
-        }
-    case SPL_PLY_INT32:
-        if (big) {
-            DECODE(int32_t, 32, be32toh);
-        } else {
-            DECODE(int32_t, 32, le32toh);
-        }
-    case SPL_PLY_UINT32:
-        if (big) {
-            DECODE(uint32_t, 32, be32toh);
-        } else {
-            DECODE(uint32_t, 32, le32toh);
-        }
-    case SPL_PLY_FLOAT32:
-        if (big) {
-            DECODE(float, 32, be32toh);
-        } else {
-            DECODE(float, 32, le32toh);
-        }
-    case SPL_PLY_FLOAT64:
-        if (big) {
-            DECODE(double, 64, be64toh);
-        } else {
-            DECODE(double, 64, le64toh);
-        }
-    }
-}
-
 /* One scalar at the cursor. */
-static int take_scalar(struct spl_cloud *cloud, enum spl_ply_type type, double *value, struct spl_error *err)
+static int take_scalar(struct spl_cloud *cloud, enum spl_number type, double *value, struct spl_error *err)
 {
     const struct ply *ply = cloud->state;
     const uint8_t *bytes;
-    size_t available, size = spl_ply_type_bytes(type);
+    size_t available, size = spl_number_bytes(type);
     int code = spl_source_peek(&cloud->source, size, &bytes, &available, err);
     if (code < 0)
         return code;
     if (available < size)
         return spl_source_fail_at(&cloud->source, spl_source_tell(&cloud->source), "", err,
                                   "the file ends before its elements do (truncated?)");
-    decode(type, ply->header.format == SPL_PLY_BIG, bytes, 0, 1, value);
+    spl_numbers_decode(type, ply->header.format == SPL_PLY_BIG, bytes, 0, 1, value);
     spl_source_take(&cloud->source, size);
     return SPL_OK;
 }
@@ -124,13 +61,13 @@ static int take_row(struct spl_cloud *cloud, const struct spl_ply_element *eleme
         if (code < 0)
             return code;
         if (p->count_type) {
-            double bytes = value * spl_ply_type_bytes(p->type);
+            double bytes = value * spl_number_bytes(p->type);
             if (value < 0 || bytes > (double)spl_source_left(source))
                 return spl_source_fail_at(source, at, p->name, err,
                                           "element %s: a list of %.0f items does not fit the file (truncated, or the "
                                           "wrong byte order?)",
                                           element->name, value);
-            spl_source_seek(source, at + spl_ply_type_bytes(p->count_type) + (uint64_t)bytes);
+            spl_source_seek(source, at + spl_number_bytes(p->count_type) + (uint64_t)bytes);
         } else if (rows && p->column >= 0) {
             rows->value[p->column][row] = value;
         }
@@ -264,10 +201,10 @@ static int check_byte_order(struct spl_cloud *cloud, struct spl_error *err)
     for (unsigned i = 0; i < element->properties; i++) {
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];
         double value[2][SPL_ROWS];
-        if (p->column < SPL_COLUMN_X || p->column > SPL_COLUMN_Z || p->type < SPL_PLY_FLOAT32)
+        if (p->column < SPL_COLUMN_X || p->column > SPL_COLUMN_Z || p->type < SPL_NUMBER_FLOAT32)
             continue;
-        decode(p->type, big, bytes + p->offset, element->row_bytes, count, value[0]);
-        decode(p->type, !big, bytes + p->offset, element->row_bytes, count, value[1]);
+        spl_numbers_decode(p->type, big, bytes + p->offset, element->row_bytes, count, value[0]);
+        spl_numbers_decode(p->type, !big, bytes + p->offset, element->row_bytes, count, value[1]);
         for (size_t r = 0; r < count; r++) {
             declared += plausible(value[0][r]);
             swapped += plausible(value[1][r]);
@@ -291,9 +228,11 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];
         if (p->column < 0)
             continue;
+        if (p->column <= SPL_COLUMN_Z)
+            cloud->info.coordinates.floats |= ply->header.format != SPL_PLY_ASCII && p->type == SPL_NUMBER_FLOAT32;
         if (p->column >= SPL_COLUMN_RED && p->column <= SPL_COLUMN_BLUE) {
-            cloud->scan_colors |= p->type != SPL_PLY_UINT8;
-            cloud->integer_colors &= p->type < SPL_PLY_FLOAT32;
+            cloud->scan_colors |= p->type != SPL_NUMBER_UINT8;
+            cloud->integer_colors &= p->type < SPL_NUMBER_FLOAT32;
         }
     }
     for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
@@ -352,8 +291,8 @@ static int ply_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
         for (unsigned i = 0; code == SPL_OK && i < element->properties; i++) {
             const struct spl_ply_property *p = &ply->header.properties[element->first + i];
             if (p->column >= 0)
-                decode(p->type, ply->header.format == SPL_PLY_BIG, bytes + p->offset, element->row_bytes, count,
-                       rows->value[p->column]);
+                spl_numbers_decode(p->type, ply->header.format == SPL_PLY_BIG, bytes + p->offset, element->row_bytes,
+                                   count, rows->value[p->column]);
         }
         if (code == SPL_OK)
             spl_source_take(&cloud->source, count * element->row_bytes);

@@ -2,26 +2,15 @@
 #ifndef SPL_CLOUD_PLY_H
 #define SPL_CLOUD_PLY_H
 
+#include "cloud/numbers.h"
 #include "cloud/reader.h"
-
-enum spl_ply_type {
-    SPL_PLY_NONE,
-    SPL_PLY_INT8,
-    SPL_PLY_UINT8,
-    SPL_PLY_INT16,
-    SPL_PLY_UINT16,
-    SPL_PLY_INT32,
-    SPL_PLY_UINT32,
-    SPL_PLY_FLOAT32,
-    SPL_PLY_FLOAT64
-};
 
 enum { SPL_PLY_ELEMENTS = 64, SPL_PLY_PROPERTIES = 1024 }; /* over all elements; more is refused */
 
 struct spl_ply_property {
     char name[48];      /* shortened, for messages */
-    uint8_t type;       /* enum spl_ply_type; of the items when it is a list */
-    uint8_t count_type; /* of a list's length, SPL_PLY_NONE when it is no list */
+    uint8_t type;       /* enum spl_number; of the items when it is a list */
+    uint8_t count_type; /* of a list's length, SPL_NUMBER_NONE when it is no list */
     int8_t column;      /* enum spl_column; SKIP for what is not kept */
     uint16_t offset;    /* in the row, where no list precedes it */
 };
@@ -42,8 +31,6 @@ struct spl_ply_header {
     unsigned vertex;      /* index into elements */
     uint64_t vertex_line; /* of its declaration, for messages */
 };
-
-unsigned spl_ply_type_bytes(enum spl_ply_type type);
 
 /* Reads the header, and takes columns from the vertices' properties; the cursor is then at the first byte of the data.
  */

@@ -9,12 +9,14 @@
 
 static const struct {
     const char *name;
-    enum spl_ply_type type;
+    enum spl_number type;
 } types[] = {
-    {"char", SPL_PLY_INT8},     {"int8", SPL_PLY_INT8},       {"uchar", SPL_PLY_UINT8},    {"uint8", SPL_PLY_UINT8},
-    {"short", SPL_PLY_INT16},   {"int16", SPL_PLY_INT16},     {"ushort", SPL_PLY_UINT16},  {"uint16", SPL_PLY_UINT16},
-    {"int", SPL_PLY_INT32},     {"int32", SPL_PLY_INT32},     {"uint", SPL_PLY_UINT32},    {"uint32", SPL_PLY_UINT32},
-    {"float", SPL_PLY_FLOAT32}, {"float32", SPL_PLY_FLOAT32}, {"double", SPL_PLY_FLOAT64}, {"float64", SPL_PLY_FLOAT64},
+    {"char", SPL_NUMBER_INT8},       {"int8", SPL_NUMBER_INT8},       {"uchar", SPL_NUMBER_UINT8},
+    {"uint8", SPL_NUMBER_UINT8},     {"short", SPL_NUMBER_INT16},     {"int16", SPL_NUMBER_INT16},
+    {"ushort", SPL_NUMBER_UINT16},   {"uint16", SPL_NUMBER_UINT16},   {"int", SPL_NUMBER_INT32},
+    {"int32", SPL_NUMBER_INT32},     {"uint", SPL_NUMBER_UINT32},     {"uint32", SPL_NUMBER_UINT32},
+    {"float", SPL_NUMBER_FLOAT32},   {"float32", SPL_NUMBER_FLOAT32}, {"double", SPL_NUMBER_FLOAT64},
+    {"float64", SPL_NUMBER_FLOAT64},
 };
 
 struct words {
@@ -22,12 +24,6 @@ struct words {
     size_t length[5];
     size_t count;
 };
-
-unsigned spl_ply_type_bytes(enum spl_ply_type type)
-{
-    static const uint8_t bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
-    return bytes[type];
-}
 
 static bool word_is(const struct words *words, size_t i, const char *text)
 {
@@ -42,12 +38,12 @@ static void split(const char *line, size_t length, struct words *words)
         words->word[words->count++] = fields.start;
 }
 
-static enum spl_ply_type find_type(const struct words *words, size_t i)
+static enum spl_number find_type(const struct words *words, size_t i)
 {
     for (size_t k = 0; k < sizeof types / sizeof *types; k++)
         if (word_is(words, i, types[k].name))
             return types[k].type;
-    return SPL_PLY_NONE;
+    return SPL_NUMBER_NONE;
 }
 
 static void copy_name(char *name, size_t room, const struct words *words, size_t i)
@@ -117,7 +113,7 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     struct spl_ply_property p = {.type = find_type(words, name - 1), .column = SPL_COLUMN_SKIP};
     if (list) {
         p.count_type = find_type(words, 2);
-        if (!p.count_type || p.count_type >= SPL_PLY_FLOAT32)
+        if (!p.count_type || p.count_type >= SPL_NUMBER_FLOAT32)
             return spl_source_fail_line(source, source->line, "property", err,
                                         "\"%.*s\" is no type for a list's length", (int)words->length[2],
                                         words->word[2]);
@@ -130,7 +126,7 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     p.offset = (uint16_t)element->row_bytes;
     if (!list && header->vertex_line && element == &header->elements[header->vertex])
         p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
-    element->row_bytes += spl_ply_type_bytes(list ? p.count_type : p.type);
+    element->row_bytes += spl_number_bytes(list ? p.count_type : p.type);
     element->lists |= list;
     element->properties++;
     header->properties[header->property_count++] = p;

@@ -46,7 +46,7 @@ struct spl_cloud {
     struct spl_rows rows;
 };
 
-extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_ptx_reader, spl_text_reader;
+extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_pcd_reader, spl_ptx_reader, spl_text_reader;
 
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cloud/fields.h"
+#include "cloud/pcd.h"
 
 enum { first_bytes = 4096 };
 
@@ -22,6 +23,11 @@ static bool is_ply(const uint8_t *bytes, size_t available)
 static bool is_las(const uint8_t *bytes, size_t available)
 {
     return begins_with(bytes, available, "LASF");
+}
+
+static bool is_pcd(const uint8_t *bytes, size_t available)
+{
+    return spl_pcd_is_header((const char *)bytes, available);
 }
 
 static bool is_text(const uint8_t *bytes, size_t available)
@@ -55,6 +61,7 @@ static const struct {
 } readers[] = {
     {&spl_ply_reader, is_ply},
     {&spl_las_reader, is_las},
+    {&spl_pcd_reader, is_pcd},
     {&spl_ptx_reader, is_ptx},
     {&spl_text_reader, is_text},
 };
@@ -78,7 +85,7 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
         found++;
     if (found == sizeof readers / sizeof *readers)
         return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, LAZ, PTX, PTS, or UTF-8 text with columns)");
+                               "is no point cloud known here (PLY, LAS, LAZ, PCD, PTX, PTS, or UTF-8 text with columns)");
     *reader = readers[found].reader;
     if ((*reader)->text && !memchr(bytes, '\n', available) && memchr(bytes, '\r', available))
         source->newline = '\r';

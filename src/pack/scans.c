@@ -16,8 +16,10 @@
 #include "cloud/crs.h"
 
 enum { names_listed = 3, bytes_a_line = 40 };
-static const double like_ranges = 8;    /* times the smallest white less black: of one kind */
-static const double like_steps = 10;    /* times the finest step of coordinates: nothing to mention */
+static const double like_ranges = 8; /* times the smallest white less black: of one kind */
+static const double like_steps = 10; /* times the finest step of coordinates: nothing to mention */
+/* 32 bit floats: coarser than a millimetre, and than the scan's size alone would make them. */
+static const double float_step = 1e-3, float_step_diagonals = 1e-6;
 static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
 
 /* "a.las, b.las, c.las and 4 more" */
@@ -122,7 +124,7 @@ int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t co
 
 void spl_scans_finish(struct spl_scans *scans)
 {
-    for (size_t i = 0; i < scans->count; i++)
+    for (size_t i = 0; scans->list && i < scans->count; i++)
         spl_crs_finish(&scans->list[i].coordinates);
     free(scans->list);
     *scans = (struct spl_scans){0};
@@ -255,6 +257,31 @@ static double gap(const struct spl_scan *a, const struct spl_scan *b)
     return sqrt(square);
 }
 
+static void look_at_floats(const struct saying *s)
+{
+    struct group coarse = {0};
+    double step = 0, of = 0;
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        double largest = 0;
+        for (int k = 0; k < 3; k++)
+            largest = fmax(largest, fmax(fabs(scan->min[k]), fabs(scan->max[k])));
+        if (!scan->coordinates.floats || !has_points(scan))
+            continue;
+        double own = nextafterf((float)largest, INFINITY) - (float)largest;
+        if (own <= float_step || own <= float_step_diagonals * diagonal(scan))
+            continue;
+        add(&coarse, scan);
+        of = own > step ? largest : of;
+        step = fmax(own, step);
+    }
+    if (coarse.count)
+        say(s,
+            "coordinates are 32 bit floats in %s, which at %.6g are multiples of %g: what was finer was lost when they "
+            "were written. Write them as doubles, or less a whole number that brings them near 0",
+            list(&coarse), of, step);
+}
+
 /* Each scan against all others: of the thousands that a street may have, that is still nothing beside reading them. */
 static void compare_places(const struct saying *s)
 {
@@ -295,6 +322,7 @@ void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context
     compare_ranges(&saying);
     compare_attributes(&saying);
     compare_steps(&saying);
+    look_at_floats(&saying);
     compare_places(&saying);
 }
 

@@ -143,6 +143,14 @@ static const struct row rows[] = {
     {"copc/1.2-with-color.copc.laz", NULL, 1065, 0, {637296.735, 851249.538, 434.09784}},
     {"copc/lion_takanawa.copc.laz", NULL, 341989, 0, {-2.60490957, 3.99850966, -1.5115028}},
     {"copc/lone-star.copc.laz", NULL, 518862, 0, {515392.121, 4918365.95, 2328.67444}},
+    {"interchange/pcd/pcl-learn0.pcd", NULL, 182292, 124908, {-0.0517441395, 0.0956667473, 0.850873603}},
+    {"interchange/pcd/pcl-milk.pcd", NULL, 12575, 0, {0.249620892, -0.0965768723, -0.696798666}},
+    {"interchange/pcd/pcl-object_template_0.pcd", NULL, 1397, 0, {-0.106276255, 0.0947920007, 0.734193853}},
+    {"interchange/pcd/pcl-samp41-utm.pcd", NULL, 11231, 0, {513325.865, 5403710.75, 309.911434}},
+    {"interchange/pcd/pdal-autzen-utm.pcd", NULL, 1065, 0, {494494.664, 4878134.83, 132.312995}},
+    {"interchange/pcd/pdal-missingheader.pcd", NULL, 10, 0, {289816.322, 4320979.6, 170.679}},
+    {"interchange/pcd/pdal-utm17_space.pcd", NULL, 10, 0, {289816.322, 4320979.6, 170.679}},
+    {"interchange/pcd/simple-ascii.pcd", NULL, 213, 0, {0.00906073761, 0.15169854, 0}},
     {"trees/pine.laz", NULL, 73851, 0, {0.0310485396, -0.0412745927, 9.84377304}},
     {"trees/pine_plot.laz", NULL, 114024, 0, {5.42936256, 4.90536146, 55.0804419}},
     {"trees/spruce.laz", NULL, 83392, 0, {-0.0945700499, 0.00851659576, 8.13124533}},
@@ -202,7 +210,7 @@ static int check_file(const char *path, const struct stat *status, int type, str
 static void every_file_loads_right_or_is_refused(void **state)
 {
     static const char *const folders[] = {
-        "bad", "formats", "als", "trees", "copc", "7scenes_4stations.ptx", "sceaux/surfels.ply"};
+        "bad", "formats", "als", "trees", "copc", "interchange/pcd", "7scenes_4stations.ptx", "sceaux/surfels.ply"};
     char path[4096];
     (void)state;
     for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {

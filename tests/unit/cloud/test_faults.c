@@ -25,6 +25,28 @@ static void make_binary_ply(struct bytes *b)
     }
 }
 
+static void make_pcd(struct bytes *b)
+{
+    put_text(b, "# .PCD v0.7\nFIELDS rgb x y z\nWIDTH 3\nVIEWPOINT 1 2 3 1 0 0 0\nDATA ascii\n"
+                "65535 1.25 2.25 3.25\n255 4.25 5.25 6.25\n16711680 7.25 8.25 9.5\n");
+}
+
+static void make_binary_pcd(struct bytes *b)
+{
+    put_text(b, "# .PCD v0.7\nFIELDS x y z intensity\nSIZE 2 2 2 2\nTYPE I I I U\nPOINTS 3\nDATA binary\n");
+    for (int16_t i = 0; i < 3; i++)
+        put(b, (int16_t[4]){(int16_t)(i + 10), (int16_t)(i + 20), (int16_t)(i + 30), i}, 8);
+}
+
+static void make_compressed_pcd(struct bytes *b)
+{
+    static const char literals[] = "\3\0\0\0\24\0\3\0\0\0\24\0\3\0\0\0\24\0\3\0\0\0\24\0";
+    put_text(b, "# .PCD v0.7\nFIELDS x y z i\nSIZE 2 2 2 2\nTYPE I I I U\nPOINTS 3\nDATA binary_compressed\n");
+    put(b, (uint32_t[2]){3 * 8 + 1, 3 * 8}, 8);
+    put(b, (uint8_t[1]){3 * 8 - 1}, 1); /* so many bytes as they are */
+    put(b, literals, 3 * 8);
+}
+
 static void make_las(struct bytes *b)
 {
     struct las las = las_default(4, 7, 3, 3);
@@ -57,8 +79,9 @@ static void make_csv(struct bytes *b)
     put_text(b, "X,Y,Z,Intensity\n1.25,2.25,3.25,20\n4.25,5.25,6.25,30\n7.25,8.25,9.25,40\n");
 }
 
-static void (*const makers[])(struct bytes *) = {make_ply, make_binary_ply, make_las, make_gray_las,
-                                                 make_ptx, make_pts,        make_csv};
+static void (*const makers[])(struct bytes *) = {
+    make_ply, make_binary_ply, make_pcd, make_binary_pcd, make_compressed_pcd,
+    make_las, make_gray_las,   make_ptx, make_pts,        make_csv};
 enum { MAKERS = sizeof makers / sizeof *makers };
 
 static void cut_at_every_byte(void **state)

@@ -85,6 +85,21 @@ static void lists_are_parsed(void **state)
     assert_null(spl_keep_find_missing(&keep, columns | 1u << SPL_COLUMN_CLASS)); /* a label is a class */
 }
 
+static void fields_of_pcd(void **state)
+{
+    struct kept k;
+    (void)state;
+    open_kept_text(
+        "# .PCD v.7\nFIELDS x curvature y z rgb ReturnNumber histogram\nTYPE F F F F F U F\nCOUNT 1 1 1 1 1 1 2\n"
+        "WIDTH 2\nDATA ascii\n1 0.25 2 3 0 1 7 8\n4 nan 5 6 0 2 9 10\n",
+        NULL, "curvature", &k);
+    check(&k, SPL_SCALAR_KEPT, 0, 0.25);
+    check(&k, SPL_SCALAR_KEPT, 1, NAN);
+    check(&k, SPL_SCALAR_RETURN, 1, 2);
+    assert_string_equal(k.info->fields, "x, curvature, y, z, rgb, ReturnNumber");
+    close_kept(&k);
+}
+
 static void fields_of_las_records(void **state)
 {
     static struct bytes b;
@@ -289,6 +304,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lists_are_parsed),
+        cmocka_unit_test(fields_of_pcd),
         cmocka_unit_test(fields_of_las_records),
         cmocka_unit_test(extra_bytes_go_by_their_names),
         cmocka_unit_test(what_is_not_named_is_left_out),

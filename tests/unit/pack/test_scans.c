@@ -47,6 +47,19 @@ static char *write_ply(const char *name, double x, const char *properties, const
     return path;
 }
 
+/* 100 points of 32 bit floats in a row from (x, 0, 0) on, `step` apart. */
+static char *write_pcd(const char *name, float x, float step)
+{
+    char *path = path_of(name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fprintf(f, "# .PCD v0.7\nFIELDS x y z\nWIDTH 100\nDATA binary\n");
+    for (int i = 0; i < 100; i++)
+        assert_int_equal(fwrite((float[3]){x + step * (float)i}, sizeof(float), 3, f), 3);
+    assert_int_equal(fclose(f), 0);
+    return path;
+}
+
 static void put(uint8_t *p, uint64_t value, unsigned bytes)
 {
     for (unsigned i = 0; i < bytes; i++)
@@ -132,7 +145,8 @@ static void listen(void *context, const char *text)
 static const char *pack_two(const char *a, const char *b, bool intensity, struct spl_dataset **out)
 {
     const char *inputs[2] = {a, b}, *output = path_of("out.spld");
-    struct spl_pack_options options = {.size = sizeof options, .inputs = inputs,
+    struct spl_pack_options options = {.size = sizeof options,
+                                       .inputs = inputs,
                                        .input_count = b ? 2 : 1,
                                        .output = output,
                                        .intensity = intensity,
@@ -375,6 +389,16 @@ static void test_coordinate_systems(void **state)
     }
 }
 
+/* What lies far from 0 has lost its millimetres; what is only large has not. */
+static void test_coarse_floats(void **state)
+{
+    (void)state;
+    const char *text = pack_two(write_pcd("utm.pcd", 5403700, 1), write_pcd("near.pcd", 0, 1), false, NULL);
+    assert_non_null(strstr(text, "32 bit floats in utm.pcd, which at 5.4038e+06 are multiples of 0.5"));
+    assert_string_equal(pack_two(path_of("near.pcd"), NULL, false, NULL), "");
+    assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -385,6 +409,7 @@ int main(void)
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
+        cmocka_unit_test(test_coarse_floats),
     };
     if (!mkdtemp(folder))
         return 1;
