@@ -153,6 +153,7 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
+    points->up[2] = 1;
     int rc = spl_point_batch_init(&batch, batch_points, err);
     for (size_t i = 0; !rc && i < scans->count; i++)
         rc = gather_file(points, &batch, scans, &scans->list[i], stage, err);
