@@ -7,6 +7,7 @@ import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
+import {toWorld} from "./place.js";
 import {askJson, setPass, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 
@@ -23,7 +24,10 @@ let asked = false;
 async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
-    const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = parse(location.hash);
+    const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = await toWorld(
+      dataset,
+      parse(location.hash),
+    );
     const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
     document.title = id;
     stage.element.ariaLabel = `View of ${id}`;

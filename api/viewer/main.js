@@ -5,6 +5,7 @@ import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
+import {toWorld} from "./place.js";
 import {Points, coordinates} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
@@ -92,6 +93,8 @@ async function open() {
     if (turn !== opening) return;
     choices($("dataset"), ids.includes(id) ? ids : [...ids, id], id);
     if (found instanceof Error) throw found;
+    Object.assign(wanted, await toWorld(found, wanted));
+    if (turn !== opening) return;
     dataset = found;
     parameters ??= new Controls($("method-help"));
     stage.pixels = limits.pixels;

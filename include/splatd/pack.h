@@ -73,7 +73,7 @@ struct spl_photo_report {
 
 struct spl_pack_options {
     size_t size;               /* spl_pack_options_init() */
-    const char *const *inputs;
+    const char *const *inputs; /* scans; folders, for all scans below them; @NAME, a list with a path a line */
     size_t input_count;
     const char *output;        /* NAME.spld */
     const char *columns;       /* text inputs, may be NULL */
@@ -90,8 +90,14 @@ struct spl_pack_options {
     /* Each thing in which scans disagree, once they have been read, and wires that are too dear to join: a sentence or
      * two without a newline. May be NULL. */
     void (*warn)(void *context, const char *text);
-    void *progress_context; /* of both */
+    void *progress_context; /* of all three */
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
+    /* Each input that cannot be read, and why: the dataset is made of the others, META names it. NULL: the first one
+     * fails all. */
+    void (*left_out)(void *context, const struct spl_error *why);
+    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
+     * those out. NULL = none of them. */
+    const char *keep;
     const char *unit;          /* of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say */
     const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
 };

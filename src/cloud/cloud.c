@@ -67,6 +67,7 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
         code = spl_cloud_find_colors(cloud, err);
     if (code < 0)
         goto fail;
+    cloud->info.named = spl_cloud_find_wrong_ending(path, cloud->reader, cloud->info.format);
     cloud->options = NULL;
     *out = cloud;
     return SPL_OK;

@@ -1,7 +1,7 @@
 /* Point clouds from files, streamed in batches: a file larger than memory is no reason to fail.
  *
- * spl_cloud_open() recognises the format by content (extension only breaks ties among text formats) and dispatches to
- * one reader per format (readers.c). Owned by one thread at a time. */
+ * spl_cloud_open() recognises the format by content alone and dispatches to one reader per format (readers.c). Owned by
+ * one thread at a time. */
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
@@ -58,6 +58,7 @@ struct spl_cloud_options {
 
 struct spl_cloud_info {
     const char *format;       /* static: "PLY", "LAS", "LAZ", "PCD", "PTX", "PTS", "text" */
+    const char *named;        /* static: the format that the name's ending is of, where it is another; else NULL */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     uint64_t file_bytes;
@@ -87,6 +88,12 @@ struct spl_cloud;
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
+
+/* Whether a name ends as only scans do (".las"), so that a search of a folder takes it. */
+bool spl_cloud_is_named_scan(const char *path);
+
+/* These endings, ".ply, .las, …", into `text`, cut to `size`. */
+void spl_cloud_list_endings(char *text, size_t size);
 
 /* Opens and checks the header. E57 gives SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
  * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */

@@ -68,13 +68,15 @@ int spl_path_fail(const struct spl_path_reader *reader, size_t index, int rc, co
     return spl_fail_field(err, rc, field, "%s[%zu]: %s", reader->list, index, why->message);
 }
 
-static int read_own_key(struct spl_path_reader *reader, json_t *view, struct spl_error *err)
+static int read_own_key(struct spl_path_reader *reader, json_t *view, json_t *crs, struct spl_error *err)
 {
     static const char *const others[] = {"camera", "time", NULL}, *const sides[] = {"width", "height"};
     json_t *time = json_object_get(view, "time"), *camera = json_object_get(view, "camera");
     struct spl_camera out;
     if (time && !json_is_number(time))
         return spl_fail_field(err, SPL_E_INPUT, "time", "time must be a number, not %s", spl_json_type_name(time));
+    if (crs && !json_object_get(view, "crs") && !json_object_get(camera, "crs"))
+        json_object_set(view, "crs", crs);
     bool sized = spl_camera_form_has_size(camera);
     for (int i = 0; i < 2; i++)
         sized = sized || json_object_get(view, sides[i]) || json_object_get(camera, sides[i]);
@@ -92,10 +94,10 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     reader->list = list ? "keyframes" : "frames";
     json_object_foreach((json_t *)json, name, value)
     {
-        bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed");
-        if (!number && !flag && strcmp(name, reader->list))
-            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a path; known are %s, closed, fps",
-                                  name, reader->list);
+        bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed"), crs = !strcmp(name, "crs");
+        if (!number && !flag && !crs && strcmp(name, reader->list))
+            return spl_fail_field(err, SPL_E_INPUT, name,
+                                  "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name, reader->list);
         if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
             return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name,
                                                           "fps must be a number above 0, up to 1000, not %g",
@@ -115,7 +117,7 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     int rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
-        if ((rc = read_own_key(reader, json_array_get(list, i), &why))) {
+        if ((rc = read_own_key(reader, json_array_get(list, i), json_object_get(json, "crs"), &why))) {
             spl_camera_locate(json_array_get(list, i), &why);
             spl_path_fail(reader, i, rc, &why, err);
         }

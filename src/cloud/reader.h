@@ -51,6 +51,9 @@ extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_pcd_rea
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);
 
+/* The format that the path's ending is of, static, where `format` of `reader` is another one; else NULL. */
+const char *spl_cloud_find_wrong_ending(const char *path, const struct spl_cloud_reader *reader, const char *format);
+
 /* For readers whose fields have names, while they open: the column that a field fills, if any, which is then one of the
  * cloud's. Names end up in messages about fields that are not there. */
 int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length);

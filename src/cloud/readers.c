@@ -1,8 +1,11 @@
-/* The table of readers: which one a file needs, by its first bytes alone, in the order in which they are asked. A name's
- * ending decides nothing. Pure functions; any thread. */
+/* The table of readers: which one a file needs, by its first bytes alone, in the order in which they are asked. A
+ * name's ending decides nothing of how a file is read; it says which files of a folder are scans, and a wrong one is
+ * told. Pure functions; any thread. */
 #include "cloud/reader.h"
 
+#include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/pcd.h"
@@ -66,6 +69,61 @@ static const struct {
     {&spl_text_reader, is_text},
 };
 
+/* What scans are called. Of formats that one reader has, `formats` has those that the ending is right for. */
+static const struct ending {
+    const char *ending;
+    const struct spl_cloud_reader *reader; // may be NULL: none yet
+    const char *format;                    /* for people */
+    const char *formats;                   // may be NULL: all of the reader
+    bool loose;                            /* other things are called so too: no folder is searched for it */
+} endings[] = {
+    {"ply", &spl_ply_reader, "PLY", NULL, false},
+    {"las", &spl_las_reader, "LAS", "LAS", false},
+    {"laz", &spl_las_reader, "LAZ", "LAZ COPC", false},
+    {"e57", NULL, "E57", NULL, false},
+    {"pcd", &spl_pcd_reader, "PCD", NULL, false},
+    {"ptx", &spl_ptx_reader, "PTX", NULL, false},
+    {"pts", &spl_text_reader, "PTS", NULL, false},
+    {"xyz", &spl_text_reader, "text", NULL, false},
+    {"xyzrgb", &spl_text_reader, "text", NULL, false},
+    {"txt", &spl_text_reader, "text", NULL, true},
+    {"csv", &spl_text_reader, "text", NULL, true},
+    {"asc", &spl_text_reader, "text", NULL, true},
+};
+
+static const struct ending *find_ending(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
+    if (!dot || (slash && dot < slash))
+        return NULL;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        if (!strcasecmp(dot + 1, endings[i].ending))
+            return &endings[i];
+    return NULL;
+}
+
+bool spl_cloud_is_named_scan(const char *path)
+{
+    const struct ending *ending = find_ending(path);
+    return ending && !ending->loose;
+}
+
+void spl_cloud_list_endings(char *text, size_t size)
+{
+    size_t used = 0;
+    text[0] = 0;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings && used < size; i++)
+        if (!endings[i].loose)
+            used += (size_t)snprintf(text + used, size - used, "%s.%s", used ? ", " : "", endings[i].ending);
+}
+
+const char *spl_cloud_find_wrong_ending(const char *path, const struct spl_cloud_reader *reader, const char *format)
+{
+    const struct ending *ending = find_ending(path);
+    bool right = !ending || (ending->reader == reader && (!ending->formats || strstr(ending->formats, format)));
+    return right ? NULL : ending->format;
+}
+
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err)
 {
     const uint8_t *bytes;
@@ -74,9 +132,10 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
     if (code < 0)
         return code;
     if (begins_with(bytes, available, "SPLD\r\n"))
-        return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
-                               "is; pack takes the scans that it was made of");
+        return spl_source_fail(
+            source, SPL_E_INPUT, "", err,
+            "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
+            "is; pack takes the scans that it was made of");
     if (begins_with(bytes, available, "ASTM-E57"))
         return spl_source_fail(source, SPL_E_UNSUPPORTED, "", err,
                                "is E57, which is not supported yet: convert it first, with \"pdal translate IN.e57 "

@@ -8,11 +8,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <splatd/pack.h>
 
+#include "base/array.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
@@ -119,12 +119,53 @@ static void name_refused(void *context, const struct spl_error *why)
     fprintf(stderr, "splatd: left out: %s\n", why->message);
 }
 
+/* What was left out is said at once, while a user may still stop, and again when all is done. */
+struct left_out {
+    char **reasons;
+    size_t count, capacity;
+};
+
+struct listener {
+    struct spl_cmd_progress progress; /* first: it is the context of what knows nothing else */
+    struct left_out left_out;
+};
+
+static void say_left_out(void *context, const struct spl_error *why)
+{
+    struct listener *listener = context;
+    struct left_out *left_out = &listener->left_out;
+    spl_cmd_progress_finish(&listener->progress);
+    fprintf(stderr, "splatd: left out: ");
+    spl_cmd_put_text(stderr, why->message, 0);
+    fputc('\n', stderr);
+    char *copy = spl_array_reserve(left_out->reasons, left_out->capacity, left_out->count + 1, NULL)
+                     ? NULL
+                     : strdup(why->message);
+    if (copy)
+        left_out->reasons[left_out->count++] = copy;
+}
+
+static void finish_left_out(struct left_out *left_out, bool say)
+{
+    if (say && left_out->count)
+        fprintf(stderr, "%zu scans were left out:\n", left_out->count);
+    for (size_t i = 0; i < left_out->count; i++) {
+        if (say) {
+            fprintf(stderr, "  ");
+            spl_cmd_put_text(stderr, left_out->reasons[i], 0);
+            fputc('\n', stderr);
+        }
+        free(left_out->reasons[i]);
+    }
+    free(left_out->reasons);
+}
+
 struct arguments {
     struct spl_pack_options pack;
     struct spl_photo_options photos;
     int textures;        /* enum spl_texture_coding; -1 = not given */
     const char *quality; // may be NULL
-    bool keep_going;
+    bool keep_going, skip_broken;
 };
 
 static const char *const texture_names[SPL_TEXTURES_COUNT + 1] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
@@ -153,8 +194,13 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, pack.columns)},
     {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
      SPL_CMD_FLAG(struct arguments, pack.intensity)},
-    {"unit", "U", "of coordinates, whatever scans say: " "m, ft, us-ft, km, cm, mm, yd, in, unknown, or metres a unit, such as \"0.2 m\"", .otherwise = "what the scans say",
-     SPL_CMD_TEXT(struct arguments, pack.unit)},
+    {"keep", "NAME,…",
+     "fields of the scans beside class, intensity, return_number, number_of_returns and scan, as they are called "
+     "there: gps_time, scan_angle, extra bytes, properties, columns; 'none' among them leaves out what is not named",
+     SPL_CMD_TEXT(struct arguments, pack.keep)},
+    {"unit", "U",
+     "of coordinates, whatever scans say: m, ft, us-ft, km, cm, mm, yd, in, unknown, or metres a unit such as 0.2m",
+     .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.unit)},
     {"crs", "WHICH",
      "the scans' coordinate system, whatever they say: EPSG:25832, EPSG:2994+EPSG:6360 with that of heights, a file of "
      "WKT, or none",
@@ -192,6 +238,8 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
      SPL_CMD_TEXT(struct arguments, photos.device)},
+    {"skip-broken", NULL, "scans that cannot be read are named and left out",
+     SPL_CMD_FLAG(struct arguments, skip_broken)},
     {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
      SPL_CMD_COUNT_32(struct arguments, pack.threads, 1, 64)},
 };
@@ -199,18 +247,25 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
-        "usage: splatd pack IN... -o NAME.spld [--columns LIST] [--intensity] [--unit U] [--crs WHICH]\n"
-        "                   [--neighbours K] [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
+        "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
+        "                   [--unit U] [--crs WHICH] [--neighbours K]\n"
+        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
         "                   [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
-        "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are kept "
-        "once.\n\n"
+        "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are "
+        "kept once.\n"
+        "IN is a scan, a folder (all scans in it and below, by the endings of their names) or @LIST, a text with a\n"
+        "path a line, relative to its own folder, '#' before comments. What is named twice is taken once.\n\n"
         "One scan, and what came of it:\n"
         "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
         "Several scans of one place, in the same coordinates, into one dataset:\n"
         "  splatd pack street-*.las -o street.spld\n"
+        "All tiles of a folder, with whatever cannot be read named and left out:\n"
+        "  splatd pack tiles --skip-broken -o city.spld\n"
+        "The same from a list of their names:\n"
+        "  splatd pack @tiles.txt -o city.spld\n"
         "Text whose columns nothing names ('-' skips one):\n"
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"
@@ -242,13 +297,6 @@ static const char *find_contradiction(const struct arguments *a)
     return NULL;
 }
 
-/* A dataset that is written over the scan it is made of takes the scan's place for good. */
-static bool is_same_file(const char *a, const char *b)
-{
-    struct stat one, other;
-    return !stat(a, &one) && !stat(b, &other) && one.st_dev == other.st_dev && one.st_ino == other.st_ino;
-}
-
 /* What is wrong with the whole, before a scan is opened. */
 static int check(const struct arguments *a, struct spl_error *err)
 {
@@ -262,25 +310,18 @@ static int check(const struct arguments *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE,
                         "pack writes a dataset, whose name ends in .spld: -o NAME.spld, not '%.300s'", o->output);
     const char *contradiction = find_contradiction(a);
-    if (contradiction)
-        return spl_fail(err, SPL_E_USAGE, "%s", contradiction);
-    for (size_t i = 0; i < o->input_count; i++)
-        if (is_same_file(o->output, o->inputs[i]))
-            return spl_fail(err, SPL_E_USAGE,
-                            "%.300s is a scan that is to be packed; write the dataset beside it: -o NAME.spld",
-                            o->output);
-    return SPL_OK;
+    return contradiction ? spl_fail(err, SPL_E_USAGE, "%s", contradiction) : SPL_OK;
 }
 
 int spl_cmd_pack(int argc, char **argv)
 {
-    struct spl_cmd_progress progress = {0};
+    struct listener listener = {0};
     struct arguments a = {
         .pack = {.size = sizeof a.pack,
                  .progress = spl_cmd_progress,
                  .warn = say_warning,
-                 .progress_context = &progress},
-        .photos = {.size = sizeof a.photos, .trained = say_trained, .context = &progress},
+                 .progress_context = &listener},
+        .photos = {.size = sizeof a.photos, .trained = say_trained, .context = &listener},
         .textures = -1,
     };
     struct spl_pack_report report = {0};
@@ -292,14 +333,15 @@ int spl_cmd_pack(int argc, char **argv)
     a.pack.input_count = (size_t)(argc - optind);
     if (rc || (rc = check(&a, &err)))
         return spl_cmd_fail(&err);
+    a.pack.left_out = a.skip_broken ? say_left_out : NULL;
     a.photos.refused = a.keep_going ? name_refused : NULL;
     a.photos.textures = a.textures < 0 ? SPL_TEXTURES_ADAPTIVE : (enum spl_texture_coding)a.textures;
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
     catch_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
-    spl_cmd_progress_finish(&progress);
-    if (rc)
-        return spl_cmd_fail(&err);
-    print_summary(a.pack.output, &report);
-    return 0;
+    spl_cmd_progress_finish(&listener.progress);
+    if (!rc)
+        print_summary(a.pack.output, &report);
+    finish_left_out(&listener.left_out, !rc);
+    return rc ? spl_cmd_fail(&err) : 0;
 }

@@ -31,6 +31,19 @@ static bool take_text(const json_t *json, bool optional, char out[SPL_STREAM_TEX
     return length > 0 || optional;
 }
 
+static int read_steps(struct spl_dataset *dataset, size_t s, const json_t *row, struct spl_error *err)
+{
+    const json_t *first = json_object_get(row, "first"), *steps = json_object_get(row, "steps_a_unit");
+    struct spl_stream *stream = &dataset->streams[s];
+    stream->first = json_is_number(first) ? json_number_value(first) : (double)NAN;
+    stream->steps_a_unit = json_number_value(steps);
+    const char *what = spl_stream_judge_steps(stream->first, stream->steps_a_unit);
+    return what ? spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                                 "%s: section META: of \"streams[%zu]\" %s; pack the dataset again", dataset->name, s,
+                                 what)
+                : SPL_OK;
+}
+
 static int read_stream(struct spl_dataset *dataset, size_t s, const json_t *row, struct spl_error *err)
 {
     struct spl_stream_info *all = dataset->info.streams, *stream = &all[s];
@@ -55,7 +68,7 @@ static int read_stream(struct spl_dataset *dataset, size_t s, const json_t *row,
             return wrong(dataset, err, s, ".name", stream->name, "must be another: a stream before it has this name");
     dataset->streams[s] = (struct spl_stream){.name = stream->name, .type = stream->type, .unit = stream->unit};
     dataset->stream_types[s] = spl_stream_type_from_name(stream->type);
-    return SPL_OK;
+    return dataset->stream_types[s] == SPL_STREAM_STEPS ? read_steps(dataset, s, row, err) : SPL_OK;
 }
 
 int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err)
@@ -110,12 +123,12 @@ static bool read_value(const struct spl_dataset *dataset, const struct spl_place
     uint32_t index = (uint32_t)(chunk - tables->chunks);
     struct spl_stream_code code = {tables->base[stream][index], tables->width[stream][index]};
     uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // which the page has
-    uint64_t word = (uint64_t)chunk->geometry_word + spl_chunk_words(chunk) +
-                    spl_tables_get_stream_words(tables, stream, index);
+    uint64_t word =
+        (uint64_t)chunk->geometry_word + spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, stream, index);
     if (spl_dataset_read(dataset, dataset->pages[tables->page]->offset + word * sizeof *words, words,
                          count * sizeof *words, NULL))
         return false;
-    *value = spl_stream_decode(dataset->stream_types[stream], code, words, (uint32_t)(id - chunk->first_id));
+    *value = spl_stream_decode(&dataset->streams[stream], code, words, (uint32_t)(id - chunk->first_id));
     return true;
 }
 

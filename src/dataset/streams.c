@@ -42,6 +42,31 @@ static double value_of_uint(struct spl_stream_code code, uint32_t number)
     return (double)(code.base + number); /* of a forged file it may wrap */
 }
 
+/* One code more than values need: the last one is for those that have none. A chunk of one value needs neither. */
+static void quantise_steps(const double *values, uint32_t count, struct spl_stream_code *code, uint32_t *codes)
+{
+    uint32_t low = SPL_STREAM_NONE, high = 0;
+    bool none = false;
+    for (uint32_t i = 0; i < count; i++) {
+        spl_assert(values[i] >= 0 && values[i] <= SPL_STREAM_NONE && values[i] == floor(values[i]));
+        codes[i] = (uint32_t)values[i];
+        none |= codes[i] == SPL_STREAM_NONE;
+        low = codes[i] < low ? codes[i] : low;
+        high = codes[i] > high && codes[i] != SPL_STREAM_NONE ? codes[i] : high;
+    }
+    bool same = low == SPL_STREAM_NONE || (low == high && !none);
+    *code = (struct spl_stream_code){low, same ? 0 : (uint8_t)bits_for_count(high - low + 1)};
+    for (uint32_t i = 0; i < count && !same; i++)
+        codes[i] = codes[i] == SPL_STREAM_NONE ? UINT32_MAX >> (32 - code->width) : codes[i] - low;
+}
+
+static double value_of_steps(struct spl_stream_code code, uint32_t number)
+{
+    bool none = code.width && number == UINT32_MAX >> (32 - code.width);
+    number += code.base; /* of a forged file it may wrap */
+    return none || number == SPL_STREAM_NONE ? (double)NAN : (double)number;
+}
+
 static float base_of_half_octaves(struct spl_stream_code code)
 {
     float largest;
@@ -100,6 +125,7 @@ static const struct {
 } types[SPL_STREAM_UNKNOWN] = {
     [SPL_STREAM_UINT] = {"uint", quantise_uint, value_of_uint, NULL},
     [SPL_STREAM_HALF_OCTAVES] = {"half-octaves", quantise_half_octaves, value_of_half_octaves, judge_half_octaves},
+    [SPL_STREAM_STEPS] = {"steps", quantise_steps, value_of_steps, NULL},
 };
 
 enum spl_stream_type spl_stream_type_from_name(const char *name)
@@ -144,8 +170,22 @@ const char *spl_stream_judge(enum spl_stream_type type, const uint32_t *base, co
     return type < SPL_STREAM_UNKNOWN && types[type].judge ? types[type].judge(base, width, count, at) : NULL;
 }
 
-double spl_stream_decode(enum spl_stream_type type, struct spl_stream_code code, const uint32_t *words, uint32_t i)
+const char *spl_stream_judge_steps(double first, double steps_a_unit)
 {
-    return type < SPL_STREAM_UNKNOWN ? types[type].value_of(code, spl_bits_get(words, i * code.width, code.width))
-                                     : (double)NAN;
+    const double most = 0x1p53; /* up to which doubles are whole */
+    if (!(fabs(first) <= most) || first != floor(first))
+        return "\"first\" must be a whole number of at most 2^53";
+    return steps_a_unit > 0 && isfinite(steps_a_unit) && isfinite(2 * most / steps_a_unit)
+               ? NULL
+               : "\"steps_a_unit\" must be a number above 0";
+}
+
+double spl_stream_decode(const struct spl_stream *stream, struct spl_stream_code code, const uint32_t *words,
+                         uint32_t i)
+{
+    enum spl_stream_type type = spl_stream_type_from_name(stream->type);
+    if (type == SPL_STREAM_UNKNOWN)
+        return (double)NAN;
+    double value = types[type].value_of(code, spl_bits_get(words, i * code.width, code.width));
+    return type == SPL_STREAM_STEPS ? (stream->first + value) / stream->steps_a_unit : value;
 }

@@ -219,12 +219,17 @@ void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const str
 static char *describe(const struct spl_dataset_writer *writer, const struct spl_counts *counts, const json_t *meta)
 {
     json_t *whole = json_copy((json_t *)meta), *streams = json_array();
+    bool failed = false;
     for (uint32_t s = 0; s < writer->stream_count; s++) {
         const struct spl_stream *stream = &writer->streams[s];
-        json_array_append_new(
-            streams, json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit", stream->unit));
+        json_t *row = json_pack("{s:s, s:s, s:s}", "name", stream->name, "type", stream->type, "unit", stream->unit);
+        if (spl_stream_type_from_name(stream->type) == SPL_STREAM_STEPS) {
+            failed |= json_object_set_new(row, "first", json_real(stream->first)) != 0;
+            failed |= json_object_set_new(row, "steps_a_unit", json_real(stream->steps_a_unit)) != 0;
+        }
+        json_array_append_new(streams, row);
     }
-    bool failed = json_array_size(streams) != writer->stream_count;
+    failed |= json_array_size(streams) != writer->stream_count;
     failed |= json_object_set_new(whole, "streams", streams) != 0;
     failed |= json_object_set_new(whole, "counts", spl_counts_to_json(counts, writer->stream_count)) != 0;
     char *text = failed ? NULL : json_dumps(whole, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
@@ -315,8 +320,8 @@ static int write_rest(struct spl_dataset_writer *writer, const struct described 
 {
     int rc = add_section(writer, SPL_SECTION_META, 0, meta, strlen(meta), err);
     if (!rc)
-        rc = add_section(writer, SPL_SECTION_DIRECTORY, 0, what->rows,
-                         (writer->page_count + 1ull) * sizeof *what->rows, err);
+        rc = add_section(writer, SPL_SECTION_DIRECTORY, 0, what->rows, (writer->page_count + 1ull) * sizeof *what->rows,
+                         err);
     for (uint32_t page = 0; page < writer->page_count && !rc; page++)
         rc = write_head(writer, &what->pages[page], err);
     if (!rc && writer->dictionary)

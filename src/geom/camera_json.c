@@ -7,7 +7,9 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "geom/camera_matrix.h"
 
@@ -69,9 +71,27 @@ static int axes_from_name(const char *name)
     return !strcmp(name, "opencv") ? SPL_AXES_OPENCV : !strcmp(name, "opengl") ? SPL_AXES_OPENGL : -1;
 }
 
+/* EPSG:N alone, since longer texts can name files where they are understood. OGC:CRS84 is EPSG:4326 in the order in which
+ * all are taken here. */
+static int crs_from_text(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    bool epsg = !strncasecmp(text, "EPSG:", 5);
+    size_t digits = epsg ? strspn(text + 5, "0123456789") : 0;
+    if (digits && digits <= 6 && text[5] != '0' && !text[5 + digits])
+        value->n[0] = atoi(text + 5);
+    else if (!strcasecmp(text, "OGC:CRS84"))
+        value->n[0] = 4326;
+    else
+        return spl_fail_field(err, SPL_E_INPUT, name,
+                              "%s '%.32s' is none that is taken; write EPSG:N, as EPSG:4326, or OGC:CRS84", name, text);
+    return 0;
+}
+
 int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, const char *name, const char *text,
                           struct spl_error *err)
 {
+    if (kind == SPL_KIND_CRS)
+        return crs_from_text(value, name, text, err);
     bool axes = kind == SPL_KIND_AXES;
     int choice = axes ? axes_from_name(text) : spl_colmap_model_from_name(text);
     if (choice < 0)

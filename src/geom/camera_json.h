@@ -21,11 +21,12 @@ enum spl_value_kind {
     SPL_KIND_NUMBERS,
     SPL_KIND_AXES,
     SPL_KIND_MODEL,
+    SPL_KIND_CRS,  /* a number of EPSG's list */
     SPL_KIND_FORM, /* an object that stands for other values; only in JSON */
     SPL_KIND_END,  /* the service's own kinds go on from here */
 };
 
-enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16 };
+enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16, SPL_PLACE = 32 };
 
 enum spl_camera_param {
 #define PARAM(name, alias, kind, places, help) SPL_CAMERA_##name,
@@ -43,9 +44,18 @@ struct spl_value {
     const char *source;          /* the member of a form that said it, a literal; NULL: the parameter itself */
 };
 
+/* Who knows where other coordinates lie in a dataset's world. */
+struct spl_camera_places {
+    /* `in`, longitude or east, latitude or north, and height in EPSG:`crs`, to `out`. `in` NULL: may it be asked? Errors
+     * carry "crs", or `name` where the point is at fault. */
+    int (*to_world)(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
+                    double out[3], struct spl_error *err);
+};
+
 /* What stands in for parameters that were left out: the default view of a dataset. */
 struct spl_camera_defaults {
     double eye[3], target[3], up[3], fov, near, far;
+    const struct spl_camera_places *places; // may be NULL: nothing is known but the world
 };
 
 /* Caps on an image's size; no camera can lift them. What more there is to an image than its camera is judged by those
@@ -65,7 +75,7 @@ void spl_kind_get_count(enum spl_value_kind kind, unsigned *least, unsigned *mos
 /* Checks count, finiteness and wholeness of what was filled in. */
 int spl_value_check(const struct spl_value *value, enum spl_value_kind kind, const char *name, struct spl_error *err);
 
-/* The number of a choice of kind AXES or MODEL. */
+/* The number of a choice of kind AXES or MODEL, or of a coordinate system. */
 int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, const char *name, const char *text,
                           struct spl_error *err);
 

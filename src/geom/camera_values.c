@@ -118,11 +118,40 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
     return 0;
 }
 
+/* What is given in another coordinate system must be a point, and the dataset must know where that lies. */
+static int check_places(const struct spl_value *v, const struct spl_camera_defaults *defaults, struct spl_error *err)
+{
+    if (!given(v, SPL_CAMERA_crs))
+        return 0;
+    for (enum spl_camera_param other = SPL_CAMERA_matrix; other <= SPL_CAMERA_t; other++)
+        if (given(v, other))
+            return conflict(v, SPL_CAMERA_crs, other, err);
+    if (!defaults->places)
+        return spl_fail_field(err, SPL_E_INPUT, "crs",
+                              "crs goes with a dataset that the service serves; give world coordinates here");
+    return defaults->places->to_world(defaults->places, (uint32_t)v[SPL_CAMERA_crs].n[0], "crs", NULL, NULL, err);
+}
+
+/* Eye or target in the world. */
+static int get_point(const struct spl_value *v, enum spl_camera_param param, const double otherwise[3],
+                     const struct spl_camera_defaults *defaults, double out[3], struct spl_error *err)
+{
+    memcpy(out, given(v, param) ? v[param].n : otherwise, 3 * sizeof *out);
+    if (!given(v, param) || !given(v, SPL_CAMERA_crs))
+        return 0;
+    return defaults->places->to_world(defaults->places, (uint32_t)v[SPL_CAMERA_crs].n[0], names[param], v[param].n, out,
+                                      err);
+}
+
 static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                         struct spl_camera *camera, struct spl_error *err)
 {
     static const enum spl_camera_param look_at[] = {SPL_CAMERA_eye, SPL_CAMERA_target, SPL_CAMERA_up},
                                        colmap[] = {SPL_CAMERA_q, SPL_CAMERA_t};
+    double eye[3], target[3];
+    int rc = check_places(v, defaults, err);
+    if (rc)
+        return rc;
     if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
         return missing(SPL_CAMERA_matrix, SPL_CAMERA_convention, err);
     for (int i = 0; i < 3; i++) {
@@ -145,9 +174,10 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
                                       : missing(SPL_CAMERA_q, SPL_CAMERA_t, err);
     if (given(v, SPL_CAMERA_q))
         return spl_camera_set_colmap(camera, v[SPL_CAMERA_q].n, v[SPL_CAMERA_t].n, err);
-    return spl_camera_look_at(camera, given(v, SPL_CAMERA_eye) ? v[SPL_CAMERA_eye].n : defaults->eye,
-                              given(v, SPL_CAMERA_target) ? v[SPL_CAMERA_target].n : defaults->target,
-                              given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up, err);
+    if ((rc = get_point(v, SPL_CAMERA_eye, defaults->eye, defaults, eye, err)) ||
+        (rc = get_point(v, SPL_CAMERA_target, defaults->target, defaults, target, err)))
+        return rc;
+    return spl_camera_look_at(camera, eye, target, given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up, err);
 }
 
 /* Without a default view, a camera that says only where it stands would be drawn from a made-up angle. */

@@ -17,7 +17,7 @@ enum { batch_nodes = 256 };
 struct encoded { /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
-    struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT]; /* by chunk */
+    struct spl_stream_code (*codes)[SPL_STREAMS_MAX]; /* by chunk */
     size_t word_count;
     uint32_t chunk_count;
     struct spl_chunk_error error;

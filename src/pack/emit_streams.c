@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "pack/kept.h"
 
 /* What an attribute of the dataset is of a point, and of an inner node's splat. */
 static double class_of_point(const struct spl_points *points, size_t i)
@@ -54,6 +55,18 @@ void spl_emitted_streams_init(struct spl_emitted_streams *streams, const struct 
             streams->which[streams->count] = a;
             streams->list[streams->count++] = spl_streams_known[a];
         }
+    int scalars[SPL_POINT_SCALARS];
+    streams->scalar_count = spl_points_list_scalars(points, scalars);
+    for (uint32_t s = 0; s < streams->scalar_count; s++) {
+        const struct spl_scalar_values *scalar = &points->scalar[scalars[s]];
+        const char *name = spl_kept_name(points->keep, scalars[s]);
+        streams->which[streams->count] = SPL_STREAM_KNOWN_COUNT + scalars[s];
+        streams->list[streams->count++] = (struct spl_stream){.name = name,
+                                                              .type = scalar->plain ? "uint" : "steps",
+                                                              .unit = spl_kept_unit(name),
+                                                              .first = scalar->first,
+                                                              .steps_a_unit = scalar->steps_a_unit};
+    }
 }
 
 void spl_emitted_streams_finish(struct spl_emitted_streams *streams)
@@ -65,17 +78,37 @@ void spl_emitted_streams_finish(struct spl_emitted_streams *streams)
     *streams = (struct spl_emitted_streams){0};
 }
 
+static void take_attribute(const struct attribute *attribute, const struct spl_points *points,
+                           const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count,
+                           double *values)
+{
+    for (uint32_t i = 0; i < count; i++)
+        values[i] = node->child_count ? attribute->of_inner(&node->splats[items[i].index])
+                                      : attribute->of_point(points, node->begin + items[i].index);
+}
+
+/* The `s`-th of `scalars` that the points have. */
+static void take_scalar(const struct spl_scalar_values *scalar, uint32_t s, uint32_t scalars,
+                        const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count, double *values)
+{
+    for (uint32_t i = 0; i < count; i++)
+        values[i] = node->child_count ? node->numbers[(size_t)items[i].index * scalars + s]
+                                      : spl_scalar_number(scalar, node->begin + items[i].index);
+}
+
 uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, const struct spl_points *points,
                                     const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count,
                                     struct spl_stream_code *codes, uint32_t *words)
 {
     uint32_t used = 0;
+    uint32_t first_scalar = streams->count - streams->scalar_count;
     for (uint32_t s = 0; s < streams->count; s++) {
-        const struct attribute *attribute = &attributes[streams->which[s]];
         double values[SPL_CHUNK_SPLATS];
-        for (uint32_t i = 0; i < count; i++)
-            values[i] = node->child_count ? attribute->of_inner(&node->splats[items[i].index])
-                                          : attribute->of_point(points, node->begin + items[i].index);
+        if (s < first_scalar)
+            take_attribute(&attributes[streams->which[s]], points, node, items, count, values);
+        else
+            take_scalar(&points->scalar[streams->which[s] - SPL_STREAM_KNOWN_COUNT], s - first_scalar,
+                        streams->scalar_count, node, items, count, values);
         used +=
             spl_stream_encode(spl_stream_type_from_name(streams->list[s].type), values, count, &codes[s], words + used);
     }
@@ -98,8 +131,7 @@ int spl_emitted_streams_reserve(struct spl_emitted_streams *streams, size_t chun
 }
 
 void spl_emitted_streams_keep(struct spl_emitted_streams *streams, uint64_t first, const struct spl_chunk *chunks,
-                              struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT], uint32_t count,
-                              uint64_t *header_bits)
+                              struct spl_stream_code (*codes)[SPL_STREAMS_MAX], uint32_t count, uint64_t *header_bits)
 {
     for (uint32_t c = 0; c < count; c++)
         for (uint32_t s = 0; s < streams->count; s++) {

@@ -8,12 +8,12 @@
 #include "pack/tree.h"
 
 struct spl_emitted_streams {
-    struct spl_stream list[SPL_STREAM_KNOWN_COUNT]; /* what the points have, as the writer takes it */
-    int which[SPL_STREAM_KNOWN_COUNT];              /* SPL_STREAM_* of each */
-    uint32_t count;
-    uint64_t bits[SPL_STREAM_KNOWN_COUNT];
-    uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk, owned; what `list` looks at */
-    uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
+    struct spl_stream list[SPL_STREAMS_MAX]; /* what the points have, as the writer takes it */
+    int which[SPL_STREAMS_MAX];   /* SPL_STREAM_* of each, or behind those the scalar's place in struct spl_points */
+    uint32_t count, scalar_count; /* the latter are scalars, the last ones */
+    uint64_t bits[SPL_STREAMS_MAX];
+    uint32_t *bases[SPL_STREAMS_MAX]; /* by chunk, owned; what `list` looks at */
+    uint8_t *widths[SPL_STREAMS_MAX];
 };
 
 void spl_emitted_streams_init(struct spl_emitted_streams *streams, const struct spl_points *points);
@@ -30,7 +30,6 @@ int spl_emitted_streams_reserve(struct spl_emitted_streams *streams, size_t chun
 
 /* Keeps the codes of chunks [first, first + count), and adds what is no code to *header_bits. */
 void spl_emitted_streams_keep(struct spl_emitted_streams *streams, uint64_t first, const struct spl_chunk *chunks,
-                              struct spl_stream_code (*codes)[SPL_STREAM_KNOWN_COUNT], uint32_t count,
-                              uint64_t *header_bits);
+                              struct spl_stream_code (*codes)[SPL_STREAMS_MAX], uint32_t count, uint64_t *header_bits);
 
 #endif

@@ -13,6 +13,7 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "cloud/cloud.h"
+#include "pack/kept.h"
 
 enum { batch_points = 65536 };
 /* Coordinates below it are 0: so is -0, and no two places are closer than floats relative to a node can tell. */
@@ -44,6 +45,9 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
         if (!rc)
             rc = grow((void **)&p->color_class, capacity, sizeof *p->color_class, err);
     }
+    for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
+        if (p->scalar[s].values && capacity > p->capacity)
+            rc = grow(&p->scalar[s].values, capacity, spl_scalar_bytes(&p->scalar[s]), err);
     if (!rc && (had_station ? capacity > p->capacity : wants_station))
         rc = grow((void **)&p->station, capacity, sizeof *p->station, err);
     if (!rc && (had_normal ? capacity > p->capacity : wants_normal))
@@ -58,21 +62,31 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
     return 0;
 }
 
-static int append(struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
-                  uint32_t first_station, const char *path, struct spl_error *err)
+/* Those that the batch has, and those that points before it had. */
+static int append_scalars(struct spl_points *p, const struct spl_point_batch *batch, uint32_t scalars,
+                          const double *scan, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++) {
+        const double *values = s == SPL_SCALAR_SCAN ? scan : scalars >> s & 1 ? batch->scalar[s] : NULL;
+        if (values || p->scalar[s].values)
+            rc = spl_scalar_add(&p->scalar[s], p->capacity, p->count, values, batch->count, err);
+    }
+    return rc;
+}
+
+static int append(struct spl_points *p, const struct spl_point_batch *batch, const struct spl_cloud_info *info,
+                  uint32_t attributes, uint32_t first_station, const double *scan, struct spl_error *err)
 {
     int rc = reserve(p, batch->count, attributes, err);
+    if (!rc)
+        rc = append_scalars(p, batch, info->scalars, scan, err);
     if (rc)
         return rc;
     size_t at = p->count;
     for (size_t i = 0; i < batch->count; i++, at++) {
         for (int c = 0; c < 3; c++) {
             double v = batch->position[i][c];
-            if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(err, SPL_E_INPUT,
-                                "%s: point %llu has %c = %g, beyond the largest coordinate %g; check the "
-                                "file's scale and columns",
-                                path, (unsigned long long)(p->points_read + i), "xyz"[c], v, SPL_COORDINATE_MAX);
             p->axis[c][at] = fabs(v) < nothing ? 0 : v;
         }
         uint32_t color = grey;
@@ -103,27 +117,49 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-static void grow_box(struct spl_scan *scan, const struct spl_point_batch *batch)
+/* The batch's first point is number `first` of the scan. */
+static int grow_box(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
 {
     for (size_t i = 0; i < batch->count; i++)
         for (int c = 0; c < 3; c++) {
-            scan->min[c] = fmin(scan->min[c], batch->position[i][c]);
-            scan->max[c] = fmax(scan->max[c], batch->position[i][c]);
+            double v = batch->position[i][c];
+            if (fabs(v) > SPL_COORDINATE_MAX)
+                return spl_fail(
+                    err, SPL_E_INPUT,
+                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
+                    "and columns",
+                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
+            scan->min[c] = fmin(scan->min[c], v);
+            scan->max[c] = fmax(scan->max[c], v);
         }
+    return SPL_OK;
+}
+
+/* The scan's number of each point of a batch: its station's, or that of the input. */
+static void number_scan(const struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
+                        bool stations, size_t input, double *out)
+{
+    for (size_t i = 0; i < batch->count; i++)
+        out[i] = !stations                        ? (double)input
+                 : attributes & SPL_CLOUD_STATION ? (double)p->station_count + batch->station[i]
+                                                  : (double)NAN;
 }
 
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
-                       struct spl_scan *scan, struct spl_stage *stage, struct spl_error *err)
+                       struct spl_scan *scan, double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors};
+        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors, .keep = scans->keep};
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
+    uint64_t first = p->points_read;
     char name[128];
+    bool stations;
+    spl_kept_has_scan(scans, &stations);
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. */
@@ -131,8 +167,11 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         spl_stage_add(stage, batch->count, 0);
-        grow_box(scan, batch);
-        rc = append(p, batch, attributes, p->station_count, scan->path, err);
+        rc = grow_box(scan, batch, p->points_read - first, err);
+        if (numbers)
+            number_scan(p, batch, attributes, stations, (size_t)(scan - scans->list), numbers);
+        if (!rc)
+            rc = append(p, batch, info, attributes, p->station_count, numbers, err);
         if (!rc)
             rc = spl_stage_check(stage, err);
     }
@@ -149,20 +188,87 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
+/* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
+ * on only to find all that break. */
+static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
+                  double *numbers, struct spl_stage *stage, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    points->keep = scans->keep;
+    for (size_t i = 0; !rc && i < scans->count;) {
+        struct spl_scan *scan = &scans->list[i];
+        struct spl_error why = {0};
+        if (!(rc = gather_file(points, batch, scans, scan, numbers, stage, &why))) {
+            i++;
+            continue;
+        }
+        spl_points_finish(points);
+        if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
+            spl_scans_remove(scans, i);
+    }
+    return rc;
+}
+
+/* Leaves out those that say nothing: all points have the same, and nobody named it. */
+static int settle_scalars(struct spl_points *p, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++) {
+        struct spl_scalar_values *scalar = &p->scalar[s];
+        if (!scalar->values)
+            continue;
+        scalar->votes = s == SPL_SCALAR_RETURN || s == SPL_SCALAR_RETURNS || s == SPL_SCALAR_SCAN;
+        if (!spl_scalar_is_constant(scalar) || spl_kept_is_named(p->keep, s)) {
+            rc = spl_scalar_settle(scalar, p->count, err);
+        } else {
+            free(scalar->values);
+            *scalar = (struct spl_scalar_values){0};
+        }
+    }
+    return rc;
+}
+
+/* What breaks after some of it was read has left its mark: on the common range of grey, on which arrays there are. So
+ * that the result is that of a pack without it, all others are read once more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
-    points->up[2] = 1;
+    double *numbers = NULL;
+    bool stations;
     int rc = spl_point_batch_init(&batch, batch_points, err);
-    for (size_t i = 0; !rc && i < scans->count; i++)
-        rc = gather_file(points, &batch, scans, &scans->list[i], stage, err);
+    if (!rc && spl_kept_has_scan(scans, &stations) && !(numbers = spl_alloc_raw(batch_points, sizeof *numbers, err)))
+        rc = SPL_E_NOMEM;
+    for (bool again = !rc; again;) {
+        size_t count = scans->count;
+        rc = gather(points, &batch, scans, numbers, stage, err);
+        again = !rc && scans->count < count;
+        if (again) {
+            spl_points_finish(points);
+            spl_scans_share(scans);
+        }
+    }
     spl_point_batch_finish(&batch);
+    free(numbers);
+    if (!rc && !scans->count)
+        rc = spl_inputs_fail_empty(scans->inputs, err);
+    points->up[2] = 1;
+    if (!rc)
+        rc = settle_scalars(points, err);
     if (!rc && !points->count)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
                       (unsigned long long)points->points_skipped);
     return rc;
+}
+
+unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS])
+{
+    unsigned count = 0;
+    for (int s = 0; s < SPL_POINT_SCALARS; s++)
+        if (points->scalar[s].values)
+            list[count++] = s;
+    return count;
 }
 
 void spl_points_finish(struct spl_points *points)
@@ -172,6 +278,8 @@ void spl_points_finish(struct spl_points *points)
     free(points->color_class);
     free(points->station);
     free(points->normal);
+    for (int s = 0; s < SPL_POINT_SCALARS; s++)
+        free(points->scalar[s].values);
     free(points->radius);
     free(points->uncertainty);
     free(points->linear);

@@ -14,6 +14,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/level_scalars.h"
 #include "pack/median.h"
 
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
@@ -34,6 +35,8 @@ struct scratch { /* of one worker */
     struct spl_inner_splat *input;
     struct cluster *clusters;
     uint32_t *table; /* cell -> cluster + 1 */
+    uint32_t *of;    /* input -> cluster */
+    struct spl_scalar_mixer mixer;
     float *radii;
     size_t input_capacity, table_size;
 };
@@ -146,6 +149,7 @@ static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit
             *k = (struct cluster){.cell = key};
         }
         add_to(k, s);
+        w->of[i] = (uint32_t)(k - w->clusters);
     }
     return clusters - 1;
 }
@@ -182,11 +186,13 @@ static bool reserve(struct scratch *w, size_t count)
     free(w->input);
     free(w->clusters);
     free(w->table);
+    free(w->of);
     w->input_capacity = 0;
     w->input = spl_alloc_raw(count, sizeof *w->input, NULL);
     w->clusters = spl_alloc_raw(count / 3 + 8, sizeof *w->clusters, NULL);
     w->table = spl_alloc_raw(table, sizeof *w->table, NULL);
-    if (!w->input || !w->clusters || !w->table)
+    w->of = spl_alloc_raw(count, sizeof *w->of, NULL);
+    if (!w->input || !w->clusters || !w->table || !w->of)
         return false;
     w->input_capacity = count;
     w->table_size = table;
@@ -226,7 +232,7 @@ static bool build_node(struct levels *l, struct scratch *w, struct spl_tree_node
     for (size_t k = 0; k < clusters; k++)
         finish_cluster(&w->clusters[k + 1], cell, &node->splats[k]);
     node->splat_count = (uint32_t)clusters;
-    return true;
+    return spl_scalars_mix(&w->mixer, l->points, l->tree, node, w->of, w->input);
 }
 
 static void build_nodes(void *context, size_t begin, size_t end, unsigned worker)
@@ -278,6 +284,8 @@ done:
         free(l.scratch[t].input);
         free(l.scratch[t].clusters);
         free(l.scratch[t].table);
+        free(l.scratch[t].of);
+        spl_scalar_mixer_finish(&l.scratch[t].mixer);
     }
     free(l.scratch);
     free(order);

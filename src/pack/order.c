@@ -286,6 +286,8 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
         rc = permute(&o, (void **)&points->station, sizeof *points->station, err);
     if (!rc)
         rc = permute(&o, (void **)&points->normal, sizeof *points->normal, err);
+    for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
+        rc = permute(&o, &points->scalar[s].values, spl_scalar_bytes(&points->scalar[s]), err);
     spl_stage_finish(stage);
     points->count = points->capacity = o.count;
 done:

@@ -21,6 +21,7 @@
 #include "dataset/dataset.h"
 #include "geom/unit.h"
 #include "pack/emit.h"
+#include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/system.h"
@@ -34,6 +35,7 @@ struct pack {
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage *stage;
+    struct spl_keep keep;
     struct spl_scans scans;
     struct spl_system system;
     struct spl_points points;
@@ -98,14 +100,13 @@ static json_t *json_vector(const double v[3])
 static json_t *make_meta(const struct pack *p, double radius, const struct spl_default_view *view)
 {
     const struct spl_points *points = &p->points;
-    json_t *bits = json_object(), *sources = json_array(), *stations = json_array();
+    json_t *bits = json_object(), *sources = spl_scans_describe_names(&p->scans),
+           *stations = json_array();
     char unit[SPL_UNIT_TEXT_MAX];
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
     for (uint32_t s = 0; s < p->emitted.streams.count; s++)
         json_object_set_new(bits, p->emitted.streams.list[s].name, json_integer((json_int_t)p->emitted.streams.bits[s]));
-    for (size_t i = 0; i < p->scans.count; i++)
-        json_array_append_new(sources, json_string_nocheck(p->scans.list[i].name));
     for (uint32_t s = 0; s < points->station_count; s++) {
         json_t *pose = json_array();
         for (int i = 0; i < 16; i++)
@@ -144,6 +145,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
+    if (p->scans.inputs->left_out_count)
+        json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
     rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);
@@ -209,23 +212,39 @@ static int join_wires(struct pack *p, struct spl_error *err)
     return rc;
 }
 
-static int pack_scan(const struct spl_pack_options *options, const char *output, uint32_t photographs,
-                     struct spl_stage *stage, struct spl_pack_report *report, struct spl_error *err)
+/* A scan that turns out to be broken has no say in what the others' coordinates are. */
+static int gather(struct pack *p, struct spl_system_options *said, struct spl_error *err)
+{
+    size_t count = p->scans.count;
+    int rc = spl_points_gather(&p->points, &p->scans, p->stage, err);
+    if (rc || p->scans.count == count)
+        return rc;
+    spl_system_finish(&p->system);
+    said->warn = NULL;
+    return spl_system_find(&p->system, &p->scans, said, err);
+}
+
+static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *inputs, const char *output,
+                     const struct spl_view_list *photographs, struct spl_stage *stage, struct spl_pack_report *report,
+                     struct spl_error *err)
 {
     struct pack p = {.options = options, .stage = stage};
-    const struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
+    struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
+        rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc)
         rc = spl_dataset_writer_create(output, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, options->inputs, options->input_count, options->columns, options->intensity,
-                            stage, err);
+        rc = spl_scans_init(&p.scans, inputs, options->columns, options->intensity, &p.keep, stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p.scans, err);
     if (!rc)
         rc = spl_system_find(&p.system, &p.scans, &said, err);
     if (!rc) {
-        plan(&p, photographs);
-        rc = spl_points_gather(&p.points, &p.scans, stage, err);
+        plan(&p, photographs ? (uint32_t)photographs->count : 0);
+        rc = gather(&p, &said, err);
     }
     if (!rc)
         rc = spl_stage_check(stage, err);
@@ -299,8 +318,8 @@ static int check_kept(const struct spl_pack_options *o, const struct spl_view_li
 }
 
 /* The dataset without its name, so that nothing of it is left when the process dies. */
-static int pack_photos(const struct spl_pack_options *options, struct spl_stage *stage, struct spl_pack_report *report,
-                       struct spl_error *err)
+static int pack_photos(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
+                       struct spl_pack_report *report, struct spl_error *err)
 {
     struct spl_view_list photographs = {0};
     struct spl_photo_report photos = {0};
@@ -313,7 +332,7 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_stage 
         path = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
-    if (!rc && !(rc = pack_scan(options, path, photos.photographs, stage, report, err))) {
+    if (!rc && !(rc = pack_scan(options, inputs, path, &photographs, stage, report, err))) {
         rc = spl_dataset_open_whole(path, false, &dataset, err);
         unlink(path);
     }
@@ -341,8 +360,18 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                               .context = options->progress_context,
                               .threads = spl_thread_count(options->threads),
                               .cancelled = spl_cancel_get_flag(options->cancel)};
-    return options->photos ? pack_photos(options, &stage, report, err)
-                           : pack_scan(options, options->output, 0, &stage, report, err);
+    const struct spl_inputs_listener listener = {options->warn, options->left_out, options->progress_context};
+    struct spl_pack_options found = *options;
+    struct spl_inputs inputs;
+    int rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
+    if (rc)
+        return rc;
+    found.inputs = (const char *const *)inputs.paths;
+    found.input_count = inputs.count;
+    rc = options->photos ? pack_photos(&found, &inputs, &stage, report, err)
+                         : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
+    spl_inputs_finish(&inputs);
+    return rc;
 }
 
 int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "pack/scalars.h"
 #include "pack/scans.h"
 
 #define SPL_NO_STATION UINT16_MAX
@@ -27,6 +28,8 @@ struct spl_points {
     float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
     uint8_t *linear;             /* 1 on a wire, a pole or a cable; made by spl_linear_find(); may be NULL: none is */
     float *radius, *uncertainty; /* made by spl_surface() or spl_bare_points() */
+    struct spl_scalar_values scalar[SPL_POINT_SCALARS]; /* settled by spl_points_gather() */
+    const struct spl_keep *keep;                        /* what they are called; borrowed */
     struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
@@ -41,6 +44,9 @@ struct spl_points {
  * beyond SPL_COORDINATE_MAX. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err);
+
+/* Fills `list` with the indices of the scalars that the points have, in order; returns how many. */
+unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS]);
 
 /* Sorts all arrays in Morton order and drops points with equal coordinates, keeping the first read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);

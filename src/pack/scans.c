@@ -14,34 +14,14 @@
 
 #include "base/memory.h"
 #include "cloud/crs.h"
+#include "pack/names.h"
 
-enum { names_listed = 3, bytes_a_line = 40 };
+enum { bytes_a_line = 40, names_kept = 1000 };
 static const double like_ranges = 8; /* times the smallest white less black: of one kind */
 static const double like_steps = 10; /* times the finest step of coordinates: nothing to mention */
 /* 32 bit floats: coarser than a millimetre, and than the scan's size alone would make them. */
 static const double float_step = 1e-3, float_step_diagonals = 1e-6;
 static const double far_diagonals = 10; /* of the larger box, from a scan to the nearest other one */
-
-/* "a.las, b.las, c.las and 4 more" */
-struct group {
-    size_t count;
-    char names[224];
-};
-
-static void add(struct group *group, const struct spl_scan *scan)
-{
-    size_t used = strlen(group->names);
-    if (group->count++ < names_listed)
-        snprintf(group->names + used, sizeof group->names - used, "%s%.60s", used ? ", " : "", scan->name);
-}
-
-static const char *list(struct group *group)
-{
-    size_t used = strlen(group->names);
-    if (group->count > names_listed)
-        snprintf(group->names + used, sizeof group->names - used, " and %zu more", group->count - names_listed);
-    return group->names;
-}
 
 struct saying {
     const struct spl_scans *scans;
@@ -64,62 +44,91 @@ static bool has_points(const struct spl_scan *scan)
     return scan->points_from[0] + scan->points_from[1] + scan->points_from[2] > 0;
 }
 
-static void share_intensities(struct spl_scans *scans)
+void spl_scans_share(struct spl_scans *scans)
 {
     double black = INFINITY, white = -INFINITY, least = INFINITY;
     for (size_t i = 0; i < scans->count; i++) {
-        const struct spl_cloud_colors *colors = &scans->list[i].colors;
-        if (colors->from != SPL_COLORS_INTENSITY || !colors->guessed)
+        const struct spl_cloud_colors *own = &scans->list[i].own_colors;
+        if (own->from != SPL_COLORS_INTENSITY || !own->guessed)
             continue;
-        black = fmin(black, colors->black);
-        white = fmax(white, colors->white);
-        least = fmin(least, colors->white - colors->black);
+        black = fmin(black, own->black);
+        white = fmax(white, own->white);
+        least = fmin(least, own->white - own->black);
     }
-    for (size_t i = 0; i < scans->count && white - black <= like_ranges * least; i++) {
+    bool alike = white - black <= like_ranges * least;
+    for (size_t i = 0; i < scans->count; i++) {
         struct spl_cloud_colors *colors = &scans->list[i].colors;
-        if (colors->from != SPL_COLORS_INTENSITY || !colors->guessed)
-            continue;
-        colors->black = black;
-        colors->white = white;
+        *colors = scans->list[i].own_colors;
+        if (colors->from == SPL_COLORS_INTENSITY && colors->guessed && alike) {
+            colors->black = black;
+            colors->white = white;
+        }
     }
 }
 
-int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
-                   bool intensity, struct spl_stage *stage, struct spl_error *err)
+/* `fields`: room for the names of the scan's, or NULL. */
+static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
+                struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity};
+    struct spl_cloud *cloud = NULL;
+    int rc = spl_cloud_open(path, options, &cloud, err);
+    if (rc)
+        return rc;
+    const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+    *scan = (struct spl_scan){.path = path,
+                              .name = spl_input_name(path),
+                              .format = info->format,
+                              .named = info->named,
+                              .own_colors = info->colors,
+                              .attributes = info->attributes,
+                              .columns = info->columns,
+                              .scalars = info->scalars,
+                              .points_expected =
+                                  info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
+                              .min = {INFINITY, INFINITY, INFINITY},
+                              .max = {-INFINITY, -INFINITY, -INFINITY}};
+    if (fields)
+        snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
+    spl_cloud_take_coordinates(cloud, &scan->coordinates);
+    spl_cloud_destroy(cloud);
+    return SPL_OK;
+}
+
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
+                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err)
+{
+    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .keep = keep};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.count = count, .columns = columns, .intensity = intensity};
-    scans->list = spl_alloc(count, sizeof *scans->list, err);
+    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .keep = keep};
+    scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
-    spl_stage_begin(stage, "looking at colours", "scans", count);
-    for (size_t i = 0; !rc && i < count; i++) {
-        struct spl_cloud *cloud = NULL;
-        struct spl_scan *scan = &scans->list[i];
-        const char *slash = strrchr(inputs[i], '/');
-        if ((rc = spl_cloud_open(inputs[i], &options, &cloud, err)))
-            break;
-        const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
-        *scan = (struct spl_scan){.path = inputs[i],
-                                  .name = slash ? slash + 1 : inputs[i],
-                                  .colors = info->colors,
-                                  .attributes = info->attributes,
-                                  .points_expected =
-                                      info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
-                                  .min = {INFINITY, INFINITY, INFINITY},
-                                  .max = {-INFINITY, -INFINITY, -INFINITY}};
-        spl_cloud_take_coordinates(cloud, &scan->coordinates);
-        spl_cloud_destroy(cloud);
+    spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
+    for (size_t i = 0; !rc && i < inputs->count; i++) {
+        struct spl_error why = {0};
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, scans->count ? NULL : scans->fields, &why)))
+            rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
+        else
+            scans->count++;
         spl_stage_add(stage, 1, 0);
-        rc = spl_stage_check(stage, err);
+        if (!rc)
+            rc = spl_stage_check(stage, err);
     }
     spl_stage_end(stage);
+    if (!rc && !scans->count)
+        rc = spl_inputs_fail_empty(inputs, err);
     if (rc)
         spl_scans_finish(scans);
     else
-        share_intensities(scans);
+        spl_scans_share(scans);
     return rc;
+}
+
+void spl_scans_remove(struct spl_scans *scans, size_t place)
+{
+    spl_crs_finish(&scans->list[place].coordinates);
+    scans->count--;
+    memmove(&scans->list[place], &scans->list[place + 1], (scans->count - place) * sizeof *scans->list);
 }
 
 void spl_scans_finish(struct spl_scans *scans)
@@ -133,41 +142,41 @@ void spl_scans_finish(struct spl_scans *scans)
 static void compare_kinds(const struct saying *s)
 {
     static const char *const what[3] = {"none at all", "RGB", "grey from intensity"};
-    struct group groups[3] = {0}, blank = {0};
+    struct spl_names groups[3] = {0}, blank = {0};
     char text[800] = "";
     int kinds = 0;
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
         for (int from = 0; from < 3; from++)
             if (scan->points_from[from])
-                add(&groups[from], scan);
+                spl_names_add(&groups[from], scan->name);
         if (scan->colors.blank && has_points(scan))
-            add(&blank, scan);
+            spl_names_add(&blank, scan->name);
     }
     for (int k = 0; k < 3; k++) {
         int from = (k + 1) % 3;
         size_t used = strlen(text);
         if (groups[from].count)
             snprintf(text + used, sizeof text - used, "%s%s in %zu (%s)", kinds++ ? ", " : "", what[from],
-                     groups[from].count, list(&groups[from]));
+                     groups[from].count, spl_names_list(&groups[from]));
     }
     if (blank.count && s->scans->count > 1)
-        say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", list(&blank));
+        say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", spl_names_list(&blank));
     if (s->scans->intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
         say(s,
             "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours "
             "are %s",
             text);
     else if (kinds > 1 && s->scans->intensity) {
-        struct group lack = {0};
+        struct spl_names lack = {0};
         for (size_t i = 0; i < s->scans->count; i++)
             if (s->scans->list[i].points_from[SPL_COLORS_RGB] || s->scans->list[i].points_from[SPL_COLORS_CONSTANT])
-                add(&lack, &s->scans->list[i]);
+                spl_names_add(&lack, s->scans->list[i].name);
         say(s,
             "no intensity, which --intensity asks for, in %zu (%s); the scans' colours are of different kinds: %s. "
             "Each was taken as it is, and a seam shows where they meet. --cameras takes the colours of photographs; or "
             "pack each kind as a dataset of its own",
-            lack.count, list(&lack), text);
+            lack.count, spl_names_list(&lack), text);
     } else if (kinds > 1)
         say(s,
             "the scans' colours are of different kinds: %s. Each was taken as it is, and a seam shows where they meet. "
@@ -176,18 +185,33 @@ static void compare_kinds(const struct saying *s)
             text);
 }
 
+static void compare_endings(const struct saying *s)
+{
+    struct spl_names wrong = {0};
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        char text[96];
+        snprintf(text, sizeof text, "%.40s holds %s", scan->name, scan->format);
+        if (scan->named)
+            spl_names_add(&wrong, text);
+    }
+    if (wrong.count)
+        say(s, "names end like another format than the file's: %s. Each was read as what it holds",
+            spl_names_list(&wrong));
+}
+
 /* Values that mean black and white where the scans do not say so themselves. */
 static void compare_ranges(const struct saying *s)
 {
     const struct spl_scan *low = NULL, *high = NULL;
-    struct group bits8 = {0}, bits16 = {0};
+    struct spl_names bits8 = {0}, bits16 = {0};
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
         const struct spl_cloud_colors *colors = &scan->colors;
         if (!colors->guessed || !scan->points_from[colors->from])
             continue;
         if (colors->from == SPL_COLORS_RGB) {
-            add(colors->white > 255 ? &bits16 : &bits8, scan);
+            spl_names_add(colors->white > 255 ? &bits16 : &bits8, scan->name);
             continue;
         }
         low = !low || colors->white < low->colors.white ? scan : low;
@@ -197,7 +221,7 @@ static void compare_ranges(const struct saying *s)
         say(s,
             "colours are 8 bit, none above 255, in %zu (%s) and 16 bit in %zu (%s): each was taken by its own range. "
             "If the former are only dark, write all of them with 8 bit first",
-            bits8.count, list(&bits8), bits16.count, list(&bits16));
+            bits8.count, spl_names_list(&bits8), bits16.count, spl_names_list(&bits16));
     if (low && (low->colors.white < high->colors.white || low->colors.black > high->colors.black))
         say(s,
             "intensities differ in range, from %g..%g in %s to %g..%g in %s: each scan was made grey by its own, and "
@@ -212,13 +236,14 @@ static void compare_attributes(const struct saying *s)
         const char *what, *done;
     } rows[] = {{SPL_CLOUD_NORMAL, "normals", "estimated"}, {SPL_CLOUD_CLASS, "classes", "0"}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
-        struct group with = {0}, without = {0};
+        struct spl_names with = {0}, without = {0};
         for (size_t i = 0; i < s->scans->count; i++)
             if (has_points(&s->scans->list[i]))
-                add(s->scans->list[i].attributes & rows[r].attribute ? &with : &without, &s->scans->list[i]);
+                spl_names_add(s->scans->list[i].attributes & rows[r].attribute ? &with : &without,
+                              s->scans->list[i].name);
         if (with.count && without.count)
-            say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count, list(&with),
-                list(&without), rows[r].done);
+            say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count,
+                spl_names_list(&with), spl_names_list(&without), rows[r].done);
     }
 }
 
@@ -259,7 +284,7 @@ static double gap(const struct spl_scan *a, const struct spl_scan *b)
 
 static void look_at_floats(const struct saying *s)
 {
-    struct group coarse = {0};
+    struct spl_names coarse = {0};
     double step = 0, of = 0;
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
@@ -271,7 +296,7 @@ static void look_at_floats(const struct saying *s)
         double own = nextafterf((float)largest, INFINITY) - (float)largest;
         if (own <= float_step || own <= float_step_diagonals * diagonal(scan))
             continue;
-        add(&coarse, scan);
+        spl_names_add(&coarse, scan->name);
         of = own > step ? largest : of;
         step = fmax(own, step);
     }
@@ -279,45 +304,47 @@ static void look_at_floats(const struct saying *s)
         say(s,
             "coordinates are 32 bit floats in %s, which at %.6g are multiples of %g: what was finer was lost when they "
             "were written. Write them as doubles, or less a whole number that brings them near 0",
-            list(&coarse), of, step);
+            spl_names_list(&coarse), of, step);
 }
 
-/* Each scan against all others: of the thousands that a street may have, that is still nothing beside reading them. */
+/* Each scan against all others until one is not far, which in a street or among tiles is one of the next. */
 static void compare_places(const struct saying *s)
 {
-    struct group empty = {0}, far = {0};
-    double farthest = 0;
+    struct spl_names empty = {0}, far = {0};
+    double farthest = 0, size = 0;
+    for (size_t i = 0; i < s->scans->count; i++)
+        if (has_points(&s->scans->list[i]))
+            size = fmax(size, diagonal(&s->scans->list[i]));
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
-        double nearest = INFINITY, size = diagonal(scan);
+        double nearest = INFINITY;
         if (!has_points(scan)) {
-            add(&empty, scan);
+            spl_names_add(&empty, scan->name);
             continue;
         }
-        for (size_t k = 0; k < s->scans->count; k++) {
-            const struct spl_scan *other = &s->scans->list[k];
-            if (k == i || !has_points(other))
-                continue;
-            nearest = fmin(nearest, gap(scan, other));
-            size = fmax(size, diagonal(other));
+        for (size_t k = 1; k < s->scans->count && nearest > far_diagonals * size; k++) {
+            const struct spl_scan *other = &s->scans->list[(i + k) % s->scans->count];
+            if (has_points(other))
+                nearest = fmin(nearest, gap(scan, other));
         }
         if (isfinite(nearest) && nearest > far_diagonals * size) {
-            add(&far, scan);
+            spl_names_add(&far, scan->name);
             farthest = fmax(farthest, nearest);
         }
     }
     if (empty.count)
-        say(s, "no usable point in %zu (%s)", empty.count, list(&empty));
+        say(s, "no usable point in %zu (%s)", empty.count, spl_names_list(&empty));
     if (far.count)
         say(s,
             "scans lie far apart: %.4g from the nearest other one (%s). They may be in different coordinates; if not, "
             "pack them as datasets of their own, since the first view and the levels of detail span the gap",
-            farthest, list(&far));
+            farthest, spl_names_list(&far));
 }
 
 void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context, const char *text), void *context)
 {
     const struct saying saying = {scans, warn, context};
+    compare_endings(&saying);
     compare_kinds(&saying);
     compare_ranges(&saying);
     compare_attributes(&saying);
@@ -326,11 +353,40 @@ void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context
     compare_places(&saying);
 }
 
+/* META has 8 MiB: of a hundred thousand tiles it names the first. */
+static void append_more(json_t *names, size_t count)
+{
+    if (count > names_kept)
+        json_array_append_new(names, json_sprintf("and %zu more", count - names_kept));
+}
+
+json_t *spl_scans_describe_names(const struct spl_scans *scans)
+{
+    json_t *all = json_array();
+    for (size_t i = 0; i < scans->count && i < names_kept; i++)
+        json_array_append_new(all, json_string_nocheck(scans->list[i].name));
+    append_more(all, scans->count);
+    return all;
+}
+
+json_t *spl_scans_describe_left_out(const struct spl_scans *scans)
+{
+    json_t *all = json_array();
+    for (size_t i = 0; i < scans->inputs->left_out_count && i < names_kept; i++)
+        json_array_append_new(all, json_string_nocheck(spl_input_name(scans->inputs->left_out[i])));
+    append_more(all, scans->inputs->left_out_count);
+    return all;
+}
+
 json_t *spl_scans_describe(const struct spl_scans *scans)
 {
     static const char *const names[3] = {"constant", "rgb", "intensity"};
     json_t *all = json_array();
-    for (size_t i = 0; i < scans->count; i++) {
+    uint64_t points_from[3] = {0};
+    for (size_t i = names_kept; i < scans->count; i++)
+        for (int from = 0; from < 3; from++)
+            points_from[from] += scans->list[i].points_from[from];
+    for (size_t i = 0; i < scans->count && i < names_kept; i++) {
         const struct spl_scan *scan = &scans->list[i];
         for (int from = 0; from < 3; from++)
             if (scan->points_from[from] || (from == (int)scan->colors.from && !has_points(scan)))
@@ -338,5 +394,9 @@ json_t *spl_scans_describe(const struct spl_scans *scans)
                                       json_pack("{s:o, s:s, s:I}", "source", json_string_nocheck(scan->name), "from",
                                                 names[from], "points", (json_int_t)scan->points_from[from]));
     }
+    for (int from = 0; from < 3; from++)
+        if (points_from[from])
+            json_array_append_new(all, json_pack("{s:s, s:s, s:I}", "source", "the others", "from", names[from],
+                                                 "points", (json_int_t)points_from[from]));
     return all;
 }

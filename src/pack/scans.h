@@ -6,36 +6,56 @@
 #include <jansson.h>
 
 #include "cloud/cloud.h"
+#include "pack/inputs.h"
 #include "pack/stage.h"
 
 struct spl_scan {
-    const char *path, *name;        /* borrowed; the name is the path's last part */
-    struct spl_cloud_colors colors; /* as they are taken; intensities of like range share one over all scans */
+    const char *path, *name;            /* borrowed; the name is the path's last part */
+    const char *format, *named;         /* as of struct spl_cloud_info */
+    struct spl_cloud_colors own_colors; /* of this scan alone */
+    struct spl_cloud_colors colors;     /* as they are taken; intensities of like range share one over all scans */
     struct spl_cloud_coordinates coordinates;
-    uint32_t attributes;      /* enum spl_cloud_attribute */
-    uint64_t points_expected; /* of the header, or a guess by the file's size */
-    uint64_t points_from[3];  /* that were read, by struct spl_cloud_colors.from */
-    double min[3], max[3];    /* of their coordinates; nothing while there is no point */
+    uint32_t attributes;       /* enum spl_cloud_attribute */
+    uint32_t columns, scalars; /* as of struct spl_cloud_info */
+    uint64_t points_expected;  /* of the header, or a guess by the file's size */
+    uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */
+    double min[3], max[3];     /* of their coordinates; nothing while there is no point */
 };
+
+enum { SPL_SCANS_FIELDS = 400 };
 
 struct spl_scans {
-    struct spl_scan *list; // owned
+    struct spl_inputs *inputs; /* borrowed */
+    struct spl_scan *list;     // owned; without what was left out
     size_t count;
-    const char *columns; /* as of struct spl_cloud_options */
-    bool intensity;      /* likewise */
+    const char *columns;         /* as of struct spl_cloud_options */
+    bool intensity;              /* likewise */
+    const struct spl_keep *keep; /* likewise, never NULL */
+    char fields[SPL_SCANS_FIELDS]; /* names of the first scan's */
 };
 
-/* Opens each scan once, so that one that cannot be read is refused before hours of work, and decides how colours are
- * taken. Points are counted by spl_points_gather(). On failure nothing is held. Blocks. */
-int spl_scans_init(struct spl_scans *scans, const char *const *inputs, size_t count, const char *columns,
-                   bool intensity, struct spl_stage *stage, struct spl_error *err);
+/* Opens each scan once, so that one that cannot be read is refused, or left out, before hours of work, and decides how
+ * colours are taken. `inputs` is held. Points are counted by spl_points_gather(). On failure nothing is held. Blocks.
+ */
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
+                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err);
+
+/* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
+void spl_scans_remove(struct spl_scans *scans, size_t place);
+
+/* Gives the scans in the list their common range of intensities. */
+void spl_scans_share(struct spl_scans *scans);
+
 void spl_scans_finish(struct spl_scans *scans);
 
 /* Hands out what a user may not know and would see: scans that disagree in colours, attributes or coordinates, that
  * hold no point, or lie far from the others. Says what was done and how to avoid it. For after reading. */
 void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context, const char *text), void *context);
 
-/* META's "color". NULL when memory is refused. */
+/* META's "sources", "skipped" (what was left out) and "color"; of more than a thousand the rest is summed up. NULL when
+ * memory is refused. */
+json_t *spl_scans_describe_names(const struct spl_scans *scans);
+json_t *spl_scans_describe_left_out(const struct spl_scans *scans);
 json_t *spl_scans_describe(const struct spl_scans *scans);
 
 #endif

@@ -126,8 +126,10 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
 
 void spl_tree_finish(struct spl_tree *tree)
 {
-    for (uint32_t i = 0; i < tree->count; i++)
+    for (uint32_t i = 0; i < tree->count; i++) {
         free(tree->nodes[i].splats);
+        free(tree->nodes[i].numbers);
+    }
     free(tree->nodes);
     *tree = (struct spl_tree){0};
 }

@@ -23,7 +23,8 @@ struct spl_tree_node {
     uint32_t parent;
     uint32_t depth;                 /* of the tree: cubes that hold all points of their parent are skipped */
     struct spl_inner_splat *splats; /* of an inner node, made by spl_levels_build() */
-    uint32_t splat_count;           /* leaf: end - begin */
+    uint32_t *numbers;    /* likewise, splat by splat: of the scalars that the points have; NULL = they have none */
+    uint32_t splat_count; /* leaf: end - begin */
 };
 
 struct spl_tree {

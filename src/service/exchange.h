@@ -37,6 +37,8 @@ struct request {
     uint64_t deadline_ns;
     struct batch *batch;           // may be NULL; the views that it waits for
     struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
+    struct spl_place_wish *place;  // may be NULL; the coordinate system that it waits for
+    unsigned places;               /* such that it has waited for */
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
     bool versioned;                /* the URL names the dataset's version */

@@ -10,6 +10,7 @@
 #include "service/exchange.h"
 #include "service/ops/ops.h"
 #include "service/pages.h"
+#include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
@@ -60,11 +61,6 @@ static void list_datasets(struct request *request, const struct spl_call *call)
     spl_reply_json(request, json);
 }
 
-static void show_dataset(struct request *request, const struct spl_call *call)
-{
-    spl_reply_json(request, spl_describe_dataset(call->entry, true));
-}
-
 static void show_status(struct request *request, const struct spl_call *call)
 {
     (void)call;
@@ -90,10 +86,11 @@ static const struct route {
     {"/v1/methods", GET, SPL_SCOPE_NONE, false, spl_show_methods},
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
     {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
-    {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, false, show_dataset},
+    {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, true, spl_show_dataset},
     {"/v1/datasets/{id}", PUT, SPL_SCOPE_ADMIN, false, spl_put_dataset}, // called before the body
     {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
+    {"/v1/datasets/{id}/place", GET, SPL_SCOPE_VIEW, true, spl_show_place},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
     {"/v1/datasets/{id}/tours", POST, SPL_SCOPE_TOUR, false, spl_create_tour},
     {"/v1/tours", GET, SPL_SCOPE_TOUR, false, spl_list_tours},

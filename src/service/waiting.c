@@ -1,4 +1,4 @@
-/* Requests that wait for views, or for the pool to read a path: their MHD connection is suspended until all is ready,
+/* Requests that wait for views, or for the pool to read a path or look up a coordinate system: their MHD connection is suspended until all is ready,
  * the deadline passes or the client leaves.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
@@ -10,6 +10,7 @@
 #include "service/exchange.h"
 #include "service/http.h"
 #include "service/ops/counters.h"
+#include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
@@ -22,6 +23,7 @@ static void let_go(struct request *request)
     spl_ticket_drop(&request->ticket);
     spl_batch_abandon(request->batch);
     spl_tour_wish_abandon(request->wish);
+    spl_place_abandon(request->place);
     spl_waiting_resume(request);
 }
 

@@ -5,6 +5,7 @@ import contextlib
 import http.server
 import json
 import math
+import os
 import pathlib
 import re
 import shutil
@@ -754,6 +755,32 @@ def test_embed():
         f"{SITE}/embed/none", ready="!document.querySelector('#notice').hidden", complaints="404", size=(400, 300)
     ) as tab:
         assert "'none'" in tab.text("#notice p")
+
+
+def lonlat(world):
+    reply = daemon.ask(f"/v1/datasets/wall/place?crs=EPSG:4326&world={','.join(map(str, world))}")
+    return ",".join(map(repr, reply.json()["position"]))
+
+
+def test_longitude_and_latitude():
+    if os.environ["SPLATD_PROJ"] != "1":
+        return
+    eye, target = lonlat((3, 0, 1)), lonlat((0, 0, 1))
+    camera = f"crs=EPSG:4326&eye={eye}&target={target}&up=0,0,1&fov=50"
+    with page(f"{SITE}/#dataset=wall&{camera}") as tab:
+        now = link(tab)
+        assert far(now["eye"], (3, 0, 1)) < 1e-3 and far(now["target"], (0, 0, 1)) < 1e-3 and "crs" not in now, now
+    with page(f"{SITE}/embed/wall#{camera}", size=(400, 300)) as tab:
+        asked = [name for name, *_ in tab.run(VIEWS)]
+        assert all("eye=3%2C0%2C1&" in a or "eye=3,0,1&" in a for a in asked) and "crs" not in asked[0], asked
+        digest = settled(tab)
+        tab.drag((200, 150), (260, 150))
+        settled(tab, digest)
+    with page(f"{SITE}/embed/wall#eye=3,0,1&target=0,0,1&up=0,0,1&fov=50", size=(400, 300)) as tab:
+        assert settled(tab) == digest
+    for wrong, said in ((f"crs=EPSG:4326&eye=10,50,1&target={target}", "km from the dataset"), ("crs=EPSG:9&eye=1,2,3", "EPSG:9")):
+        with page(f"{SITE}/embed/wall#{wrong}", ready="!document.querySelector('#notice').hidden", complaints="400") as tab:
+            assert said in tab.text("#notice p"), tab.text("#notice p")
 
 
 @contextlib.contextmanager

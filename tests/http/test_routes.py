@@ -399,6 +399,7 @@ def test_openapi_knows_every_parameter_and_route():
               (ROOT / "src/geom/camera_params.def").read_text()}
     assert listed["pick"] == {name for name, _, places in rows if "PICK" in places} | camera
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
+    assert listed["showPlace"] == {name for name, _, places in rows if "PLACE" in places}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
     assert all(f"Alias {alias}." in text for _, alias, _ in rows if alias)
     routes = re.findall(r'^    \{"(/[^"]*)", ', (ROOT / "src/service/routes.c").read_text(), re.M)

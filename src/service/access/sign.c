@@ -68,7 +68,7 @@ static size_t find_id(const char *path, const char *prefix)
 
 bool spl_sign_covers(const char *path, size_t length)
 {
-    static const char *const below[] = {"", "/view", "/pick", "/profile"};
+    static const char *const below[] = {"", "/view", "/pick", "/place", "/profile"};
     size_t id = find_id(path, pages);
     if (id)
         return sizeof pages - 1 + id == length;
@@ -173,8 +173,8 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
     bool page = find_id(path, pages);
     if (!spl_sign_covers(path, length))
         return spl_fail(err, SPL_E_USAGE,
-                        "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick and "
-                        "/profile, and the page /embed/ID; anything else needs a token",
+                        "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick, "
+                        "/place and /profile, and the page /embed/ID; anything else needs a token",
                         url);
     if (page && path[length] == '?')
         return spl_fail(err, SPL_E_USAGE,

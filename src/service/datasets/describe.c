@@ -73,6 +73,8 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "uri", json_string(entry->uri));
     set(json, "view", json_sprintf("%s/view", entry->uri));
     set(json, "unit", json_string(spl_unit_word(info)));
+    const char *crs = spl_places_get_crs(entry->places);
+    set(json, "crs", *crs ? json_string(crs) : json_null());
     set(json, "splats", count(info->splats));
     set(json, "points", count(info->points));
     set(json, "bytes", count(info->file_bytes));

@@ -39,6 +39,10 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     memcpy(entry->defaults.eye, info->default_eye, sizeof entry->defaults.eye);
     memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
     memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
+    if ((rc = spl_places_create(entry->dataset, &entry->places, err)))
+        goto done;
+    spl_places_hook_init(&entry->at_once, entry->places, false);
+    entry->defaults.places = &entry->at_once.hook;
     encode_uri(entry->uri, sizeof entry->uri, info->id);
     rc = spl_plan_create(place, info, &entry->plan, err);
 done:
@@ -71,6 +75,7 @@ void spl_catalog_entry_destroy(struct spl_catalog_entry *entry)
     if (!entry)
         return;
     spl_plan_destroy(entry->plan);
+    spl_places_destroy(entry->places);
     spl_dataset_close(entry->dataset);
     free(entry);
 }

@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "dataset/dataset.h"
 #include "geom/camera_json.h"
+#include "service/place/places.h"
 #include "service/view/plan.h"
 
 enum spl_entry_state {
@@ -28,7 +29,9 @@ enum spl_entry_state {
 struct spl_catalog_entry {
     struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
-    struct spl_camera_defaults defaults;
+    struct spl_places *places;
+    struct spl_places_hook at_once;      // owned by: loop; what `defaults` knows other coordinates by
+    struct spl_camera_defaults defaults; /* for the loop: whoever may wait has a hook of its own */
     char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
     struct spl_plan *plan;
 

@@ -26,6 +26,7 @@ static int resolve(const struct values *values, const struct spl_camera_defaults
         (rc = resolve_point(values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
         (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)))
         return rc;
+    out->pick.crs = (uint32_t)values->v[PARAM_crs].n[0];
     spl_values_resolve_splats(values, &out->view);
     spl_values_resolve_version(values, out);
     out->view.camera = *camera;

@@ -24,6 +24,7 @@ struct spl_view_request {
     struct spl_picked_point {
         double x, y;              /* pixels of `camera` */
         struct spl_camera camera; /* that was asked for */
+        uint32_t crs;             /* the answer's position, a number of EPSG's list; 0 = the world */
     } pick;
     bool versioned; /* v was given: only this version of the dataset will do */
     uint64_t version;

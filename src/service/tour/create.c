@@ -19,8 +19,8 @@ struct spl_tour_wish {
     uv_work_t work;
     struct request *request; // NULL once it has been given up
     struct spl_tours *tours;
-    char dataset[256];
-    uint64_t version;
+    struct spl_catalog_entry *entry; // one reference, until the path is read
+    struct spl_places_hook places;
     struct spl_camera_defaults defaults;
     struct spl_tour_limits limits;
     char *body; // owned
@@ -37,12 +37,13 @@ static void read_path(uv_work_t *work)
 
 static void reply(struct request *request, struct spl_tour_wish *wish)
 {
-    const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->library->catalog, wish->dataset);
+    const char *id = wish->entry->info->id;
+    const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->library->catalog, id);
     struct spl_error *err = &wish->err;
     struct spl_tour *tour;
     char location[64];
-    if (!err->code && (!entry || entry->info->version != wish->version))
-        spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' was replaced or dropped just now", wish->dataset);
+    if (!err->code && (!entry || entry->info->version != wish->entry->info->version))
+        spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' was replaced or dropped just now", id);
     if (err->code || spl_tours_add(wish->tours, entry, &wish->body, wish->body_length, &wish->spec, &tour, err)) {
         spl_reply_error(request, err);
         return;
@@ -59,6 +60,7 @@ static void destroy(struct spl_tour_wish *wish)
     if (!wish)
         return;
     spl_tour_spec_finish(&wish->spec);
+    spl_catalog_entry_unref(wish->entry);
     free(wish->body);
     free(wish);
 }
@@ -69,6 +71,7 @@ static void after(uv_work_t *work, int status)
     struct spl_tour_wish *wish = work->data;
     struct request *request = wish->request;
     wish->tours->wishes--;
+    wish->tours->service->library->tasks--;
     if (request) {
         request->wish = NULL;
         reply(request, wish);
@@ -86,7 +89,7 @@ void spl_tour_wish_abandon(struct spl_tour_wish *wish)
     wish->request = NULL;
 }
 
-void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const struct spl_catalog_entry *entry)
+void spl_tour_wish_add(struct request *request, struct spl_tours *tours, struct spl_catalog_entry *entry)
 {
     struct spl_service *service = request->service;
     struct spl_error err = {0};
@@ -98,9 +101,10 @@ void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const s
     wish->work.data = wish;
     wish->request = request;
     wish->tours = tours;
-    snprintf(wish->dataset, sizeof wish->dataset, "%s", entry->info->id);
-    wish->version = entry->info->version;
+    wish->entry = spl_catalog_entry_ref(entry);
     wish->defaults = entry->defaults;
+    spl_places_hook_init(&wish->places, entry->places, true);
+    wish->defaults.places = &wish->places.hook;
     wish->limits = spl_tour_get_limits(service);
     wish->body = request->body;
     wish->body_length = request->body_length;
@@ -108,6 +112,7 @@ void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const s
     request->body_length = request->body_capacity = 0;
     request->wish = wish;
     tours->wishes++;
+    service->library->tasks++; // it holds a reference
     spl_waiting_add(request, spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
     uv_queue_work(&service->loop, &wish->work, read_path, after); // fails without a callback only
 }

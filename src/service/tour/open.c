@@ -39,9 +39,16 @@ static void take_up(struct spl_tour *tour, const struct spl_catalog *catalog)
     struct spl_tour_limits limits = spl_tour_get_limits(service);
     struct spl_tour_spec spec;
     struct spl_error err = {0};
+    struct spl_places_hook places;
+    struct spl_camera_defaults defaults = {0};
+    if (entry) {
+        spl_places_hook_init(&places, entry->places, true);
+        defaults = entry->defaults;
+        defaults.places = &places.hook;
+    }
     if (!entry)
         spl_fail(&err, SPL_E_NOT_FOUND, "dataset '%s' is no longer served", tour->dataset);
-    else if (!spl_tour_spec_from_text(tour->body, tour->body_length, &entry->defaults, &limits, &spec, &err) &&
+    else if (!spl_tour_spec_from_text(tour->body, tour->body_length, &defaults, &limits, &spec, &err) &&
              spec.frames != tour->spec.frames) {
         spl_tour_spec_finish(&spec);
         spl_fail(&err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);

@@ -101,6 +101,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
         return fail_type("settings", "an object", settings, err);
     if (json_object_get(settings, "camera"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
+    if (json_object_get(settings, "crs"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.crs", "crs goes into the path, beside its keyframes or frames");
     json_t *sized = settings ? json_copy((json_t *)settings) : json_object();
     for (int i = 0; sized && i < 2; i++) // what is left out follows from the path, and is held against the limits there
         if (json_object_get(sized, sides[!i]) && !json_object_get(sized, sides[i]))

@@ -158,7 +158,7 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
 void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
 
 /* create.c: has a thread of the pool read the request's body; the request waits, and gets 202 or why not. */
-void spl_tour_wish_add(struct request *request, struct spl_tours *tours, const struct spl_catalog_entry *entry);
+void spl_tour_wish_add(struct request *request, struct spl_tours *tours, struct spl_catalog_entry *entry);
 void spl_tour_wish_abandon(struct spl_tour_wish *wish); /* its request no longer waits for it; NULL-safe */
 
 /* route.c */

@@ -16,6 +16,7 @@
 #include "service/headers.h"
 #include "service/http.h"
 #include "service/ops/counters.h"
+#include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/view/bundle.h"
@@ -231,10 +232,14 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         goto refuse;
     int rc = spl_views_request_from_json(request->body, request->body_length, &call->entry->defaults, &limits,
                                          &batch->views, &err);
-    if (rc && rc != SPL_E_NOMEM)
-        err.code = SPL_E_INPUT;
-    if (rc)
+    if (rc && spl_place_wait(request, call, spl_make_views, &err)) {
+        destroy(batch);
+        return;
+    }
+    if (rc) {
+        spl_view_blame(&err);
         goto refuse;
+    }
     for (size_t i = 0; i < batch->views.count; i++)
         if (spl_view_check_dataset(&batch->views.views[i], call->entry->info, &err) ||
             spl_view_has_no_room(service, &batch->views.views[i], &err))

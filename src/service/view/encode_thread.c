@@ -13,7 +13,8 @@ static void encode(struct spl_job *job)
         return;
     const struct spl_view_request *request = &job->request;
     if (request->picks)
-        spl_pick_encode(request, &job->frame, job->dataset, &job->encoded, &job->err);
+        spl_pick_encode(request, &job->frame, job->dataset, job->entry ? job->entry->places : NULL, &job->encoded,
+                        &job->err);
     else if (request->container)
         spl_bundle_layers(request, &job->frame, &job->encoded, &job->err);
     else

@@ -104,6 +104,7 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
         add_camera(&form, &request->pick.camera);
         add_number(&form, request->pick.x);
         add_number(&form, request->pick.y);
+        add(&form, request->pick.crs);
     }
     for (unsigned layer = 0; layer < SPL_LAYER_COUNT && !request->picks; layer++)
         if (view->layers >> layer & 1)

@@ -31,8 +31,22 @@ static void fill(json_t *json, const struct spl_pick *p)
     json_object_set_new(json, "splat", hit && p->splat >= 0 ? json_integer(p->splat) : json_null());
 }
 
+/* The position in EPSG:`crs`; where it is in the world is said as well. */
+static int place(json_t *json, uint32_t crs, const struct spl_pick *pick, struct spl_places *places,
+                 struct spl_error *err)
+{
+    double position[3];
+    int rc = pick->hit ? spl_places_from_world(places, crs, true, pick->position, position, err) : 0;
+    json_object_set_new(json, "crs", json_sprintf("EPSG:%u", crs));
+    json_object_set(json, "world", json_object_get(json, "position"));
+    if (!rc && pick->hit)
+        json_object_set_new(json, "position", vector(position));
+    return rc;
+}
+
 int spl_pick_encode(const struct spl_view_request *request, const struct spl_frame *frame,
-                    const struct spl_dataset *dataset, struct spl_encoded *out, struct spl_error *err)
+                    const struct spl_dataset *dataset, struct spl_places *places, struct spl_encoded *out,
+                    struct spl_error *err)
 {
     double x = request->pick.x, y = request->pick.y;
     struct spl_pick pick;
@@ -41,6 +55,11 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
     json_t *json = json_pack("{s:f, s:f, s:s}", "x", x, "y", y, "unit", request->encode.unit);
     if (json)
         fill(json, &pick);
+    int rc = json && request->pick.crs ? place(json, request->pick.crs, &pick, places, err) : 0;
+    if (rc) {
+        json_decref(json);
+        return rc;
+    }
     char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
     json_decref(json);
     if (!text)

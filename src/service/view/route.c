@@ -5,6 +5,7 @@
 #include "base/clock.h"
 #include "service/exchange.h"
 #include "service/ops/counters.h"
+#include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/view/reply.h"
@@ -21,9 +22,7 @@ static int parse_view(struct request *request, const struct spl_call *call, pars
     bool posted = call->method == SPL_POST;
     const char *text = posted ? request->body : request->query;
     int rc = parse(text, posted ? request->body_length : strlen(text), &call->entry->defaults, &limits, view, err);
-    if (rc && rc != SPL_E_NOMEM)
-        err->code = SPL_E_INPUT; // whatever is wrong with a view is the client's to change
-    return rc;
+    return rc ? spl_view_blame(err) : 0;
 }
 
 static void answer(struct ticket *ticket, struct spl_rendering *rendering, const struct spl_error *err)
@@ -63,14 +62,17 @@ static bool answer_at_once(struct request *request, const struct spl_view_reques
     return request->head;
 }
 
-static void make(struct request *request, const struct spl_call *call, parse_fn *parse)
+static void make(struct request *request, const struct spl_call *call, parse_fn *parse, spl_handler *handler)
 {
     struct spl_catalog_entry *entry = call->entry;
     struct spl_service *service = request->service;
     struct spl_error err = {0};
     struct spl_view_request view;
     struct spl_key key = {0};
-    if (parse_view(request, call, parse, &view, &err) || spl_view_check_dataset(&view, entry->info, &err))
+    int rc = parse_view(request, call, parse, &view, &err);
+    if (rc && spl_place_wait(request, call, handler, &err))
+        return;
+    if (rc || spl_view_check_dataset(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
         key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));
@@ -96,10 +98,12 @@ refuse:
 
 void spl_make_view(struct request *request, const struct spl_call *call)
 {
-    make(request, call, call->method == SPL_POST ? spl_view_request_from_json : spl_view_request_from_query);
+    make(request, call, call->method == SPL_POST ? spl_view_request_from_json : spl_view_request_from_query,
+         spl_make_view);
 }
 
 void spl_pick(struct request *request, const struct spl_call *call)
 {
-    make(request, call, call->method == SPL_POST ? spl_pick_request_from_json : spl_pick_request_from_query);
+    make(request, call, call->method == SPL_POST ? spl_pick_request_from_json : spl_pick_request_from_query,
+         spl_pick);
 }

@@ -89,6 +89,13 @@ void spl_views_complete(struct spl_service *service)
     spl_http_pump(service);
 }
 
+int spl_view_blame(struct spl_error *err)
+{
+    if (err->code != SPL_E_NOMEM && err->code != SPL_E_BUSY && err->code != SPL_E_UNSUPPORTED)
+        err->code = SPL_E_INPUT;
+    return err->code;
+}
+
 void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_info *info)
 {
     snprintf(view->encode.unit, sizeof view->encode.unit, "%s", spl_unit_word(info));

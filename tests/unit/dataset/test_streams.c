@@ -12,6 +12,7 @@
 /* Encodes into a block whose end is watched, decodes each value. */
 static struct spl_stream_code through(enum spl_stream_type type, const double *values, uint32_t count, double *out)
 {
+    static const char *const names[] = {"uint", "half-octaves", "steps"};
     uint32_t words[SPL_STREAM_WORDS_MAX + 2];
     struct spl_stream_code code;
     memset(words, 0xa5, sizeof words);
@@ -22,7 +23,7 @@ static struct spl_stream_code through(enum spl_stream_type type, const double *v
     uint64_t at;
     assert_null(spl_stream_judge(type, &code.base, &code.width, 1, &at));
     for (uint32_t i = 0; i < count; i++)
-        out[i] = spl_stream_decode(type, code, words, i);
+        out[i] = spl_stream_decode(&(struct spl_stream){.type = names[type], .steps_a_unit = 1}, code, words, i);
     return code;
 }
 
@@ -72,6 +73,38 @@ static void test_half_octaves(void **state)
         assert_true(in[i] == 0 ? out[i] == 0 : fabs(log2(out[i] / in[i])) < 0.26);
 }
 
+/* Any numbers up to the largest, with splats that have none among them, or nothing else. */
+static void steps_and_none(void **state)
+{
+    (void)state;
+    static const struct {
+        double low, step;
+        unsigned every, bits; /* none: each such splat; 0: no splat */
+    } rows[] = {{7, 0, 0, 0}, {7, 0, 1, 0}, {7, 0, 2, 1}, {SPL_STREAM_NONE - 1.0, 0, 3, 1},
+                {0, 1, 0, 8}, {0, 1, 5, 7}, {5, 3, 0, 9}, {0, 33818640, 4, 32}};
+    double in[SPL_CHUNK_SPLATS], out[SPL_CHUNK_SPLATS];
+    for (size_t row = 0; row < sizeof rows / sizeof *rows; row++) {
+        for (uint32_t i = 0; i < SPL_CHUNK_SPLATS; i++)
+            in[i] = rows[row].every && i % rows[row].every == 0 ? SPL_STREAM_NONE : rows[row].low + rows[row].step * i;
+        struct spl_stream_code code = through(SPL_STREAM_STEPS, in, SPL_CHUNK_SPLATS, out);
+        assert_int_equal(code.width, rows[row].bits);
+        for (uint32_t i = 0; i < SPL_CHUNK_SPLATS; i++)
+            if (in[i] == SPL_STREAM_NONE ? !isnan(out[i]) : in[i] != out[i])
+                fail_msg("row %zu: %.17g instead of %.17g", row, out[i], in[i]);
+    }
+    const struct spl_stream tenths = {.type = "steps", .first = -3, .steps_a_unit = 10};
+    assert_true(spl_stream_decode(&tenths, (struct spl_stream_code){0, 0}, (uint32_t[2]){0}, 0) == -0.3);
+    assert_true(spl_stream_decode(&tenths, (struct spl_stream_code){6, 0}, (uint32_t[2]){0}, 0) == 0.3);
+    assert_null(spl_stream_judge_steps(-0x1p53, 0x1p-100));
+    assert_non_null(spl_stream_judge_steps(0.5, 1));
+    assert_non_null(spl_stream_judge_steps(0x1p54, 1));
+    assert_non_null(spl_stream_judge_steps((double)NAN, 1));
+    assert_non_null(spl_stream_judge_steps(0, 0));
+    assert_non_null(spl_stream_judge_steps(0, -1));
+    assert_non_null(spl_stream_judge_steps(0, (double)NAN));
+    assert_non_null(spl_stream_judge_steps(0, 0x1p-1000));
+}
+
 static void test_bad_codes(void **state)
 {
     (void)state;
@@ -90,6 +123,8 @@ static void test_bad_codes(void **state)
         {SPL_STREAM_HALF_OCTAVES, {0x7f800000, 0}, false},
         {SPL_STREAM_HALF_OCTAVES, {0x7fc00000, 0}, false},
         {SPL_STREAM_HALF_OCTAVES, {0xbf800000, 0}, false},
+        {SPL_STREAM_STEPS, {UINT32_MAX, 32}, true},
+        {SPL_STREAM_STEPS, {0, 33}, false},
         {SPL_STREAM_UNKNOWN, {0x7fc00000, 32}, true},
         {SPL_STREAM_UNKNOWN, {0, 33}, false},
     };
@@ -101,7 +136,8 @@ static void test_bad_codes(void **state)
         if (!what != rows[i].good || (what && at != 2))
             fail_msg("row %zu", i);
     }
-    assert_true(isnan(spl_stream_decode(SPL_STREAM_UNKNOWN, (struct spl_stream_code){0, 0}, NULL, 0)));
+    const struct spl_stream unknown = {.type = "furlongs"};
+    assert_true(isnan(spl_stream_decode(&unknown, (struct spl_stream_code){0, 0}, NULL, 0)));
     assert_int_equal(spl_stream_type_from_name("uint"), SPL_STREAM_UINT);
     assert_int_equal(spl_stream_type_from_name("half-octaves"), SPL_STREAM_HALF_OCTAVES);
     assert_int_equal(spl_stream_type_from_name("UINT"), SPL_STREAM_UNKNOWN);
@@ -125,6 +161,7 @@ int main(void)
         cmocka_unit_test(names_that_every_dataset_has_are_taken),
         cmocka_unit_test(test_whole_numbers_are_exact),
         cmocka_unit_test(test_half_octaves),
+        cmocka_unit_test(steps_and_none),
         cmocka_unit_test(test_bad_codes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -197,7 +197,7 @@ static void test_kinds_are_said_and_remembered(void **state)
     assert_null(strstr(pack_two(b, b, true, NULL), "--intensity"));
     char *bare = write_ply("bare.ply", 10, "", ""); /* names are lent for a few calls */
     assert_non_null(strstr(pack_two(bare, NULL, true, NULL), "--intensity changes nothing"));
-    assert_non_null(strstr(pack_two(bare, bare, true, NULL), "colours are none at all in 2"));
+    assert_non_null(strstr(pack_two(bare, bare, true, NULL), "colours are none at all in 1"));
     assert_null(strstr(pack_two(bare, NULL, false, NULL), "--intensity"));
 }
 
