@@ -100,6 +100,7 @@ struct spl_pack_options {
     const char *keep;
     const char *unit;          /* of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say */
     const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
+    double up[3];              /* what is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it */
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)

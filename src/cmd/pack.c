@@ -187,6 +187,24 @@ static int take_quality(void *arguments, const char *option, char *text, struct 
     return spl_cmd_parse_real(option, text, 20, 60, &a->photos.texture_quality, err);
 }
 
+static int take_up(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    const char *axis = text + (*text == '+' || *text == '-');
+    double up[3] = {0};
+    if (*axis >= 'x' && *axis <= 'z' && !axis[1])
+        up[*axis - 'x'] = *text == '-' ? -1 : 1;
+    else if (spl_cmd_parse_vector(option, text, up, err) || (up[0] == 0 && up[1] == 0 && up[2] == 0)) {
+        if (err)
+            *err = (struct spl_error){0};
+        return spl_fail_field(err, SPL_E_USAGE, "up",
+                              "%s takes +x, -x, +y, -y, +z, -z, or a direction X,Y,Z that is not 0,0,0, not '%.60s'",
+                              option, text);
+    }
+    memcpy(a->pack.up, up, sizeof up);
+    return 0;
+}
+
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
      SPL_CMD_TEXT(struct arguments, pack.output)},
@@ -205,6 +223,8 @@ static const struct spl_cmd_option options[] = {
      "the scans' coordinate system, whatever they say: EPSG:25832, EPSG:2994+EPSG:6360 with that of heights, a file of "
      "WKT, or none",
      .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.crs)},
+    {"up", "AXIS", "what is up: +z, -y and such, or a direction X,Y,Z",
+     .otherwise = "z; without a coordinate system, what is up in the photographs", .take = take_up},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -248,7 +268,7 @@ static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
-        "                   [--unit U] [--crs WHICH] [--neighbours K]\n"
+        "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K]\n"
         "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
         "                   [--no-clip-lines] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"

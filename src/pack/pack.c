@@ -27,6 +27,7 @@
 #include "pack/system.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
+#include "pack/up.h"
 #include "pack/view.h"
 #include "pack/wires/wires.h"
 
@@ -38,6 +39,7 @@ struct pack {
     struct spl_keep keep;
     struct spl_scans scans;
     struct spl_system system;
+    const char *up_from; // static; NULL: z is up, because nobody says otherwise
     struct spl_points points;
     struct spl_wires wires;
     struct spl_tree tree;
@@ -66,6 +68,9 @@ static int check_options(struct pack *p, struct spl_error *err)
     if (!(normal >= 0.01 && normal <= 30))
         return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
                               normal);
+    if (!(isfinite(o->up[0]) && isfinite(o->up[1]) && isfinite(o->up[2])))
+        return spl_fail_field(err, SPL_E_USAGE, "up", "%g, %g, %g; up is a direction of three finite numbers", o->up[0],
+                              o->up[1], o->up[2]);
     p->chunk = (struct spl_chunk_options){
         .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05};
     struct stat output, input;
@@ -145,6 +150,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     json_t *meta = make_meta(p, radius, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
+    if (p->up_from)
+        json_object_set_new(meta, "up", json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
@@ -212,6 +219,21 @@ static int join_wires(struct pack *p, struct spl_error *err)
     return rc;
 }
 
+/* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */
+static void settle_up(struct pack *p, const struct spl_view_list *photographs)
+{
+    const double *said = p->options->up;
+    double *up = p->points.up, most = fmax(fmax(fabs(said[0]), fabs(said[1])), fabs(said[2])), length = 0;
+    if (most > 0) {
+        for (int c = 0; c < 3; c++)
+            length += said[c] / most * (said[c] / most);
+        for (int c = 0; c < 3; c++)
+            up[c] = said[c] / most / sqrt(length);
+        p->up_from = "given";
+    } else if (photographs && !p->system.crs && spl_up_from_cameras(photographs, up))
+        p->up_from = "cameras";
+}
+
 /* A scan that turns out to be broken has no say in what the others' coordinates are. */
 static int gather(struct pack *p, struct spl_system_options *said, struct spl_error *err)
 {
@@ -246,6 +268,8 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
         plan(&p, photographs ? (uint32_t)photographs->count : 0);
         rc = gather(&p, &said, err);
     }
+    if (!rc)
+        settle_up(&p, photographs);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
