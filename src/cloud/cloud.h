@@ -136,6 +136,9 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
  * right white, and the next batch is the first one. SPL_E_CANCELLED. */
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
 
+/* Moves what the header says of its coordinates to the caller, who releases it with spl_crs_finish(). */
+void spl_cloud_take_coordinates(struct spl_cloud *cloud, struct spl_cloud_coordinates *out);
+
 /* NULL-safe. */
 void spl_cloud_destroy(struct spl_cloud *cloud);
 
