@@ -157,7 +157,7 @@ FORGE(taken_name, add_stream(p, "position", "uint", ""))
 FORGE(total_name, add_stream(p, "total", "uint", ""))
 FORGE(uncertainty_negative, p->bases[1][0] = 0xbf800000)
 FORGE(uncertainty_wide, p->widths[1][0] = 6)
-FORGE(unit_text, json_object_set_new(p->meta, "unit", json_string("km")))
+FORGE(unit_text, json_object_set_new(p->meta, "unit", json_string("furlong")))
 FORGE(unit_number, json_object_set_new(p->meta, "unit", json_integer(1)))
 FORGE(unit_gone, (json_object_del(p->meta, "unit"), json_object_del(p->meta, "crs")))
 FORGE(crs_number, json_object_set_new(p->meta, "crs", json_integer(2056)))
@@ -243,7 +243,7 @@ static const struct {
     {total_name, "section META: \"streams[2].name\" is \"total\", and"},
     {uncertainty_negative, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative"},
     {uncertainty_wide, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative or not finite, or codes"},
-    {unit_text, "section META: \"unit\" is \"km\", and must be m, ft"},
+    {unit_text, "section META: \"unit\" is \"furlong\", and must be m, ft"},
     {unit_number, "section META: \"unit\" is 1, and must be m, ft"},
     {unit_gone, NULL},
     {crs_number, "section META: \"crs\" is 2056, and must be a text"},
