@@ -182,12 +182,14 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
         size_t room = batch->capacity - batch->count;
         int code = cloud->reader->rows(cloud, &cloud->rows, room < SPL_ROWS ? room : SPL_ROWS, err);
         size_t before = batch->count;
-        if (code > 0)
-            code = spl_rows_emit(&cloud->rows, cloud->row, &cloud->color, &cloud->source, &cloud->info, batch, err);
+        bool sampled = cloud->info.colors.sampled, emits = code > 0;
+        if (emits)
+            code = spl_rows_emit(&cloud->rows, cloud->row, &cloud->color, &cloud->source, &cloud->info, batch,
+                                 sampled ? NULL : err);
         else if (code == 0)
             break;
         if (code < 0)
-            return code;
+            return emits && sampled ? spl_cloud_begin_again(cloud, batch, err) : code;
         if (cloud->part)
             thin(cloud, batch, before);
         cloud->row += cloud->rows.count;

@@ -5,6 +5,7 @@
 #ifndef SPL_CLOUD_CLOUD_H
 #define SPL_CLOUD_CLOUD_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -34,6 +35,7 @@ struct spl_cloud_colors {
     double black, white;                                                     /* of RGB 0 and 1, 255 or 65535 */
     bool guessed; /* by the values of this file, since their type has room for more */
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
+    bool sampled; /* white is what the first points say: spl_cloud_read() may find that it is another */
 };
 
 /* What a header says of its coordinates, as far as it does (crs.h). */
@@ -56,6 +58,19 @@ struct spl_cloud_options {
     const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
     uint64_t max_points;                   /* an even part: of COPC whole levels, of others so many; 0 = all */
     uint64_t points; /* info.points_total of an earlier open; 0 = find out, which may take a pass over the file */
+    unsigned threads;                      /* of readers that decode chunks side by side; 0 = all cores */
+    const atomic_bool *cancelled;          // may be NULL; outlives the cloud
+    bool sample_colors; /* of a file that is slow to read the first points say what white is; see colors.sampled */
+};
+
+/* An image that a scan's file holds. */
+struct spl_cloud_image {
+    const char *name;     /* printable; "" = it has none */
+    const char *kind;     /* static: "pinhole", "spherical", "cylindrical", or "visual reference": no projection */
+    const char *coding;   /* static: "JPEG", "PNG", "" = neither */
+    double width, height; /* pixels, as the file says */
+    uint64_t bytes;
+    bool posed;
 };
 
 struct spl_cloud_info {
@@ -70,13 +85,15 @@ struct spl_cloud_info {
     struct spl_cloud_colors colors; /* of the points that come next: stations of a PTX may differ */
     uint64_t points_from[3];        /* points so far, by struct spl_cloud_colors.from */
     struct spl_cloud_coordinates coordinates;
-    uint64_t points_skipped; /* non-finite, or PTX "no return" cells */
-    uint32_t scalars;        /* bit 1 << enum spl_scalar for each that batches have */
-    uint32_t columns;        /* bit 1 << enum spl_column (rows.h) for each that the file has */
-    const char *fields;      /* borrowed: names of what the file has, as far as it names any; "" = none */
-    char version[48];        /* of the format, and its kind: "1.4, point format 7"; "" = it has none */
-    double bounds[2][3];     /* least and most of the coordinates, as the header says, which may be wrong */
-    bool has_bounds;         /* it does */
+    uint64_t points_skipped;              /* non-finite, or PTX "no return" cells */
+    uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
+    uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
+    uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
+    const struct spl_cloud_image *images; /* borrowed until destroy */
+    char version[48];                     /* of the format, and its kind: "1.4, point format 7"; "" = it has none */
+    double bounds[2][3]; /* least and most of the coordinates, as the header says, which may be wrong */
+    bool has_bounds;     /* it does */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
@@ -91,6 +108,8 @@ struct spl_point_batch {
 };
 
 struct spl_cloud;
+
+enum { SPL_CLOUD_AGAIN = 2 };
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
@@ -113,7 +132,8 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
 
 /* Fills the next batch (overwriting it): 1 = batch.count > 0 points, 0 = end, negative = error. Points with a
  * non-finite coordinate are skipped and counted. A file with no usable point ends with 0 at once: the caller decides.
- */
+ * SPL_CLOUD_AGAIN where a point is brighter than sampled colours let expect: nothing that was read holds, info has the
+ * right white, and the next batch is the first one. SPL_E_CANCELLED. */
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
 
 /* NULL-safe. */

@@ -1,15 +1,17 @@
 /* Finding out what a file's colour numbers mean: 8 or 16 bits, 0..1 or 0..255, or intensities whose range becomes grey.
  *
  * Binary colours of an ambiguous type are all looked at (until one exceeds 8 bits), since one dark half of a scan must
- * not decide for the other. Text is sampled at places all over the file; spl_rows_emit() then refuses a value that
+ * not decide for the other; of a file that is slow to read only the first ones where the caller can begin again
+ * (SPL_CLOUD_AGAIN). Text is sampled at places all over the file; spl_rows_emit() then refuses a value that
  * contradicts what the samples said, so that no colour is ever wrong in silence. Runs once, inside spl_cloud_open(). */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "cloud/reader.h"
 
-enum { PARTS = 64, SAMPLES = 1 << 16 };
+enum { PARTS = 64, SAMPLES = 1 << 16, FIRST_ROWS = 4096 };
 
 struct ranges {
     bool colors, intensities; /* which are wanted */
@@ -113,13 +115,20 @@ static struct spl_cloud_colors find_grey(double *sample, size_t count)
 static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
 {
     struct ranges ranges = {.colors = true};
-    int code = scan_all(cloud, &ranges, err);
+    /* of a part all points have a say, those too that are not read */
+    bool sample = cloud->slow_rows && cloud->options->sample_colors && !cloud->options->max_points;
+    int code = sample ? cloud->reader->seek(cloud, 0, PARTS, err) : SPL_OK;
+    if (code == SPL_OK && sample)
+        code = scan(cloud, &ranges, FIRST_ROWS, true, err);
+    bool sampled = ranges.color_max > 0 && !ranges.done;
+    if (code == SPL_OK && !sampled && !ranges.done)
+        code = scan_all(cloud, &ranges, err);
     if (code < 0)
         return code;
     if (ranges.color_max > 65535.5)
         return spl_source_fail(&cloud->source, SPL_E_INPUT, "red, green, blue", err,
                                "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
-    *colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .guessed = true, .white = 1};
+    *colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .guessed = true, .white = 1, .sampled = sampled};
     if (ranges.color_max > 255.5)
         colors->white = 65535;
     else if (ranges.color_max > 1.001 || cloud->integer_colors)
@@ -152,6 +161,21 @@ void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors
         cloud->color = spl_color_rule_rgb(colors->white);
     else if (colors->from == SPL_COLORS_INTENSITY)
         cloud->color = spl_color_rule_grey(colors->black, colors->white);
+}
+
+int spl_cloud_begin_again(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err)
+{
+    struct spl_cloud_colors colors = cloud->info.colors;
+    colors.white = 65535;
+    colors.sampled = false;
+    spl_cloud_set_colors(cloud, &colors);
+    memset(cloud->info.points_from, 0, sizeof cloud->info.points_from);
+    cloud->info.points_skipped = 0;
+    cloud->row = 0;
+    cloud->part_sum = cloud->part_of - cloud->part;
+    batch->count = 0;
+    int code = cloud->reader->seek(cloud, 0, 1, err);
+    return code < 0 ? code : SPL_CLOUD_AGAIN;
 }
 
 int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err)

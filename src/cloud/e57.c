@@ -40,10 +40,12 @@ struct e57 {
     struct spl_e57_document document;
     struct spl_e57_points points;
     struct scan *scans;               /* document.scan_count */
+    struct spl_cloud_image *images;   /* document.image_count */
     size_t scan;                      /* the one that is read; document.scan_count = the end */
     const struct spl_e57_scan *named; /* the first one with points: its fields' names are known */
     bool begun;
     bool scale_colors, scale_intensity;
+    uint64_t room;                /* bytes of the file that no scan has claimed: none is told of twice */
     struct spl_cloud_colors base; /* of the file as a whole */
     double state[SPL_ROWS];
 };
@@ -158,10 +160,11 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
         memcpy(cloud->info.stations[cloud->info.station_count++], scan->pose, sizeof scan->pose);
         cloud->info.attributes |= SPL_CLOUD_STATION;
     }
-    if (__builtin_add_overflow(cloud->info.points_expected, from->points, &cloud->info.points_expected))
-        return fail_scan(cloud, from, "recordCount", err, "more points in all than 64 bits can count");
     if (!from->points)
         return SPL_OK;
+    if ((code = spl_e57_check_count(&cloud->source, document, from, &e57->room, err)) < 0)
+        return code;
+    cloud->info.points_expected += from->points;
     for (int k = 0; colors && k < 3; k++)
         scan->color[k] = range_of(spl_e57_field(document, from, SPL_E57_RED + k), from->color_limits[k], true);
     if (colors)
@@ -233,6 +236,25 @@ static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+static int list_images(struct spl_cloud *cloud, struct spl_error *err)
+{
+    static const char *const kinds[] = {"", "visual reference", "pinhole", "spherical", "cylindrical"},
+                             *const codings[] = {"", "JPEG", "PNG"};
+    struct e57 *e57 = cloud->state;
+    e57->images = spl_alloc(e57->document.image_count, sizeof *e57->images, err);
+    if (!e57->images)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < e57->document.image_count; i++) {
+        const struct spl_e57_image *image = &e57->document.images[i];
+        if (image->kind != SPL_E57_NO_IMAGE)
+            e57->images[cloud->info.image_count++] =
+                (struct spl_cloud_image){image->name,   kinds[image->kind], codings[image->coding], image->width,
+                                         image->height, image->bytes,       image->pose.given};
+    }
+    cloud->info.images = e57->images;
+    return SPL_OK;
+}
+
 static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct e57 *e57 = cloud->state = spl_alloc(1, sizeof *e57, err);
@@ -250,12 +272,14 @@ static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
     cloud->info.stations = spl_alloc(count, sizeof *cloud->info.stations, err);
     if (!e57->scans || !cloud->info.stations)
         return SPL_E_NOMEM;
+    e57->room = spl_e57_logical_bytes(&e57->pages);
     for (size_t i = 0; i < count; i++)
         if ((code = set_scan(cloud, i, err)) < 0)
             return code;
     agree_on_ranges(cloud);
     cloud->sampling = SPL_SAMPLE_INTENSITY;
-    return read_coordinates(cloud, err);
+    code = list_images(cloud, err);
+    return code < 0 ? code : read_coordinates(cloud, err);
 }
 
 /* What the colours of a scan are made from, where it lacks what most of the file has. */
@@ -464,6 +488,7 @@ static void e57_close(struct spl_cloud *cloud)
     spl_e57_document_finish(&e57->document);
     spl_e57_pages_finish(&e57->pages);
     free(e57->scans);
+    free(e57->images);
 }
 
 const struct spl_cloud_reader spl_e57_reader = {

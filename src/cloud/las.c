@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "base/memory.h"
 #include "cloud/copc.h"
 #include "cloud/las_fields.h"
@@ -126,6 +127,21 @@ static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
     }
 }
 
+/* Of a table that is done without whoever opens the file first is told. */
+static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *format, uint64_t points_at,
+                       struct spl_error *err)
+{
+    const struct spl_cloud_options *options = cloud->options;
+    struct las *las = cloud->state;
+    int code = spl_laz_stream_open(&las->stream, &cloud->source, format, points_at, las->count, options->threads,
+                                   options->cancelled, err);
+    const struct spl_laz_fault *wrong = code < 0 || options->colors ? NULL : spl_laz_stream_get_warning(las->stream);
+    if (wrong)
+        spl_log_warn("%s: offset %llu: %s: %s; chunks are read one after the other", cloud->source.path,
+                     (unsigned long long)wrong->at, wrong->field, wrong->reason);
+    return code;
+}
+
 static int las_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct spl_source *source = &cloud->source;
@@ -193,7 +209,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     cloud->info.format = compressed ? "LAZ" : "LAS";
-    if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count, 0, err)) < 0)
+    cloud->slow_rows = compressed;
+    if (compressed && (code = open_stream(cloud, &format, points_at, err)) < 0)
         return code;
     if (compressed &&
         (code = spl_copc_take_levels(cloud, records, las->stream, cloud->options->max_points, &las->count, err)) < 0)

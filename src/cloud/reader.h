@@ -37,6 +37,7 @@ struct spl_cloud {
     enum spl_sampling sampling;
     bool scan_colors;    /* the range of the colours is not fixed by their type */
     bool integer_colors; /* 1 is then the darkest grey, not white */
+    bool slow_rows;      /* reading all of them twice is to be avoided */
     bool intensity;      /* wanted, whatever colours there are */
     struct spl_keep keep;
     char fields[400]; /* see info.fields */
@@ -69,6 +70,9 @@ void spl_cloud_keep_columns(struct spl_cloud *cloud);
 
 /* Takes colours from the next rows on as `colors` say. */
 void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors *colors);
+
+/* Behind a colour that sampled ones contradict. SPL_CLOUD_AGAIN. */
+int spl_cloud_begin_again(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
 
 /* Decides them from the columns and the values' range, and leaves the reader at its first row. */
 int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err);

@@ -52,6 +52,12 @@ int spl_view_list_read_transforms(struct spl_view_list *list, const char *path, 
 int spl_view_list_read_open3d(struct spl_view_list *list, const char *path, const json_t *document,
                               const struct spl_photograph_options *photographs, struct spl_error *err);
 
+/* views_e57.c */
+bool spl_view_list_is_e57(const char *path);
+int spl_view_list_load_e57(struct spl_view_list *list, const char *path,
+                           const struct spl_photograph_options *photographs, struct spl_error *err);
+void spl_inner_photograph_destroy(struct spl_inner_photograph *inner);
+
 /* views_poses.c */
 int spl_view_list_load_poses(struct spl_view_list *list, const char *folder,
                              const struct spl_photograph_options *photographs, struct spl_error *err);

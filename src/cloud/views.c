@@ -170,7 +170,8 @@ static int load(struct spl_view_list *list, const char *path, const struct spl_p
 {
     struct stat status;
     if (stat(path, &status) || !S_ISDIR(status.st_mode))
-        return spl_view_list_load_json(list, path, photographs, err);
+        return spl_view_list_is_e57(path) ? spl_view_list_load_e57(list, path, photographs, err)
+                                          : spl_view_list_load_json(list, path, photographs, err);
     if (has(path, "cameras.bin"))
         return spl_view_list_load_colmap_bin(list, path, photographs, err);
     if (has(path, "camera-intrinsics.txt"))
@@ -208,6 +209,7 @@ void spl_view_list_finish(struct spl_view_list *list)
     for (size_t i = 0; i < list->count; i++) {
         free(list->views[i].name);
         free(list->views[i].photograph);
+        spl_inner_photograph_destroy(list->views[i].inner);
     }
     free(list->views);
     *list = (struct spl_view_list){0};

@@ -19,27 +19,42 @@
  * Pose folders: camera-intrinsics.txt (3 x 3; the first pixel's centre is (0, 0)), NAME.pose.txt (4 x 4, camera to
  * world, z forward) beside NAME.color.jpg or .png; the photographs say their own size.
  *
+ * E57: the images of the scans' file that have a pose: pinholes as they are, spherical and cylindrical ones as faces of
+ * 90 degrees (views_e57.c).
+ *
  * A view is drawn as a pinhole: those with distortion are taken when it is 0. Photographs keep their lens. */
 #ifndef SPL_CLOUD_VIEWS_H
 #define SPL_CLOUD_VIEWS_H
 
 #include <stddef.h>
+#include <stdio.h>
 
 #include <splatd/camera.h>
 
 #include "base/error.h"
 #include "geom/distortion.h"
+#include "geom/panorama.h"
 
 enum {
     SPL_VIEW_NAME_MAX = 100,  /* bytes */
     SPL_VIEW_LIST_MAX = 65536 /* views */
 };
 
+/* A photograph that lies inside a scan's file, whole or as a panorama that the view cuts a face out of. */
+struct spl_inner_photograph {
+    char *path;         /* of the file */
+    uint64_t at, bytes; /* of its section in the file, and of the image */
+    bool is_panorama;
+    uint32_t width, height; /* of the image, pixels */
+    struct spl_panorama panorama;
+};
+
 struct spl_named_view {
     char *name; /* unique; part of file names: no '/', no control character, no '.' in front */
     struct spl_camera camera;
-    struct spl_distortion distortion; /* NONE but for photographs */
-    char *photograph;                 /* path; may be NULL */
+    struct spl_distortion distortion;   /* NONE but for photographs */
+    char *photograph;                   /* path, of an inner one for messages alone; may be NULL */
+    struct spl_inner_photograph *inner; /* may be NULL: the photograph is a file */
 };
 
 struct spl_view_list {
@@ -66,6 +81,9 @@ struct spl_photograph_options {
  * SIMPLE_PINHOLE to FULL_OPENCV, SIMPLE_RADIAL_FISHEYE and RADIAL_FISHEYE are taken. */
 int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
                                    const struct spl_photograph_options *options, struct spl_error *err);
+
+/* An inner photograph as a file of its own, which the caller closes: the image as it was stored. Any thread; blocks. */
+int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct spl_error *err);
 
 /* Takes NULL and zeroed lists. */
 void spl_view_list_finish(struct spl_view_list *list);

@@ -139,6 +139,19 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
                      (json_int_t)estimate.dataset_bytes, "warnings", warnings);
 }
 
+static json_t *list_images(const struct spl_cloud_info *info)
+{
+    json_t *all = json_array();
+    for (uint32_t i = 0; i < info->image_count; i++) {
+        const struct spl_cloud_image *image = &info->images[i];
+        json_array_append_new(all,
+                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", text_json(image->name), "kind",
+                                        image->kind, "coding", image->coding, "width", image->width, "height",
+                                        image->height, "bytes", (json_int_t)image->bytes, "posed", (int)image->posed));
+    }
+    return all;
+}
+
 /* Members that are not known are null. */
 static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, const struct spl_cloud_info *info,
                         const struct spl_info_scan_options *options)
@@ -165,6 +178,7 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
     json_object_set_new(json, "stations",
                         options->read || info->station_count ? json_integer((json_int_t)info->station_count)
                                                              : json_null());
+    json_object_set_new(json, "images", list_images(info));
     json_object_set_new(json, "crs", crs ? text_json(crs) : json_null());
     json_object_set_new(json, "crs_name", info->coordinates.name[0] ? text_json(info->coordinates.name) : json_null());
     json_object_set_new(
@@ -258,6 +272,14 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
                info->bounds[0][1], info->bounds[0][2], info->bounds[1][0], info->bounds[1][1], info->bounds[1][2]);
     if (info->station_count)
         printf("  stations      %u\n", info->station_count);
+    for (uint32_t i = 0; i < info->image_count; i++) {
+        const struct spl_cloud_image *image = &info->images[i];
+        printf("  %-14s%s, %s %.0f x %.0f, %s bytes%s: ", i ? "" : "images", image->kind,
+               image->coding[0] ? image->coding : "unknown coding", image->width, image->height,
+               spl_cmd_group(image->bytes, text), image->posed ? "" : ", without a pose");
+        spl_cmd_put_text(stdout, image->name, 0);
+        putchar('\n');
+    }
     print_pack(json_object_get(json, "pack"));
 }
 

@@ -213,8 +213,8 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_FLAG(struct arguments, pack.no_linear)},
     {"no-clip-lines", NULL, "discs are not cut where surfaces end", SPL_CMD_FLAG(struct arguments, pack.no_clip_lines)},
     {"cameras", "MODEL",
-     "poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a folder of poses, or a list of "
-     "views; in the scan's coordinates",
+     "poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a folder of poses, an "
+     "E57 file with images (the scan itself), or a list of views; in the scan's coordinates",
      SPL_CMD_TEXT(struct arguments, photos.cameras)},
     {"images", "DIR", "where the photographs lie", .otherwise = "where MODEL says",
      SPL_CMD_TEXT(struct arguments, photos.images)},

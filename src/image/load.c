@@ -82,30 +82,45 @@ static int open_file(const char *path, FILE **file, struct spl_error *err)
                              : spl_fail_errno(err, errno, "%s: cannot be opened", path);
 }
 
+int spl_image_get_info_of(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err)
+{
+    *out = (struct spl_image_info){0};
+    int format = find_format(file, path, err);
+    if (format >= 0 && !formats[format].inspect)
+        format = spl_fail(err, SPL_E_UNSUPPORTED, "%s: a %s is no photograph", path, formats[format].name);
+    return format < 0 ? format : formats[format].inspect(file, path, out, err);
+}
+
 int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_error *err)
 {
     FILE *file;
     *out = (struct spl_image_info){0};
-    int rc = open_file(path, &file, err), format = rc ? rc : find_format(file, path, err);
-    if (!rc && format >= 0 && !formats[format].inspect)
-        format = spl_fail(err, SPL_E_UNSUPPORTED, "%s: a %s is no photograph", path, formats[format].name);
-    rc = format < 0 ? format : formats[format].inspect(file, path, out, err);
+    int rc = open_file(path, &file, err);
+    if (!rc)
+        rc = spl_image_get_info_of(file, path, out, err);
     if (file)
         fclose(file);
+    return rc;
+}
+
+int spl_image_load_of(FILE *file, const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err)
+{
+    spl_assert((unsigned)layer < SPL_LAYER_COUNT);
+    *out = (struct spl_image){.layer = layer, .type = types[layer]};
+    int rc = load(file, path, out, err);
+    if (rc)
+        spl_image_finish(out);
     return rc;
 }
 
 int spl_image_load(const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err)
 {
     FILE *file;
-    spl_assert((unsigned)layer < SPL_LAYER_COUNT);
-    *out = (struct spl_image){.layer = layer, .type = types[layer]};
+    *out = (struct spl_image){0};
     int rc = open_file(path, &file, err);
     if (!rc)
-        rc = load(file, path, out, err);
+        rc = spl_image_load_of(file, path, layer, out, err);
     if (file)
         fclose(file);
-    if (rc)
-        spl_image_finish(out);
     return rc;
 }

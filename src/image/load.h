@@ -2,6 +2,8 @@
 #ifndef SPL_IMAGE_LOAD_H
 #define SPL_IMAGE_LOAD_H
 
+#include <stdio.h>
+
 #include <splatd/image.h>
 
 #include "base/error.h"
@@ -20,6 +22,9 @@ enum { SPL_IMAGE_PIXELS_MAX = 64 << 20 };
  * reading. */
 int spl_image_load(const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err);
 
+/* The same of an open file, which stands at its start; `path` is for messages. */
+int spl_image_load_of(FILE *file, const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err);
+
 /* What an image file is, from its header alone. */
 struct spl_image_info {
     uint32_t width, height;
@@ -29,5 +34,6 @@ struct spl_image_info {
 
 /* As spl_image_load() without its pixels: PNG and JPEG. */
 int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_error *err);
+int spl_image_get_info_of(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);
 
 #endif

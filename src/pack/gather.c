@@ -127,6 +127,15 @@ static void number_scan(const struct spl_points *p, const struct spl_point_batch
                                                   : (double)NAN;
 }
 
+static void forget(struct spl_scan *scan, struct spl_stage *stage)
+{
+    for (int c = 0; c < 3; c++) {
+        scan->min[c] = INFINITY;
+        scan->max[c] = -INFINITY;
+    }
+    atomic_store(&stage->done, 0);
+}
+
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
                        struct spl_scan *scan, double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
@@ -141,6 +150,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
     uint64_t first = p->points_read;
+    size_t count = p->count;
     char name[128];
     bool stations;
     spl_kept_has_scan(scans, &stations);
@@ -150,6 +160,14 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     if (info->points_expected && info->points_expected < UINT32_MAX - 1 - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
+        if (rc == SPL_CLOUD_AGAIN) {
+            p->points_read = first;
+            p->count = count;
+            forget(scan, stage);
+            scan->colors = scan->own_colors = info->colors;
+            rc = 0;
+            continue;
+        }
         spl_stage_add(stage, batch->count, 0);
         rc = spl_scan_grow(scan, batch, p->points_read - first, err);
         if (numbers)

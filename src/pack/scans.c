@@ -102,13 +102,16 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
 {
     int rc = SPL_OK;
     *scans = (struct spl_scans){.inputs = inputs, .how = *how};
+    scans->how.threads = stage->threads;
+    scans->how.cancelled = stage->cancelled;
+    scans->how.sample_colors = true;
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], how, scans->count ? NULL : scans->fields, &why)))
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &scans->how, scans->count ? NULL : scans->fields, &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;

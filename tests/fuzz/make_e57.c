@@ -85,11 +85,22 @@ int main(int argc, char **argv)
     e57_add_scan(&w, &(struct e57_scan){"first", NULL, plain, 3, N, 0});
     e57_add_scan(&w, &(struct e57_scan){"empty", e57_pose(1, 0, 0, 0, 0, 0, 0), cells, 6, 0, 0});
     e57_add_scan(&w, &(struct e57_scan){"second", NULL, cells, 6, N, 0});
+    e57_add_image(
+        &w,
+        "<name type=\"String\">a</name>%s<pinholeRepresentation><jpegImage type=\"Blob\" fileOffset=\"%llu\" "
+        "length=\"4\"/><focalLength type=\"Float\">0.01</focalLength><imageWidth type=\"Integer\">4"
+        "</imageWidth><imageHeight>3</imageHeight><pixelWidth>1e-3</pixelWidth><pixelHeight>1e-3</pixelHeight>"
+        "</pinholeRepresentation>",
+        e57_pose(1, 0, 0, 0, 0, 0, 0), (unsigned long long)e57_add_blob(&w, "JPEG", 4));
     e57_add_image(&w,
-                  "<name type=\"String\">a</name>%s<pinholeRepresentation><jpegImage type=\"Blob\" fileOffset=\"%llu\" "
-                  "length=\"4\"/><focalLength type=\"Float\">0.01</focalLength><imageWidth type=\"Integer\">4"
-                  "</imageWidth></pinholeRepresentation>",
-                  e57_pose(1, 0, 0, 0, 0, 0, 0), (unsigned long long)e57_add_blob(&w, "JPEG", 4));
+                  "<associatedData3DGuid>{second}</associatedData3DGuid><sphericalRepresentation><pngImage "
+                  "type=\"Blob\" fileOffset=\"48\" length=\"9\"/><imageWidth>60</imageWidth><imageHeight>30"
+                  "</imageHeight><pixelWidth>0.1</pixelWidth><pixelHeight>0.1</pixelHeight></sphericalRepresentation>");
+    e57_add_image(&w,
+                  "%s<cylindricalRepresentation><pngImage type=\"Blob\" fileOffset=\"48\" length=\"9\"/><imageWidth>9"
+                  "</imageWidth><imageHeight>9</imageHeight><pixelWidth>0.1</pixelWidth><pixelHeight>0.1</pixelHeight>"
+                  "<radius>1</radius></cylindricalRepresentation>",
+                  e57_pose(1, 0, 0, 0, 0, 0, 0));
     save("scans.e57", &w, "<coordinateMetadata type=\"String\"><![CDATA[PROJCS[\"UTM\"]]]></coordinateMetadata>");
     char path[4096];
     snprintf(path, sizeof path, "%s/small.xml", folder);

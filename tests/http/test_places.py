@@ -123,6 +123,10 @@ def test_a_pick_answers_in_what_it_was_asked_in():
             {"x": 32.5, "y": 24.5, "width": 64, "height": 48, "crs": "EPSG:4326", "camera": {"eye": eye, "target": target}}),
             {"Content-Type": "application/json"})
         assert posted.json() == got
+        inside = d.ask(f"{DATASET}/pick", "POST", json.dumps(
+            {"x": 32.5, "y": 24.5, "width": 64, "height": 48,
+             "camera": {"eye": eye, "target": target, "crs": "EPSG:4326"}}), {"Content-Type": "application/json"})
+        assert inside.json() == got
         # one image, two answers: neither is kept for the other
         other = d.ask(f"{DATASET}/pick?{SMALL}&x=32.5&y=24.5&crs=EPSG:32618")
         default = d.ask(f"{DATASET}/pick?{SMALL}&x=32.5&y=24.5")
@@ -186,13 +190,15 @@ def test_what_is_wrong_is_said():
 def test_what_a_dataset_does_not_say_is_not_guessed():
     bad = ["PROJCS[\"x\",EXTENSION[\"PROJ4\",\"+proj=utm +zone=1\"]]", "+proj=utm +zone=18", "/etc/passwd", "EPSG:2263+x",
            "GEOGCS[\"@/etc/passwd\"]", "BOUNDCRS[x,PARAMETERFILE[\"a\",\"/etc/passwd\"]]", "GEOGCS[\"x\",GRIDS]",
-           "CONVERSION[METHOD[\"PROJ-based operation method: utm\"]]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
+           "CONVERSION[METHOD[\"PROJ-based operation method: utm\"]]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]",
+           "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
     with tempfile.TemporaryDirectory() as folder:
         paths = [make(folder, "m", crs, f"bad{i}") for i, crs in enumerate(bad)]
         paths.append(make(folder, "", "", "none"))
         with Daemon(REAL, datasets=paths) as d:
             for i in range(len(bad)):
-                why = "extensions" if re.search(r"EXTENSION|@|grids|PARAMETERFILE|PROJ-based", bad[i]) else "own" if "[" in bad[i] else "--crs"
+                files = re.search(r"(?i)EXTENSION|@|grids|PARAMETERFILE|PROJ-based", bad[i])
+                why = "extensions" if files else "own" if "[" in bad[i] else "--crs"
                 refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs", why)
                 assert d.ask(f"/v1/datasets/bad{i}").json()["crs"] == bad[i]
             refused(d.ask("/v1/datasets/none/place?crs=EPSG:4326&world=1,2,3"), 400, "crs", "--crs")

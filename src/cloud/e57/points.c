@@ -38,17 +38,19 @@ void spl_e57_points_finish(struct spl_e57_points *points)
     *points = (struct spl_e57_points){0};
 }
 
-/* Refuses a count that the section has no room for; a point of no bits at all counts as one. */
-static int check_count(const struct spl_e57_points *points, const struct spl_e57_scan *scan, struct spl_error *err)
+int spl_e57_check_count(const struct spl_source *source, const struct spl_e57_document *document,
+                        const struct spl_e57_scan *scan, uint64_t *bytes, struct spl_error *err)
 {
-    uint64_t bits = 0, room = points->end - points->start;
+    uint64_t bits = 0;
     for (size_t i = 0; i < scan->fields; i++)
-        bits += points->document->fields[scan->first_field + i].bits;
-    if (scan->points / 8 <= room / (bits ? bits : 1))
-        return SPL_OK;
-    return spl_source_fail_at(points->pages->source, scan->at, "recordCount", err,
-                              "%llu points of %llu bits do not fit the %llu bytes of their packets",
-                              (unsigned long long)scan->points, (unsigned long long)bits, (unsigned long long)room);
+        bits += document->fields[scan->first_field + i].bits;
+    if (scan->points / 8 > *bytes / (bits ? bits : 1))
+        return spl_source_fail_at(source, scan->at, "recordCount", err,
+                                  "%llu points of %llu bits do not fit the %llu bytes that there are for them",
+                                  (unsigned long long)scan->points, (unsigned long long)bits,
+                                  (unsigned long long)*bytes);
+    *bytes -= scan->points / 8 * (bits ? bits : 1);
+    return SPL_OK;
 }
 
 int spl_e57_points_begin(struct spl_e57_points *points, const struct spl_e57_scan *scan, struct spl_error *err)
@@ -81,7 +83,8 @@ int spl_e57_points_begin(struct spl_e57_points *points, const struct spl_e57_sca
             points->start > points->end)
             return spl_source_fail_at(source, scan->at, "data offset", err, "%llu lies outside the section",
                                       (unsigned long long)data);
-        if ((code = check_count(points, scan, err)) < 0)
+        uint64_t room = points->end - points->start;
+        if ((code = spl_e57_check_count(source, points->document, scan, &room, err)) < 0)
             return code;
     }
     for (int i = 0; i < SPL_E57_ROLES; i++) {

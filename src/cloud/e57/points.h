@@ -25,6 +25,11 @@ struct spl_e57_points {
     struct spl_e57_stream streams[SPL_E57_ROLES];
 };
 
+/* Refuses a count of points that *bytes have no room for, and takes what they need off it. A point of no bits at all
+ * counts as one. */
+int spl_e57_check_count(const struct spl_source *source, const struct spl_e57_document *document,
+                        const struct spl_e57_scan *scan, uint64_t *bytes, struct spl_error *err);
+
 int spl_e57_points_init(struct spl_e57_points *points, struct spl_e57_pages *pages,
                         const struct spl_e57_document *document, struct spl_error *err);
 void spl_e57_points_finish(struct spl_e57_points *points);

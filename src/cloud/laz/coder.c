@@ -7,6 +7,7 @@
 
 enum { bit_count_max = 1 << SPL_LAZ_BIT_BITS, bit_cycle_max = 64, count_max = 1 << SPL_LAZ_MODEL_BITS };
 
+enum { likely_share = 4 }; /* of all counts: from a quarter on trying it first has been worth it */
 enum { few_symbols = 64, few_shift = 9, many_shift = 8, no_shift = 31 };
 
 static unsigned lanes_for(unsigned symbols)
@@ -51,18 +52,28 @@ struct spl_laz_model *spl_laz_model_create(struct spl_laz_arena *arena, struct s
     return *slot = m;
 }
 
-/* The symbol of each entry's least place. */
+/* The symbol of each entry's least place: each symbol marks the first entry from its start on, and holds up to the
+ * next mark. */
 static void fill_firsts(struct spl_laz_model *m)
 {
-    unsigned entries = firsts_for(m->symbols), next = 0;
-    for (unsigned i = 0; i < m->symbols; i++) {
-        /* the first entry whose least place is not below the symbol's */
-        unsigned from = (unsigned)(m->start[i] + 32768 + (1 << m->shift) - 1) >> m->shift;
-        for (; next < from; next++)
-            m->first[next] = (uint16_t)(i - 1);
-    }
-    for (; next < entries; next++)
-        m->first[next] = (uint16_t)(m->symbols - 1);
+    unsigned entries = firsts_for(m->symbols);
+    uint16_t now = 0;
+    memset(m->first, 0, entries * sizeof *m->first);
+    for (unsigned i = 0; i < m->symbols; i++)
+        m->first[(unsigned)(m->start[i] + 32768 + (1 << m->shift) - 1) >> m->shift] = (uint16_t)i;
+    for (unsigned e = 0; e < entries; e++)
+        m->first[e] = now = m->first[e] > now ? m->first[e] : now;
+}
+
+/* The last symbol is none, since what rounding leaves over is its own too. */
+static void find_likely(struct spl_laz_model *m)
+{
+    unsigned most = 0;
+    for (unsigned i = 1; i + 1u < m->symbols; i++)
+        most = m->count[i] > m->count[most] ? i : most;
+    m->likely = (uint16_t)most;
+    m->likely_start = (uint32_t)(m->start[most] + 32768);
+    m->likely_width = likely_share * m->count[most] > m->total ? (uint32_t)(m->start[most + 1] - m->start[most]) : 0;
 }
 
 void spl_laz_model_update(struct spl_laz_model *m)
@@ -77,6 +88,7 @@ void spl_laz_model_update(struct spl_laz_model *m)
         m->start[i] = (int16_t)((int)((scale * sum) >> (31 - SPL_LAZ_MODEL_BITS)) - 32768);
         sum += m->count[i];
     }
+    find_likely(m);
     if (m->shift != no_shift)
         fill_firsts(m);
     uint32_t longest = (m->symbols + 6u) << 3, cycle = 5 * m->cycle >> 2;
@@ -104,17 +116,17 @@ void spl_laz_bit_model_update(struct spl_laz_bit_model *m)
 void spl_laz_coder_begin(struct spl_laz_coder *coder, const uint8_t *bytes, size_t length)
 {
     *coder = (struct spl_laz_coder){.p = bytes, .end = bytes + length, .length = UINT32_MAX};
-    coder->value = spl_laz_coder_tail(coder, 4);
+    size_t taken = length < 4 ? length : 4;
+    coder->value = spl_laz_coder_tail(coder->p, coder->end);
+    coder->p += taken;
+    coder->over = (uint32_t)(4 - taken);
     coder->value -= coder->value == UINT32_MAX; /* which no writer begins with */
 }
 
-uint32_t spl_laz_coder_tail(struct spl_laz_coder *coder, unsigned bytes)
+uint32_t spl_laz_coder_tail(const uint8_t *p, const uint8_t *end)
 {
-    size_t left = (size_t)(coder->end - coder->p), taken = bytes < left ? bytes : left;
     uint32_t next = 0;
-    for (size_t i = 0; i < 4; i++)
-        next = next << 8 | (i < left ? coder->p[i] : 0u);
-    coder->p += taken;
-    coder->over += (uint32_t)(bytes - taken);
+    for (unsigned i = 0; i < 4; i++)
+        next = next << 8 | (p < end ? *p++ : 0u);
     return next;
 }

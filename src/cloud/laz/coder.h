@@ -29,8 +29,9 @@ struct spl_laz_coder {
  * last lies SPL_LAZ_ABOVE for 16 lanes. A symbol is found among the 16 from first[place >> shift] on, or behind them.
  */
 struct spl_laz_model {
-    uint32_t total, cycle, left; /* of counts; between updates; until the next one */
-    uint16_t symbols;
+    uint32_t total, cycle, left;         /* of counts; between updates; until the next one */
+    uint16_t symbols, likely;            /* the latter: the symbol that is tried first */
+    uint32_t likely_start, likely_width; /* of 2^15; 0: there is none */
     uint8_t shift;
     int16_t *start; /* in the same allocation, as all of them */
     uint16_t *count;
@@ -38,6 +39,11 @@ struct spl_laz_model {
 };
 
 #define SPL_LAZ_ABOVE INT16_MAX
+
+/* Everything that a symbol goes through is inlined into functions that are `HOT`. Those work on a copy of the coder, so
+ * that it stays in registers. */
+#define SPL_LAZ_INLINE static inline __attribute__((always_inline))
+#define SPL_LAZ_HOT __attribute__((flatten))
 
 /* Where models come from: nothing is released but all at once. Room for all that a format can want is there from the
  * beginning, and costs nothing until it is touched. */
@@ -75,11 +81,11 @@ static inline bool spl_laz_coder_is_over(const struct spl_laz_coder *coder)
     return coder->over > 0;
 }
 
-/* The bytes that a value wants and the stream lacks. Returns four bytes from p on, zeros behind the end. */
-uint32_t spl_laz_coder_tail(struct spl_laz_coder *coder, unsigned bytes);
+/* Four bytes from p on, zeros behind the end. */
+uint32_t spl_laz_coder_tail(const uint8_t *p, const uint8_t *end);
 
 /* Makes length at least 2^24 again. */
-static inline void spl_laz_renew(struct spl_laz_coder *coder)
+SPL_LAZ_INLINE void spl_laz_renew(struct spl_laz_coder *coder)
 {
     unsigned shift = (unsigned)__builtin_clz(coder->length) & 24u;
     uint32_t next;
@@ -88,14 +94,17 @@ static inline void spl_laz_renew(struct spl_laz_coder *coder)
         next = be32toh(next);
         coder->p += shift >> 3;
     } else {
-        next = spl_laz_coder_tail(coder, shift >> 3);
+        unsigned wanted = shift >> 3, left = (unsigned)(coder->end - coder->p), taken = wanted < left ? wanted : left;
+        next = spl_laz_coder_tail(coder->p, coder->end);
+        coder->p += taken;
+        coder->over += wanted - taken;
     }
     coder->value = coder->value << shift | (uint32_t)((uint64_t)next << shift >> 32);
     coder->length <<= shift;
 }
 
 /* How many of 16 ascending lanes are not above `at`. */
-static inline unsigned spl_laz_lanes_below(const int16_t *lanes, int at)
+SPL_LAZ_INLINE unsigned spl_laz_lanes_below(const int16_t *lanes, int at)
 {
 #ifdef __SSE2__
     __m128i than = _mm_set1_epi16((short)at);
@@ -110,23 +119,31 @@ static inline unsigned spl_laz_lanes_below(const int16_t *lanes, int at)
 #endif
 }
 
-/* A symbol; `small`, which is constant where it is known: the model has at most 16. */
-static inline __attribute__((always_inline)) unsigned spl_laz_find(struct spl_laz_coder *coder,
-                                                                   struct spl_laz_model *model, bool small)
+/* A symbol. The likely one is tried without the division, whose outcome all that follows waits for: a processor that
+ * foresees it goes on at once. */
+SPL_LAZ_INLINE unsigned spl_laz_symbol(struct spl_laz_coder *coder, struct spl_laz_model *model)
 {
-    uint32_t unit = coder->length >> SPL_LAZ_MODEL_BITS, place = coder->value / unit; /* a little above 2^15 at most */
-    unsigned first = small ? 0 : model->first[place >> model->shift];
-    unsigned below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
-    while (__builtin_expect(below == SPL_LAZ_LANES && !small, 0)) {
-        first += SPL_LAZ_LANES;
-        below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
+    uint32_t unit = coder->length >> SPL_LAZ_MODEL_BITS;
+    uint32_t above = coder->value - model->likely_start * unit, width = model->likely_width * unit;
+    unsigned symbol = model->likely;
+    if (above < width) {
+        coder->value = above;
+        coder->length = width;
+    } else {
+        uint32_t place = coder->value / unit; /* a little above 2^15 at most */
+        unsigned first = model->first[place >> model->shift];
+        unsigned below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
+        while (__builtin_expect(below == SPL_LAZ_LANES, 0)) {
+            first += SPL_LAZ_LANES;
+            below = spl_laz_lanes_below(model->start + first, (int)place - 32768);
+        }
+        symbol = first + below - 1;
+        uint32_t low = (uint32_t)(model->start[symbol] + 32768) * unit;
+        /* behind the last symbol lies more than the length: no branch, since nobody can foresee it */
+        uint64_t high = (uint64_t)(uint32_t)(model->start[symbol + 1] + 32768) * unit;
+        coder->value -= low;
+        coder->length = (uint32_t)(high < coder->length ? high : coder->length) - low;
     }
-    unsigned symbol = first + below - 1;
-    uint32_t low = (uint32_t)(model->start[symbol] + 32768) * unit;
-    uint32_t high = (uint32_t)(model->start[symbol + 1] + 32768) * unit;
-    high = symbol + 1u < model->symbols ? high : coder->length;
-    coder->value -= low;
-    coder->length = high - low;
     spl_laz_renew(coder);
     model->count[symbol]++;
     if (__builtin_expect(--model->left == 0, 0))
@@ -134,12 +151,7 @@ static inline __attribute__((always_inline)) unsigned spl_laz_find(struct spl_la
     return symbol;
 }
 
-static inline unsigned spl_laz_symbol(struct spl_laz_coder *coder, struct spl_laz_model *model)
-{
-    return spl_laz_find(coder, model, false);
-}
-
-static inline unsigned spl_laz_bit(struct spl_laz_coder *coder, struct spl_laz_bit_model *model)
+SPL_LAZ_INLINE unsigned spl_laz_bit(struct spl_laz_coder *coder, struct spl_laz_bit_model *model)
 {
     uint32_t low = model->probability * (coder->length >> SPL_LAZ_BIT_BITS);
     unsigned bit = coder->value >= low;
@@ -153,7 +165,7 @@ static inline unsigned spl_laz_bit(struct spl_laz_coder *coder, struct spl_laz_b
 }
 
 /* 1 to 19 bits without a model. */
-static inline uint32_t spl_laz_raw(struct spl_laz_coder *coder, unsigned bits)
+SPL_LAZ_INLINE uint32_t spl_laz_raw(struct spl_laz_coder *coder, unsigned bits)
 {
     coder->length >>= bits;
     uint32_t value = coder->value / coder->length;
@@ -163,7 +175,7 @@ static inline uint32_t spl_laz_raw(struct spl_laz_coder *coder, unsigned bits)
 }
 
 /* 1 to 32 bits: of more than 19 the low 16 come first. */
-static inline uint32_t spl_laz_raw_long(struct spl_laz_coder *coder, unsigned bits)
+SPL_LAZ_INLINE uint32_t spl_laz_raw_long(struct spl_laz_coder *coder, unsigned bits)
 {
     if (bits <= 19)
         return spl_laz_raw(coder, bits);
@@ -171,7 +183,7 @@ static inline uint32_t spl_laz_raw_long(struct spl_laz_coder *coder, unsigned bi
     return low | spl_laz_raw(coder, bits - 16) << 16;
 }
 
-static inline uint64_t spl_laz_raw64(struct spl_laz_coder *coder)
+SPL_LAZ_INLINE uint64_t spl_laz_raw64(struct spl_laz_coder *coder)
 {
     uint64_t low = spl_laz_raw_long(coder, 32);
     return low | (uint64_t)spl_laz_raw_long(coder, 32) << 32;

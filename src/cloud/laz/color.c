@@ -31,27 +31,37 @@ static int read_byte(struct spl_laz_model **models, unsigned k, unsigned changed
     return (expected + (int)spl_laz_symbol(coder, spl_laz_model_get(arena, &models[k], 256))) & 255;
 }
 
-void spl_laz_color_read(struct spl_laz_color *c, struct spl_laz_coder *coder, struct spl_laz_arena *arena,
-                        uint16_t rgb[3])
+/* The low (shift 0) or high (8) bytes of green and blue, by how far red went. */
+SPL_LAZ_INLINE void read_others(struct spl_laz_color *c, struct spl_laz_coder *coder, struct spl_laz_arena *arena,
+                                unsigned changed, unsigned shift, int went, const uint16_t before[3], unsigned now[3])
 {
+    int green = before[1] >> shift & 255, blue = before[2] >> shift & 255, was = green;
+    green = read_byte(c->byte, 2 + shift / 8, changed, coder, arena, green, clamp(green + went));
+    went = (went + green - was) / 2;
+    blue = read_byte(c->byte, 4 + shift / 8, changed, coder, arena, blue, clamp(blue + went));
+    now[1] |= (unsigned)green << shift;
+    now[2] |= (unsigned)blue << shift;
+}
+
+SPL_LAZ_HOT void spl_laz_color_read(struct spl_laz_color *c, struct spl_laz_coder *shared, struct spl_laz_arena *arena,
+                                    uint16_t rgb[3])
+{
+    struct spl_laz_coder local = *shared, *coder = &local;
     unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &c->changed, 128));
-    int before[6], now[6];
-    for (int k = 0; k < 6; k++)
-        before[k] = now[k] = rgb[k / 2] >> 8 * (k & 1) & 255;
-    for (unsigned k = 0; k < 2; k++)
-        now[k] = read_byte(c->byte, k, changed, coder, arena, before[k], before[k]);
-    for (unsigned k = 0; k < 2; k++) { /* low bytes, then high ones */
-        if (!(changed & grey)) {
-            now[2 + k] = now[4 + k] = now[k];
-            continue;
+    if (changed != grey) { /* else nothing did */
+        int low = rgb[0] & 255, high = rgb[0] >> 8;
+        int now_low = read_byte(c->byte, 0, changed, coder, arena, low, low);
+        int now_high = read_byte(c->byte, 1, changed, coder, arena, high, high);
+        unsigned red = (unsigned)(now_low | now_high << 8), now[3] = {red, red, red};
+        if (changed & grey) {
+            now[1] = now[2] = 0;
+            read_others(c, coder, arena, changed, 0, now_low - low, rgb, now);
+            read_others(c, coder, arena, changed, 8, now_high - high, rgb, now);
         }
-        int went = now[k] - before[k];
-        now[2 + k] = read_byte(c->byte, 2 + k, changed, coder, arena, before[2 + k], clamp(before[2 + k] + went));
-        went = (went + now[2 + k] - before[2 + k]) / 2;
-        now[4 + k] = read_byte(c->byte, 4 + k, changed, coder, arena, before[4 + k], clamp(before[4 + k] + went));
+        for (int k = 0; k < 3; k++)
+            rgb[k] = (uint16_t)now[k];
     }
-    for (int k = 0; k < 3; k++)
-        rgb[k] = (uint16_t)(now[2 * k] | now[2 * k + 1] << 8);
+    *shared = local;
 }
 
 void spl_laz_infrared_read(struct spl_laz_infrared *c, struct spl_laz_coder *coder, struct spl_laz_arena *arena,

@@ -65,8 +65,10 @@ static void read_multiple(struct spl_laz_gpstime *g, struct spl_laz_coder *coder
     g->time[g->now] += (uint64_t)(int64_t)difference;
 }
 
-uint64_t spl_laz_gpstime_read(struct spl_laz_gpstime *g, struct spl_laz_coder *coder, struct spl_laz_arena *arena)
+SPL_LAZ_HOT uint64_t spl_laz_gpstime_read(struct spl_laz_gpstime *g, struct spl_laz_coder *shared,
+                                          struct spl_laz_arena *arena)
 {
+    struct spl_laz_coder local = *shared, *coder = &local;
     unsigned shift = !g->same_is_coded, code, switched = 0;
     for (unsigned switches = 0;; switches++) {
         bool stands = g->step[g->now] == 0;
@@ -92,6 +94,7 @@ uint64_t spl_laz_gpstime_read(struct spl_laz_gpstime *g, struct spl_laz_coder *c
             g->odd[g->now] = 0;
         } else if (!stands && code < code_same)
             read_multiple(g, coder, arena, code);
+        *shared = local;
         return g->time[g->now];
     }
 }

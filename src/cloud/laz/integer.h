@@ -24,8 +24,8 @@ static inline void spl_laz_integer_init(struct spl_laz_integer *integer, unsigne
 }
 
 /* The correction that `sizes` begins: any 32 bits, to be taken modulo 2^bits. */
-static inline uint32_t spl_laz_correction(struct spl_laz_integer *integer, struct spl_laz_coder *coder,
-                                          struct spl_laz_arena *arena, struct spl_laz_model *sizes)
+SPL_LAZ_INLINE uint32_t spl_laz_correction(struct spl_laz_integer *integer, struct spl_laz_coder *coder,
+                                           struct spl_laz_arena *arena, struct spl_laz_model *sizes)
 {
     unsigned k = integer->k = spl_laz_symbol(coder, sizes);
     if (k == 0)
@@ -36,13 +36,13 @@ static inline uint32_t spl_laz_correction(struct spl_laz_integer *integer, struc
     uint32_t c = spl_laz_symbol(coder, spl_laz_model_get(arena, &integer->correctors[k], 1u << high));
     if (low)
         c = c << low | spl_laz_raw_long(coder, low);
-    /* the upper half is 2^(k-1) + 1 … 2^k, the lower one −(2^k − 1) … −2^(k-1) */
-    return c >= 1u << (k - 1) ? c + 1 : c - ((1u << k) - 1);
+    /* the upper half is 2^(k-1) + 1 … 2^k, the lower one −(2^k − 1) … −2^(k-1); no branch, since a sign is a coin */
+    return c + 1 - (-(uint32_t) !(c >> (k - 1)) & 1u << k);
 }
 
 /* The number whose prediction is `expected`. */
-static inline uint32_t spl_laz_integer_read(struct spl_laz_integer *integer, struct spl_laz_coder *coder,
-                                            struct spl_laz_arena *arena, uint32_t expected, unsigned context)
+SPL_LAZ_INLINE uint32_t spl_laz_integer_read(struct spl_laz_integer *integer, struct spl_laz_coder *coder,
+                                             struct spl_laz_arena *arena, uint32_t expected, unsigned context)
 {
     struct spl_laz_model *sizes = spl_laz_model_get(arena, &integer->sizes[context], integer->bits + 1);
     uint32_t value = expected + spl_laz_correction(integer, coder, arena, sizes);

@@ -75,9 +75,9 @@ static void read_number(struct spl_laz_channel *c, unsigned changed, struct spl_
     c->number = (c->number + step) & 15;
 }
 
-uint32_t spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record)
+SPL_LAZ_HOT uint32_t spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *arena, uint8_t *record)
 {
-    struct spl_laz_coder *coder = &l->coders[SPL_LAZ_LAYER_XY];
+    struct spl_laz_coder local = l->coders[SPL_LAZ_LAYER_XY], *coder = &local;
     struct spl_laz_channel *c = &l->channels[l->now];
     unsigned set = place_of(c->number, c->count) | (unsigned)c->time_changed << 2;
     unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &c->changed[set], 128));
@@ -99,6 +99,7 @@ uint32_t spl_laz_read_returns(struct spl_laz_layers *l, struct spl_laz_arena *ar
     k = (k + c->dy.k) / 2;
     c->x += (uint32_t)dx;
     c->y += (uint32_t)dy;
+    l->coders[SPL_LAZ_LAYER_XY] = local;
     memcpy(record, l->begin, l->format.record_bytes);
     spl_laz_put32(record + SPL_LAZ_AT_X, c->x);
     spl_laz_put32(record + SPL_LAZ_AT_Y, c->y);

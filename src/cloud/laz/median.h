@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 struct spl_laz_median {
     int32_t value[5]; /* ascending; the median is value[2] */
@@ -15,9 +16,8 @@ struct spl_laz_median {
 static inline void spl_laz_median_add(struct spl_laz_median *m, int32_t v)
 {
     int32_t kept[4], median = m->value[2];
-    for (int i = 0; i < 4; i++)
-        kept[i] = m->drops_least ? m->value[i + 1] : m->value[i];
-    m->drops_least = m->drops_least ? v > median : v >= median;
+    memcpy(kept, m->value + m->drops_least, sizeof kept);
+    m->drops_least = (v > median) | ((v == median) & !m->drops_least);
     m->value[0] = v < kept[0] ? v : kept[0];
     for (int i = 1; i < 4; i++) {
         int32_t low = v > kept[i - 1] ? v : kept[i - 1];

@@ -131,8 +131,9 @@ static void v2_begin(void *state, unsigned bytes, const uint8_t *first)
     spl_laz_integer_init(&s->source, 16);
 }
 
-static void v2_read(void *state, struct spl_laz_coder *coder, struct spl_laz_arena *arena, uint8_t *item)
+SPL_LAZ_HOT static void v2_read(void *state, struct spl_laz_coder *shared, struct spl_laz_arena *arena, uint8_t *item)
 {
+    struct spl_laz_coder local = *shared, *coder = &local;
     struct point10_v2 *s = state;
     uint8_t *last = s->last;
     unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &s->changed, 64));
@@ -167,6 +168,7 @@ static void v2_read(void *state, struct spl_laz_coder *coder, struct spl_laz_are
     spl_laz_put32(last + at_y, spl_laz_get32(last + at_y) + (uint32_t)dy);
     spl_laz_put32(last + at_z, s->z_of[level]);
     memcpy(item, last, point_bytes);
+    *shared = local;
 }
 
 const struct spl_laz_codec spl_laz_point10_v1 = {v1_state_bytes, model_bytes, v1_begin, v1_read};

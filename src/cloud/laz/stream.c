@@ -7,9 +7,9 @@
 
 #include <stdlib.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/work.h"
 #include "cloud/laz/items.h"
 
 enum {
@@ -28,10 +28,12 @@ struct spl_laz_stream {
     struct spl_source *source; // borrowed
     struct spl_laz_format format;
     struct spl_laz_table table;
+    struct spl_laz_fault warning; /* of the table; field NULL: none */
     bool has_table, few;
     uint64_t begin, points, next; /* offset of the first chunk; points in all; the one to give */
     uint32_t wanted;
     unsigned threads;
+    const atomic_bool *cancelled; // may be NULL
     struct spl_laz_decoder *decoders[threads_most]; // made when they are needed
     uint8_t *records, *input;                       // owned
     size_t records_bytes, input_bytes;              /* room in them */
@@ -59,6 +61,8 @@ static int fail(const struct spl_laz_stream *s, int code, uint64_t offset, size_
     if (code == SPL_E_INPUT)
         return spl_source_fail_at(s->source, offset + fault->at, fault->field, err, "chunk %zu: %s", chunk + 1,
                                   fault->reason);
+    if (code == SPL_E_CANCELLED)
+        return spl_fail(err, code, "%s: reading was cancelled", s->source->path);
     return spl_fail(err, code, "%s: chunk %zu cannot be decoded", s->source->path, chunk + 1);
 }
 
@@ -123,14 +127,20 @@ static int open_table(struct spl_laz_stream *s, uint64_t points_at, struct spl_e
     if (s->format.chunk_points == 0)
         return spl_source_fail_at(source, at + fault.at, fault.field, err, "%s; chunks of varying size need one",
                                   fault.reason);
+    fault.at += at;
     if (!interrupted)
-        spl_log_warn("%s: offset %llu: %s: %s; chunks are read one after the other", source->path,
-                     (unsigned long long)(at + fault.at), fault.field, fault.reason);
+        s->warning = fault;
     return SPL_OK;
 }
 
+const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stream *s)
+{
+    return s->warning.field ? &s->warning : NULL;
+}
+
 int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, const struct spl_laz_format *format,
-                        uint64_t points_at, uint64_t points, unsigned threads, struct spl_error *err)
+                        uint64_t points_at, uint64_t points, unsigned threads, const atomic_bool *cancelled,
+                        struct spl_error *err)
 {
     struct spl_laz_stream *s = spl_alloc(1, sizeof *s, err);
     if (!s)
@@ -138,6 +148,7 @@ int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, 
     s->source = source;
     s->format = *format;
     s->points = points;
+    s->cancelled = cancelled;
     s->begin = points_at;
     s->threads = spl_thread_count(threads);
     s->threads = s->threads < threads_most ? s->threads : threads_most;
@@ -186,7 +197,7 @@ void spl_laz_stream_choose(struct spl_laz_stream *s, const uint8_t *wanted)
 void spl_laz_stream_seek(struct spl_laz_stream *s, uint64_t point, bool few)
 {
     s->next = point;
-    s->few = few && !fits_round(s, s->points);
+    s->few = few && (point == 0 || !fits_round(s, s->points));
 }
 
 static size_t find_chunk(const struct spl_laz_stream *s, uint64_t point)
@@ -204,12 +215,17 @@ static size_t find_chunk(const struct spl_laz_stream *s, uint64_t point)
 
 /* ---- rounds ---- */
 
-static int decode_chunk(struct spl_laz_decoder *decoder, const struct spl_laz_chunk *chunk, const uint8_t *bytes,
-                        uint32_t wanted, uint8_t *records, struct spl_laz_fault *fault)
+static int decode_chunk(const struct spl_laz_stream *s, struct spl_laz_decoder *decoder,
+                        const struct spl_laz_chunk *chunk, const uint8_t *bytes, uint8_t *records,
+                        struct spl_laz_fault *fault)
 {
-    int code = spl_laz_decoder_begin(decoder, bytes, chunk->bytes, wanted, fault);
-    if (code == SPL_OK)
-        code = spl_laz_decoder_read(decoder, records, chunk->points, fault);
+    int code = spl_laz_decoder_begin(decoder, bytes, chunk->bytes, s->wanted, fault);
+    for (size_t at = 0, count; code == SPL_OK && at < chunk->points; at += count) {
+        count = chunk->points - at < slice_points ? chunk->points - at : slice_points;
+        code = spl_is_cancelled(s->cancelled) ? SPL_E_CANCELLED
+                                              : spl_laz_decoder_read(decoder, records + at * s->format.record_bytes,
+                                                                     count, fault);
+    }
     if (code == SPL_OK)
         code = spl_laz_decoder_end(decoder, false, fault);
     return code;
@@ -222,7 +238,7 @@ static void decode_chunks(void *context, size_t begin, size_t end, unsigned work
     const struct spl_laz_chunk *chunks = s->table.chunks + round->first_chunk;
     for (size_t i = begin; i < end; i++)
         if (chunks[i].points > 0)
-            round->code[i] = decode_chunk(s->decoders[worker], &chunks[i], s->input + round->input_at[i], s->wanted,
+            round->code[i] = decode_chunk(s, s->decoders[worker], &chunks[i], s->input + round->input_at[i],
                                           s->records + (chunks[i].first - chunks[0].first) * s->format.record_bytes,
                                           &round->fault[i]);
 }
@@ -354,7 +370,8 @@ static int decode_slice(struct spl_laz_stream *s, struct spl_error *err)
         return code;
     uint64_t left = s->slice.end - s->slice.at;
     size_t count = left < slice_points ? (size_t)left : slice_points;
-    code = spl_laz_decoder_read(s->decoders[0], s->records, count, &fault);
+    code = spl_is_cancelled(s->cancelled) ? SPL_E_CANCELLED
+                                          : spl_laz_decoder_read(s->decoders[0], s->records, count, &fault);
     if (code == SPL_OK && count == left)
         code = spl_laz_decoder_end(s->decoders[0], !s->has_table, &fault);
     if (code < 0) {

@@ -4,6 +4,8 @@
 #ifndef SPL_CLOUD_LAZ_STREAM_H
 #define SPL_CLOUD_LAZ_STREAM_H
 
+#include <stdatomic.h>
+
 #include "cloud/laz/decoder.h"
 #include "cloud/laz/table.h"
 #include "cloud/source.h"
@@ -11,10 +13,14 @@
 struct spl_laz_stream;
 
 /* `points` records lie from byte `points_at` on. A table of chunks that is missing, or wrong where it can be done
- * without, is no error: the latter is logged. `threads`: 0 = all cores. On success the caller owns *out; `source` is
- * borrowed. */
+ * without, is no error: spl_laz_stream_get_warning() tells the latter. `threads`: 0 = all cores. On success the caller owns *out; `source` and
+ * `cancelled`, which may be NULL, are borrowed. */
 int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, const struct spl_laz_format *format,
-                        uint64_t points_at, uint64_t points, unsigned threads, struct spl_error *err);
+                        uint64_t points_at, uint64_t points, unsigned threads, const atomic_bool *cancelled,
+                        struct spl_error *err);
+
+/* What is wrong with the table, at an offset of the file, so that chunks are read one after the other; NULL: nothing. */
+const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stream *stream);
 
 /* NULL-safe. */
 void spl_laz_stream_destroy(struct spl_laz_stream *stream);
@@ -26,7 +32,8 @@ const struct spl_laz_table *spl_laz_stream_get_table(const struct spl_laz_stream
 void spl_laz_stream_choose(struct spl_laz_stream *stream, const uint8_t *wanted);
 
 /* The next 1 to `most` records, record_bytes each, valid until the next call; *count 0 at the end. Of layers only the
- * `wanted` ones (enum spl_laz_want); those may change after a seek alone. */
+ * `wanted` ones (enum spl_laz_want); those may change after a seek alone. SPL_E_CANCELLED some ten
+ * thousand points after it was asked for. */
 int spl_laz_stream_read(struct spl_laz_stream *stream, uint32_t wanted, const uint8_t **records, size_t most,
                         size_t *count, struct spl_error *err);
 

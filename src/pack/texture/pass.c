@@ -77,13 +77,15 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
         if (!(rc = spl_photo_open(&photo, view, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, &why))) {
             uint64_t seen = spl_candidates_look(&pass->candidates, &pass->splats, &photo, (uint16_t)i, pass->stage);
             spl_photo_close(&photo);
-            if (!seen)
+            if (!seen && spl_photo_is_face(view))
+                rc = SPL_PHOTO_EMPTY;
+            else if (!seen)
                 rc = spl_fail(&why, SPL_E_INPUT, "%s: its pose sees no splat; is the model in the scan's coordinates?",
                               view->photograph);
         }
         pass->dropped[i] = rc != 0;
         usable += !rc;
-        rc = rc ? spl_photos_refuse(pass->options, pass->report, rc, &why, err) : SPL_OK;
+        rc = rc < 0 ? spl_photos_refuse(pass->options, pass->report, rc, &why, err) : SPL_OK;
         if (!rc)
             rc = spl_stage_check(pass->stage, err);
     }

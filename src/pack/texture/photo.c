@@ -10,7 +10,7 @@
 
 #include "base/memory.h"
 #include "geom/size.h"
-#include "image/load.h"
+#include "pack/texture/photo_image.h"
 
 enum { black = 6, border_steps = 32 };
 static const double widest = 5; /* tangent of the angle off the axis to which depth is drawn */
@@ -61,7 +61,7 @@ int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, s
                             "%s: %u x %u pixels; its camera says %u x %u: scale the photograph or its lens", path,
                             photo->pixels.width[0], photo->pixels.height[0], camera->width, camera->height);
     else if (is_black(photo))
-        rc = spl_fail(err, SPL_E_INPUT, "%s: nothing but black", path);
+        rc = spl_photo_is_face(view) ? SPL_PHOTO_EMPTY : spl_fail(err, SPL_E_INPUT, "%s: nothing but black", path);
     if (!rc)
         photo->sharpness = find_sharpness(photo);
     if (rc)
@@ -136,6 +136,8 @@ static int render_depth(struct spl_photo *photo, struct spl_renderer *renderer, 
         seen += !isnan(depth[i]);
         close += depth[i] < within;
     }
+    if (!seen && spl_photo_is_face(photo->view))
+        return SPL_PHOTO_EMPTY;
     if (!seen)
         return spl_fail(err, SPL_E_INPUT, "%s: its pose sees no splat; is the model in the scan's coordinates?", path);
     if (close > count / 2)
@@ -151,16 +153,8 @@ int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, s
     struct spl_image pixels = {0};
     struct spl_image_info info;
     *photo = (struct spl_photo){0};
-    int rc = spl_image_get_info(view->photograph, &info, err);
-    if (rc)
-        return rc;
-    if (info.bits != 8 || info.cmyk)
-        return spl_fail(err, SPL_E_UNSUPPORTED, "%s: %s; photographs are 8 bit sRGB: convert it", view->photograph,
-                        info.cmyk         ? "a CMYK image"
-                        : info.bits == 16 ? "16 bit channels"
-                                          : "channels below 8 bit");
-    if ((rc = spl_image_load(view->photograph, SPL_LAYER_COLOR, &pixels, err)) ||
-        (rc = spl_photo_init(photo, view, &pixels, err)))
+    int rc = spl_photo_image_get_info(view, &info, err);
+    if (rc || (rc = spl_photo_image_load(view, &pixels, err)) || (rc = spl_photo_init(photo, view, &pixels, err)))
         return rc;
     photo->depth_camera = find_depth_camera(view, depth_side);
     if ((rc = render_depth(photo, renderer, dataset, err)))

@@ -5,6 +5,7 @@
 
 #include "image/load.h"
 #include "pack/texture/candidates.h"
+#include "pack/texture/photo_image.h"
 
 int spl_photos_refuse(const struct spl_photo_options *options, struct spl_photo_report *report, int rc,
                       const struct spl_error *why, struct spl_error *err)
@@ -41,19 +42,12 @@ static int check_file(const struct spl_named_view *view, struct spl_error *err)
 {
     struct spl_image_info info;
     const struct spl_camera *camera = &view->camera;
-    int rc = spl_image_get_info(view->photograph, &info, err);
-    if (rc)
-        return rc;
-    if (info.cmyk || info.bits != 8)
-        return spl_fail(err, SPL_E_UNSUPPORTED, "%s: %s; photographs are 8 bit sRGB: convert it", view->photograph,
-                        info.cmyk         ? "a CMYK image"
-                        : info.bits == 16 ? "16 bit channels"
-                                          : "channels below 8 bit");
-    if (info.width != camera->width || info.height != camera->height)
-        return spl_fail_field(err, SPL_E_INPUT, "width",
-                              "%s: %u x %u pixels; its camera says %u x %u: scale the photograph or its lens",
-                              view->photograph, info.width, info.height, camera->width, camera->height);
-    return SPL_OK;
+    int rc = spl_photo_image_get_info(view, &info, err);
+    if (!rc && (info.width != camera->width || info.height != camera->height))
+        rc = spl_fail_field(err, SPL_E_INPUT, "width",
+                            "%s: %u x %u pixels; its camera says %u x %u: scale the photograph or its lens",
+                            view->photograph, info.width, info.height, camera->width, camera->height);
+    return rc;
 }
 
 int spl_photos_load(const struct spl_photo_options *options, struct spl_view_list *list,

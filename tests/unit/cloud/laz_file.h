@@ -36,7 +36,7 @@ static inline int laz_file_open(struct laz_file *f, const char *path, unsigned t
             code = spl_laz_format_read(&f->format, head + at + 54, bytes, points, spl_laz_get16(head + 105), &f->fault);
             if (code < 0)
                 return spl_fail(err, code, "%s: %s", f->fault.field, f->fault.reason);
-            return spl_laz_stream_open(&f->stream, &f->source, &f->format, points_at, f->points, threads, err);
+            return spl_laz_stream_open(&f->stream, &f->source, &f->format, points_at, f->points, threads, NULL, err);
         }
         at += 54 + bytes;
     }

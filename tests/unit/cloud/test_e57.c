@@ -676,6 +676,33 @@ static void a_count_without_bits_is_bounded(void **state)
     refused_scan(&(struct e57_scan){"many", NULL, empty, 3, 1 << 20, 0}, NULL, SPL_E_INPUT, "recordCount", "0 bits");
 }
 
+/* Each scan's count fits its packets, but they are the same ones. */
+static void scans_that_share_their_packets_are_bounded(void **state)
+{
+    struct e57_writer w;
+    struct loaded l;
+    size_t length;
+    (void)state;
+    prepare_doubles();
+    const struct e57_field fields[] = {doubles("cartesianX", 0), doubles("cartesianY", 1), doubles("cartesianZ", 2)};
+    e57_begin(&w);
+    e57_add_scan(&w, &(struct e57_scan){"once", NULL, fields, 3, N, 0});
+    char *one = w.scans, *many = NULL;
+    for (int i = 0; i < 6; i++) {
+        char *more;
+        assert_true(asprintf(&more, "%s%s", many ? many : "", one) > 0);
+        free(many);
+        many = more;
+    }
+    free(one);
+    w.scans = many;
+    uint8_t *file = e57_end(&w, NULL, &length);
+    load_file(file, length, 77, &l);
+    assert_int_equal(l.code, SPL_E_INPUT);
+    assert_string_equal(l.err.field, "recordCount");
+    loaded_finish(&l);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -698,6 +725,7 @@ int main(void)
         cmocka_unit_test(what_the_header_must_not_say),
         cmocka_unit_test(what_sections_and_packets_must_not_say),
         cmocka_unit_test(what_the_xml_must_not_say),
+        cmocka_unit_test(scans_that_share_their_packets_are_bounded),
         cmocka_unit_test(a_count_without_bits_is_bounded),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);

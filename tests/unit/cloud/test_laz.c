@@ -2,6 +2,7 @@
  * that nobody wants change nothing else; and bytes that are wrong are named, cost no memory and end. */
 #include "laz_file.h"
 
+#include "base/work.h"
 #include "support/laz_writer.h"
 
 enum { records_max = 3000 };
@@ -215,6 +216,113 @@ static void wrong_tables_are_named_or_done_without(void **state)
         }
 }
 
+/* A file of point format 3 or 7 whose chunks have 2000 points and whose colours are all `low`, but for a `high` red at
+ * `bright` (if it is below `count`). */
+enum { colored = 12000, no_point = colored };
+
+static void write_colored(unsigned points, uint16_t low, uint16_t high, size_t bright)
+{
+    static const uint32_t chunks[] = {2000, 2000, 2000, 2000, 2000, 2000, 0};
+    struct spl_laz_format format = laz_format(points, 0, points < 6 ? 2 : 3, 2000);
+    uint8_t *records = laz_make_records(&format, colored, 11);
+    for (size_t i = 0; i < colored; i++)
+        for (unsigned k = 0; k < 3; k++)
+            spl_laz_put16(records + i * format.record_bytes + (points < 6 ? 28 : 30) + 2 * k,
+                          i == bright && k == 0 ? high : low);
+    struct laz_out file = laz_write_file(&format, points, records, chunks, LAZ_TABLE_USUAL);
+    write_scratch(file.bytes, file.count);
+    free(file.bytes);
+    free(records);
+}
+
+/* All colours of the file; how often reading began again. */
+static unsigned read_colors(bool sample, uint8_t (*colors)[3], struct spl_cloud_info *info)
+{
+    const struct spl_cloud_options options = {.sample_colors = sample};
+    struct spl_cloud *cloud;
+    struct spl_point_batch batch;
+    struct spl_error err = {0};
+    size_t count = 0;
+    unsigned again = 0;
+    int code;
+    assert_int_equal(spl_point_batch_init(&batch, 999, NULL), 0);
+    assert_int_equal(spl_cloud_open(scratch_path(), &options, &cloud, &err), 0);
+    while ((code = spl_cloud_read(cloud, &batch, &err)) > 0) {
+        again += code == SPL_CLOUD_AGAIN;
+        count = code == SPL_CLOUD_AGAIN ? 0 : count;
+        assert_true(code == SPL_CLOUD_AGAIN ? batch.count == 0 : count + batch.count <= colored);
+        memcpy(colors + count, batch.color, batch.count * sizeof *colors);
+        count += batch.count;
+    }
+    if (code < 0)
+        fail_msg("%s", err.message);
+    assert_int_equal(count, colored);
+    *info = *spl_cloud_get_info(cloud);
+    spl_cloud_destroy(cloud);
+    spl_point_batch_finish(&batch);
+    return again;
+}
+
+/* What a caller that can begin again gets is what one gets that has all colours looked at first. */
+static void sampled_colors_are_the_same(void **state)
+{
+    static const struct {
+        uint16_t low, high;
+        size_t bright;
+        bool again;
+    } rows[] = {{7, 30000, 9000, true}, {7, 256, colored - 1, true}, {7, 30000, 10, false}, {7, 255, 9000, false},
+                {0, 30000, 9000, false}, {0, 9, 9000, false},        {0, 0, no_point, false}};
+    static uint8_t whole[colored][3], sampled[colored][3];
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        for (unsigned points = 3; points <= 7; points += 4) {
+            struct spl_cloud_info info, of_sample;
+            write_colored(points, rows[i].low, rows[i].high, rows[i].bright);
+            assert_int_equal(read_colors(false, whole, &info), 0);
+            unsigned again = read_colors(true, sampled, &of_sample);
+            if (again != rows[i].again)
+                fail_msg("%zu: reading began again %u times", i, again);
+            assert_memory_equal(whole, sampled, sizeof whole);
+            assert_memory_equal(info.points_from, of_sample.points_from, sizeof info.points_from);
+            assert_true(info.colors.white == of_sample.colors.white && info.colors.from == of_sample.colors.from);
+            assert_int_equal(info.colors.blank, of_sample.colors.blank);
+            assert_int_equal(info.points_skipped, of_sample.points_skipped);
+        }
+}
+
+/* In the middle of a file, of chunks side by side and one after the other. */
+static void reading_is_cancelled(void **state)
+{
+    static const uint32_t chunks[] = {2000, 2000, 2000, 2000, 2000, 2000, 0};
+    (void)state;
+    for (int table = LAZ_TABLE_USUAL; table <= LAZ_TABLE_MISSING; table += LAZ_TABLE_MISSING - LAZ_TABLE_USUAL) {
+        struct spl_laz_format format = laz_format(3, 0, 2, 2000);
+        uint8_t *records = laz_make_records(&format, colored, 12);
+        struct laz_out file = laz_write_file(&format, 3, records, chunks, (enum laz_table)table);
+        atomic_bool cancelled = false;
+        const struct spl_cloud_options options = {.threads = 1, .cancelled = &cancelled};
+        struct spl_cloud *cloud;
+        struct spl_point_batch batch;
+        struct spl_error err = {0};
+        size_t count = 0;
+        int code;
+        write_scratch(file.bytes, file.count);
+        assert_int_equal(spl_point_batch_init(&batch, 500, NULL), 0);
+        assert_int_equal(spl_cloud_open(scratch_path(), &options, &cloud, &err), 0);
+        while ((code = spl_cloud_read(cloud, &batch, &err)) > 0) {
+            count += batch.count;
+            atomic_store(&cancelled, true);
+        }
+        assert_int_equal(code, SPL_E_CANCELLED);
+        assert_in_range(count, 500, colored / 2);
+        spl_cloud_destroy(cloud);
+        assert_int_equal(spl_cloud_open(scratch_path(), &options, &cloud, &err), SPL_E_CANCELLED);
+        spl_point_batch_finish(&batch);
+        free(file.bytes);
+        free(records);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -223,6 +331,8 @@ int main(void)
         cmocka_unit_test(layers_that_nobody_wants),
         cmocka_unit_test(wrong_chunks_are_named),
         cmocka_unit_test(wrong_tables_are_named_or_done_without),
+        cmocka_unit_test(sampled_colors_are_the_same),
+        cmocka_unit_test(reading_is_cancelled),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
 }

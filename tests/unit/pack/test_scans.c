@@ -10,10 +10,14 @@
 
 #include <cmocka.h>
 
+#include <splatd/log.h>
 #include <splatd/pack.h>
 
+#include "cloud/laz/items.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
+#include "pack/points.h"
+#include "support/laz_writer.h"
 
 static char folder[] = "/tmp/splatd-scans-XXXXXX";
 static char said[8192];
@@ -314,6 +318,68 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
+enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */
+
+/* Points in chunks of 10000, their red 7 but for `high` at one; the table's offset beyond the file or not. */
+static char *write_laz(const char *name, uint16_t high, bool lost)
+{
+    static const uint32_t chunks[] = {10000, 10000, 10000, 10000, 10000, 10000, 10000, 0};
+    struct spl_laz_format format = laz_format(2, 0, 2, 10000);
+    uint8_t *records = laz_make_records(&format, laz_points, 1);
+    char *path = path_of(name);
+    for (size_t i = 0; i < laz_points; i++) {
+        memset(records + i * 26 + 20, 0, 6);
+        records[i * 26 + 20] = i == laz_bright ? high & 255 : 7;
+        records[i * 26 + 21] = i == laz_bright ? high >> 8 : 0;
+    }
+    struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
+    file.bytes[spl_laz_get32(file.bytes + 96) + 3] ^= lost ? 0x40 : 0;
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(file.bytes, 1, file.count, f), file.count);
+    assert_int_equal(fclose(f), 0);
+    free(file.bytes);
+    free(records);
+    return path;
+}
+
+static void count_warnings(void *context, enum spl_log_level level, const char *message)
+{
+    if (level == SPL_LOG_WARN && strstr(message, "dark.laz: offset") && strstr(message, "chunk table"))
+        ++*(unsigned *)context;
+}
+
+/* A file whose first colours mislead is read again, and what was read of it is forgotten; that of others is not. Each
+ * is opened twice; that a table is lost is said once. */
+static void test_brighter_than_the_first(void **state)
+{
+    const char *paths[] = {write_laz("dark.laz", 8, true), write_laz("late.laz", 65535, false)};
+    unsigned warnings = 0;
+    struct spl_inputs inputs;
+    const struct spl_cloud_options how = {.keep = &(struct spl_keep){0}};
+    struct spl_stage stage = {.threads = 1};
+    struct spl_scans scans;
+    struct spl_points points = {0};
+    (void)state;
+    spl_log_set_callback(count_warnings, &warnings);
+    assert_int_equal(spl_inputs_find(&inputs, paths, 2, &(struct spl_inputs_listener){0}, NULL), 0);
+    assert_int_equal(spl_scans_init(&scans, &inputs, &how, &stage, NULL), 0);
+    assert_int_equal(spl_points_gather(&points, &scans, &stage, NULL), 0);
+    spl_log_set_callback(NULL, NULL);
+    assert_int_equal(warnings, 1);
+    assert_int_equal(points.count, 2 * laz_points);
+    assert_int_equal(points.points_read, 2 * laz_points);
+    assert_true(scans.list[0].colors.white == 255 && scans.list[1].colors.white == 65535);
+    assert_int_equal(scans.list[1].points_from[SPL_COLORS_RGB], laz_points);
+    for (size_t i = 0; i < laz_points; i++) {
+        assert_int_equal(points.color_class[i] & 0xffffff, i == laz_bright ? 8 : 7);
+        assert_int_equal(points.color_class[laz_points + i] & 0xffffff, i == laz_bright ? 255 : 0);
+    }
+    spl_points_finish(&points);
+    spl_scans_finish(&scans);
+    spl_inputs_finish(&inputs);
+}
+
 static char *write_text(const char *name, int count)
 {
     char *path = path_of(name);
@@ -365,6 +431,7 @@ int main(void)
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
         cmocka_unit_test(test_coarse_floats),
+        cmocka_unit_test(test_brighter_than_the_first),
         cmocka_unit_test(test_a_part_of_the_points),
     };
     if (!mkdtemp(folder))

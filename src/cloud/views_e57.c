@@ -1,0 +1,306 @@
+/* Photographs inside an E57 file (images2D): pinholes, which look along -z with y up, and panoramas around the eye, of
+ * which each face of 90 degrees that shows something is a view. What has no projection (a visual reference) is no view.
+ *
+ * Names are the images', with their number in the file, since most writers call all of them the same; of what no file
+ * name can carry '_' remains. A spherical or cylindrical image without a pose has that of its scan. Any thread. */
+#include <fcntl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "base/memory.h"
+#include "cloud/e57/document.h"
+#include "cloud/view_list.h"
+#include "geom/quaternion.h"
+#include "geom/size.h"
+
+enum { name_bytes = 60, section_header = 16, block = 1 << 16, probes = 16, face_side_max = 8192, face_side_min = 16 };
+
+struct reading {
+    struct spl_view_list *list;
+    const char *path;
+    const struct spl_e57_document *document;
+    const struct spl_e57_image *image;
+    size_t number; /* of the image, from 1 */
+    const struct spl_photograph_options *photographs;
+};
+
+bool spl_view_list_is_e57(const char *path)
+{
+    char magic[8] = "";
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO is not waited for */
+    bool is = file >= 0 && read(file, magic, sizeof magic) == sizeof magic && !memcmp(magic, "ASTM-E57", sizeof magic);
+    if (file >= 0)
+        close(file);
+    return is;
+}
+
+void spl_inner_photograph_destroy(struct spl_inner_photograph *inner)
+{
+    if (inner)
+        free(inner->path);
+    free(inner);
+}
+
+static int fail(const struct reading *r, const char *field, struct spl_error *err, const char *what, double value)
+{
+    return spl_fail_field(err, SPL_E_INPUT, field, "%s: image %zu ('%s'): %s: %g %s", r->path, r->number,
+                          r->image->name, field, value, what);
+}
+
+/* Camera to world of an image, by its pose and the axes of its face (NULL: its own). */
+static int make_matrix(const struct reading *r, const struct spl_e57_pose *pose, const double face[9], double m[16],
+                       struct spl_error *err)
+{
+    const double *q = pose->rotation;
+    double turn[9], length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (!(length > 1e-6 && length < 1e6))
+        return fail(r, "rotation", err, "is the length of its quaternion, which is no rotation", length);
+    spl_quaternion_to_matrix(q, turn);
+    memset(m, 0, 16 * sizeof *m);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                m[4 * i + j] += turn[3 * i + k] * (face ? face[3 * k + j] : k == j);
+        m[4 * i + 3] = pose->translation[i];
+    }
+    m[15] = 1;
+    return SPL_OK;
+}
+
+static int add(const struct reading *r, const struct spl_camera *camera, const char *face,
+               const struct spl_panorama *panorama, struct spl_error *err)
+{
+    const struct spl_e57_image *image = r->image;
+    char name[name_bytes + 1];
+    struct spl_inner_photograph *inner = NULL;
+    size_t length = strlen(image->name);
+    while (length > name_bytes || (length && (image->name[length] & 0xc0) == 0x80))
+        length--; /* whole characters */
+    memcpy(name, image->name, length);
+    name[length] = 0;
+    for (char *c = name; *c; c++)
+        *c = *c == '/' || (c == name && *c == '.') ? '_' : *c;
+    char *whole = spl_view_list_print(err, "%s-%zu%s%s", *name ? name : "image", r->number, *face ? "-" : "", face);
+    char *shown = spl_view_list_print(err, "%s: image %zu ('%s')", r->path, r->number, image->name);
+    int rc = whole && shown ? spl_camera_check(camera, err) : SPL_E_NOMEM;
+    if (!rc)
+        rc = spl_view_list_add(r->list, r->path, whole, camera, r->photographs ? shown : NULL, err);
+    if (!rc && r->photographs) {
+        inner = spl_alloc(1, sizeof *inner, err);
+        char *path = spl_view_list_print(err, "%s", r->path);
+        r->list->views[r->list->count - 1].inner = inner;
+        if (!inner || !path) {
+            free(path);
+            rc = SPL_E_NOMEM;
+        } else {
+            *inner = (struct spl_inner_photograph){.path = path,
+                                                   .at = image->at,
+                                                   .bytes = image->bytes,
+                                                   .is_panorama = panorama != NULL,
+                                                   .width = (uint32_t)image->width,
+                                                   .height = (uint32_t)image->height};
+            if (panorama)
+                inner->panorama = *panorama;
+        }
+    }
+    free(whole);
+    free(shown);
+    return rc;
+}
+
+static int check_sizes(const struct reading *r, struct spl_error *err)
+{
+    const struct spl_e57_image *i = r->image;
+    const double sizes[2] = {i->width, i->height}, pixels[2] = {i->pixel_width, i->pixel_height};
+    if (i->coding == SPL_E57_NO_CODING)
+        return spl_fail_field(err, SPL_E_INPUT, "jpegImage", "%s: image %zu ('%s') has neither jpegImage nor pngImage",
+                              r->path, r->number, i->name);
+    for (int k = 0; k < 2; k++) {
+        if (!(sizes[k] >= 1 && sizes[k] <= spl_view_list_limits.side_px && sizes[k] == floor(sizes[k])) ||
+            i->width * i->height > (double)spl_view_list_limits.pixels)
+            return fail(r, k ? "imageHeight" : "imageWidth", err, "pixels are no image that can be taken", sizes[k]);
+        if (!(pixels[k] > 0 && isfinite(pixels[k])))
+            return fail(r, k ? "pixelHeight" : "pixelWidth", err, "is no size", pixels[k]);
+    }
+    return SPL_OK;
+}
+
+static int add_pinhole(const struct reading *r, struct spl_error *err)
+{
+    const struct spl_e57_image *i = r->image;
+    struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    struct spl_error why = {0};
+    double m[16];
+    int rc = make_matrix(r, &i->pose, NULL, m, err);
+    if (rc)
+        return rc;
+    if (!i->pose.given)
+        return spl_fail_field(err, SPL_E_INPUT, "pose", "%s: image %zu ('%s') has no pose", r->path, r->number,
+                              i->name);
+    if (!(i->focal_length > 0 && isfinite(i->focal_length)))
+        return fail(r, "focalLength", err, "is no focal length", i->focal_length);
+    camera.width = (uint32_t)i->width;
+    camera.height = (uint32_t)i->height;
+    camera.fx = i->focal_length / i->pixel_width;
+    camera.fy = i->focal_length / i->pixel_height;
+    camera.cx = i->principal[0];
+    camera.cy = i->principal[1];
+    if ((rc = spl_camera_set_matrix(&camera, m, SPL_AXES_OPENGL, &why)) || (rc = spl_camera_check(&camera, &why)))
+        return spl_fail_field(err, rc, why.field, "%s: image %zu ('%s'): %s", r->path, r->number, i->name, why.message);
+    return add(r, &camera, "", NULL, err);
+}
+
+/* The pose of a panorama: its own, else that of the scan that it belongs to; NULL: neither. */
+static const struct spl_e57_pose *find_pose(const struct reading *r)
+{
+    const struct spl_e57_document *d = r->document;
+    for (size_t i = 0; !r->image->pose.given && *r->image->scan_guid && i < d->scan_count; i++)
+        if (!strcmp(d->scans[i].guid, r->image->scan_guid))
+            return &d->scans[i].pose;
+    return r->image->pose.given ? &r->image->pose : NULL;
+}
+
+static bool shows_something(const struct spl_panorama *panorama, const struct spl_camera *face)
+{
+    double place[2];
+    for (int y = 0; y <= probes; y++)
+        for (int x = 0; x <= probes; x++)
+            if (spl_panorama_place(panorama, face,
+                                   (double[2]){(double)face->width * x / probes, (double)face->height * y / probes},
+                                   place))
+                return true;
+    return false;
+}
+
+static int add_faces(const struct reading *r, struct spl_error *err)
+{
+    const struct spl_e57_image *i = r->image;
+    const struct spl_e57_pose *pose = find_pose(r);
+    struct spl_panorama panorama = {.cylinder = i->kind == SPL_E57_CYLINDRICAL,
+                                    .width = (uint32_t)i->width,
+                                    .height = (uint32_t)i->height,
+                                    .across = 1 / i->pixel_width,
+                                    .down = 1 / i->pixel_height,
+                                    .horizon = i->height / 2};
+    if (!pose)
+        return spl_fail_field(err, SPL_E_INPUT, "pose",
+                              "%s: image %zu ('%s') has no pose, and names no scan that has one", r->path, r->number,
+                              i->name);
+    if (panorama.cylinder && !(i->radius > 0 && isfinite(i->radius) && isfinite(i->principal[1])))
+        return fail(r, "radius", err, "is no radius", i->radius);
+    if (panorama.cylinder) {
+        panorama.down = i->radius / i->pixel_height;
+        panorama.horizon = i->principal[1];
+    }
+    if (i->width > 2 * M_PI * panorama.across + 1)
+        return fail(r, "pixelWidth", err, "times its width is more than once around", i->pixel_width);
+    double side = fmin(fmax(round(2 * panorama.across), face_side_min), face_side_max);
+    for (unsigned face = 0; face < SPL_PANORAMA_FACES; face++) {
+        struct spl_camera camera = {.fx = side / 2,
+                                    .fy = side / 2,
+                                    .cx = side / 2,
+                                    .cy = side / 2,
+                                    .width = (uint32_t)side,
+                                    .height = (uint32_t)side,
+                                    .near = SPL_CAMERA_NEAR_DEFAULT,
+                                    .far = INFINITY};
+        struct spl_error why = {0};
+        double m[16];
+        const char *name = spl_panorama_face(face, panorama.rotation);
+        int rc = make_matrix(r, pose, panorama.rotation, m, err);
+        if (rc)
+            return rc;
+        if ((rc = spl_camera_set_matrix(&camera, m, SPL_AXES_OPENCV, &why)))
+            return spl_fail_field(err, rc, why.field, "%s: image %zu ('%s'): %s", r->path, r->number, i->name,
+                                  why.message);
+        if (shows_something(&panorama, &camera) && (rc = add(r, &camera, name, &panorama, err)))
+            return rc;
+    }
+    return SPL_OK;
+}
+
+int spl_view_list_load_e57(struct spl_view_list *list, const char *path,
+                           const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    struct spl_source source;
+    struct spl_e57_pages pages = {0};
+    struct spl_e57_document document = {0};
+    int rc = spl_source_open(&source, path, err);
+    if (rc)
+        return rc;
+    if (!(rc = spl_e57_pages_init(&pages, &source, err)))
+        rc = spl_e57_document_read(&document, &pages, err);
+    if (!rc && photographs && photographs->images)
+        rc = spl_fail_field(err, SPL_E_USAGE, "images", "%s holds its photographs itself: leave --images out", path);
+    for (size_t i = 0; !rc && i < document.image_count; i++) {
+        const struct reading r = {list, path, &document, &document.images[i], i + 1, photographs};
+        struct spl_error why = {0};
+        if (r.image->kind == SPL_E57_NO_IMAGE || r.image->kind == SPL_E57_VISUAL)
+            continue;
+        if (!(rc = check_sizes(&r, &why)))
+            rc = r.image->kind == SPL_E57_PINHOLE ? add_pinhole(&r, &why) : add_faces(&r, &why);
+        rc = spl_view_list_refuse(photographs, rc, &why, err);
+    }
+    spl_e57_document_finish(&document);
+    spl_e57_pages_finish(&pages);
+    spl_source_close(&source);
+    return rc;
+}
+
+/* Copies a blob's bytes to a file in memory. */
+static int copy_blob(struct spl_e57_pages *pages, const struct spl_inner_photograph *inner, FILE *file,
+                     struct spl_error *err)
+{
+    const struct spl_source *source = pages->source;
+    uint64_t at, end = spl_e57_logical_bytes(pages);
+    uint8_t *bytes = spl_alloc_raw(block, 1, err);
+    int rc = bytes ? SPL_OK : SPL_E_NOMEM;
+    if (!rc && (!spl_e57_to_logical(pages, inner->at, &at) || end - at < section_header ||
+                inner->bytes > end - at - section_header))
+        rc = spl_source_fail_at(source, inner->at, "image", err, "%llu bytes do not fit the file",
+                                (unsigned long long)inner->bytes);
+    if (!rc && !(rc = spl_e57_read(pages, at, bytes, section_header, err)) &&
+        (bytes[0] != 0 || spl_e57_get64(bytes + 8) < section_header + inner->bytes))
+        rc = spl_source_fail_at(source, inner->at, "image", err, "is no section of %llu bytes",
+                                (unsigned long long)inner->bytes);
+    for (uint64_t done = 0; !rc && done < inner->bytes;) {
+        size_t count = inner->bytes - done < block ? (size_t)(inner->bytes - done) : block;
+        if (!(rc = spl_e57_read(pages, at + section_header + done, bytes, count, err)) &&
+            fwrite(bytes, 1, count, file) != count)
+            rc = spl_fail(err, SPL_E_NOMEM, "%s: no memory for an image of %llu bytes", inner->path,
+                          (unsigned long long)inner->bytes);
+        done += count;
+    }
+    free(bytes);
+    return rc;
+}
+
+int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct spl_error *err)
+{
+    const struct spl_inner_photograph *inner = view->inner;
+    struct spl_source source;
+    struct spl_e57_pages pages = {0};
+    int rc = spl_source_open(&source, inner->path, err);
+    if (rc)
+        return rc;
+    int memory = memfd_create("photograph", MFD_CLOEXEC);
+    *file = memory < 0 ? NULL : fdopen(memory, "w+b");
+    if (!*file)
+        rc = spl_fail(err, SPL_E_NOMEM, "%s: no memory for an image", inner->path);
+    if (memory >= 0 && !*file)
+        close(memory);
+    if (!rc && !(rc = spl_e57_pages_init(&pages, &source, err)))
+        rc = copy_blob(&pages, inner, *file, err);
+    if (!rc && (fflush(*file) || fseek(*file, 0, SEEK_SET)))
+        rc = spl_fail(err, SPL_E_NOMEM, "%s: no memory for an image", inner->path);
+    if (rc && *file) {
+        fclose(*file);
+        *file = NULL;
+    }
+    spl_e57_pages_finish(&pages);
+    spl_source_close(&source);
+    return rc;
+}

@@ -1,0 +1,15 @@
+/* The pixels of a photograph, whether it is a file, lies inside a scan's file, or is a face of a panorama there. */
+#ifndef SPL_PACK_TEXTURE_PHOTO_IMAGE_H
+#define SPL_PACK_TEXTURE_PHOTO_IMAGE_H
+
+#include "cloud/views.h"
+#include "image/load.h"
+
+/* As the photograph's header says, the size of a face being its camera's. Refuses what is no photograph: CMYK, channels
+ * of other than 8 bits, a panorama of another size than its scan's file says. Blocks for the reading. */
+int spl_photo_image_get_info(const struct spl_named_view *view, struct spl_image_info *info, struct spl_error *err);
+
+/* RGBA8; what a panorama does not show of a face is transparent. Blocks. */
+int spl_photo_image_load(const struct spl_named_view *view, struct spl_image *out, struct spl_error *err);
+
+#endif
