@@ -56,7 +56,7 @@ static const char ply[] =
 
 static json_t *json_of(const char *arguments)
 {
-    char output[16384], command[512];
+    char output[16384], command[600];
     snprintf(command, sizeof command, "info --json %s", arguments);
     assert_int_equal(run(command, output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL);
