@@ -115,18 +115,6 @@ static int check_transform(struct spl_cloud *cloud, const uint8_t *h, struct spl
     return SPL_OK;
 }
 
-/* The header's box: most and least of each axis in turn. */
-static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
-{
-    info->has_bounds = true;
-    for (unsigned k = 0; k < 3; k++) {
-        info->bounds[1][k] = get_double(h + 179 + 16 * k);
-        info->bounds[0][k] = get_double(h + 187 + 16 * k);
-        info->has_bounds &= isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) &&
-                            info->bounds[0][k] <= info->bounds[1][k];
-    }
-}
-
 /* Of a table that is done without whoever opens the file first is told. */
 static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *format, uint64_t points_at,
                        struct spl_error *err)
@@ -140,6 +128,18 @@ static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *for
         spl_log_warn("%s: offset %llu: %s: %s; chunks are read one after the other", cloud->source.path,
                      (unsigned long long)wrong->at, wrong->field, wrong->reason);
     return code;
+}
+
+/* The header's box: most and least of each axis in turn. */
+static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
+{
+    info->has_bounds = true;
+    for (unsigned k = 0; k < 3; k++) {
+        info->bounds[1][k] = get_double(h + 179 + 16 * k);
+        info->bounds[0][k] = get_double(h + 187 + 16 * k);
+        info->has_bounds &= isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) &&
+                            info->bounds[0][k] <= info->bounds[1][k];
+    }
 }
 
 static int las_open(struct spl_cloud *cloud, struct spl_error *err)

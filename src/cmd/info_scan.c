@@ -23,6 +23,7 @@
 #include "cmd/progress.h"
 #include "geom/unit.h"
 #include "pack/look.h"
+#include "pack/system.h"
 
 enum { batch_points = 65536 };
 
@@ -131,11 +132,17 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     for (size_t i = 0; i < count; i++)
         points += count_points(&list[i]);
     struct spl_pack_estimate estimate = spl_pack_estimate(points);
+    const struct spl_system_options said = {.warn = collect, .context = warnings};
+    struct spl_system system;
+    struct spl_error refused = {0};
+    spl_system_find(&system, &some, &said, &refused);
+    spl_system_finish(&system);
     spl_scans_compare(&some, collect, warnings);
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));
-    return json_pack("{s:I, s:I, s:o}", "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
+    return json_pack("{s:o, s:I, s:I, s:o}", "refused", refused.code ? text_json(refused.message) : json_null(),
+                     "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
                      (json_int_t)estimate.dataset_bytes, "warnings", warnings);
 }
 
@@ -229,6 +236,9 @@ static void print_pack(const json_t *pack)
 {
     const json_t *warnings = json_object_get(pack, "warnings"), *warning;
     size_t i;
+    const char *refused = json_string_value(json_object_get(pack, "refused"));
+    if (refused)
+        print_text("refused", refused);
     printf("  as a dataset  about %.1f MB; packing takes about %.0f MB of memory\n",
            json_number_value(json_object_get(pack, "dataset_bytes")) / 1e6,
            json_number_value(json_object_get(pack, "memory_bytes")) / 1e6);

@@ -256,6 +256,7 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
     free(numbers);
     if (!rc && !scans->count)
         rc = spl_inputs_fail_empty(scans->inputs, err);
+    points->up[2] = 1;
     if (!rc)
         rc = settle_scalars(points, err);
     if (!rc && !points->count)

@@ -35,6 +35,7 @@ struct spl_points {
     size_t station_capacity;
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
+    double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */
     uint64_t points_read, points_skipped, duplicates;
 };
 

@@ -12,7 +12,7 @@ static char folder[256] = "/tmp/splatd-info-XXXXXX";
 /* Runs `splatd COMMAND` in the folder; returns the exit code, what was printed in `output`. */
 static int run(const char *command, char *output, size_t size)
 {
-    char line[1024];
+    char line[2048];
     snprintf(line, sizeof line, "cd '%s' && '%s' %s", folder, getenv("SPLATD_BINARY"), command);
     FILE *pipe = popen(line, "r");
     size_t used = fread(output, 1, size - 1, pipe);
@@ -177,7 +177,7 @@ static void test_options(void **state)
 
 static void test_images(void **state)
 {
-    char path[512], command[600], output[16384];
+    char path[512], command[1200], output[16384];
     (void)state;
     snprintf(path, sizeof path, "%s/formats/e57/tiny_pc_and_images.e57",
              getenv("SPLATD_DATA") ? getenv("SPLATD_DATA") : "");
@@ -190,7 +190,16 @@ static void test_images(void **state)
     json_t *json = json_of(path);
     assert_int_equal(json_array_size(json_object_get(json, "images")), 4);
     assert_true(is(json_array_get(json_object_get(json, "images"), 1), "posed", "true"));
+    assert_true(is(json_object_get(json, "pack"), "refused", "null"));
     json_decref(json);
+    /* metres beside feet */
+    snprintf(command, sizeof command, "info --no-verify '%s' '%.*s/als/autzen_trim.las'", path,
+             (int)(strstr(path, "/formats/") - path), path);
+    assert_int_equal(run(command, output, sizeof output), 0);
+    const char *together = strstr(output, "2 scans together");
+    assert_non_null(together);
+    assert_non_null(strstr(together, "  refused       "));
+    assert_non_null(strstr(together, "bring all scans into one unit first"));
 }
 
 static int make_folder(void **state)
