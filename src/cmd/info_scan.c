@@ -23,6 +23,7 @@
 #include "cmd/progress.h"
 #include "geom/unit.h"
 #include "pack/look.h"
+#include "pack/system.h"
 
 enum { batch_points = 65536 };
 
@@ -131,12 +132,31 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     for (size_t i = 0; i < count; i++)
         points += count_points(&list[i]);
     struct spl_pack_estimate estimate = spl_pack_estimate(points);
+    const struct spl_system_options said = {.warn = collect, .context = warnings};
+    struct spl_system system;
+    struct spl_error refused = {0};
+    spl_system_find(&system, &some, &said, &refused);
+    spl_system_finish(&system);
     spl_scans_compare(&some, collect, warnings);
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));
-    return json_pack("{s:I, s:I, s:o}", "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
+    return json_pack("{s:o, s:I, s:I, s:o}", "refused", refused.code ? text_json(refused.message) : json_null(),
+                     "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
                      (json_int_t)estimate.dataset_bytes, "warnings", warnings);
+}
+
+static json_t *list_images(const struct spl_cloud_info *info)
+{
+    json_t *all = json_array();
+    for (uint32_t i = 0; i < info->image_count; i++) {
+        const struct spl_cloud_image *image = &info->images[i];
+        json_array_append_new(all,
+                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", text_json(image->name), "kind",
+                                        image->kind, "coding", image->coding, "width", image->width, "height",
+                                        image->height, "bytes", (json_int_t)image->bytes, "posed", (int)image->posed));
+    }
+    return all;
 }
 
 /* Members that are not known are null. */
@@ -165,6 +185,7 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
     json_object_set_new(json, "stations",
                         options->read || info->station_count ? json_integer((json_int_t)info->station_count)
                                                              : json_null());
+    json_object_set_new(json, "images", list_images(info));
     json_object_set_new(json, "crs", crs ? text_json(crs) : json_null());
     json_object_set_new(json, "crs_name", info->coordinates.name[0] ? text_json(info->coordinates.name) : json_null());
     json_object_set_new(
@@ -215,6 +236,9 @@ static void print_pack(const json_t *pack)
 {
     const json_t *warnings = json_object_get(pack, "warnings"), *warning;
     size_t i;
+    const char *refused = json_string_value(json_object_get(pack, "refused"));
+    if (refused)
+        print_text("refused", refused);
     printf("  as a dataset  about %.1f MB; packing takes about %.0f MB of memory\n",
            json_number_value(json_object_get(pack, "dataset_bytes")) / 1e6,
            json_number_value(json_object_get(pack, "memory_bytes")) / 1e6);
@@ -258,6 +282,14 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
                info->bounds[0][1], info->bounds[0][2], info->bounds[1][0], info->bounds[1][1], info->bounds[1][2]);
     if (info->station_count)
         printf("  stations      %u\n", info->station_count);
+    for (uint32_t i = 0; i < info->image_count; i++) {
+        const struct spl_cloud_image *image = &info->images[i];
+        printf("  %-14s%s, %s %.0f x %.0f, %s bytes%s: ", i ? "" : "images", image->kind,
+               image->coding[0] ? image->coding : "unknown coding", image->width, image->height,
+               spl_cmd_group(image->bytes, text), image->posed ? "" : ", without a pose");
+        spl_cmd_put_text(stdout, image->name, 0);
+        putchar('\n');
+    }
     print_pack(json_object_get(json, "pack"));
 }
 

@@ -12,7 +12,7 @@ static char folder[256] = "/tmp/splatd-info-XXXXXX";
 /* Runs `splatd COMMAND` in the folder; returns the exit code, what was printed in `output`. */
 static int run(const char *command, char *output, size_t size)
 {
-    char line[1024];
+    char line[2048];
     snprintf(line, sizeof line, "cd '%s' && '%s' %s", folder, getenv("SPLATD_BINARY"), command);
     FILE *pipe = popen(line, "r");
     size_t used = fread(output, 1, size - 1, pipe);
@@ -48,14 +48,15 @@ static void write_las(const char *name)
     write_file(name, b.data, b.length);
 }
 
-static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double "
-                          "z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float nx\nproperty "
-                          "float ny\nproperty float nz\nproperty float heat\nend_header\n"
-                          "1 2 3 9 9 9 0 0 1 5\nnan 0 0 9 9 9 0 0 1 5\n-4 2.5 7 9 9 9 0 0 1 5\n";
+static const char ply[] =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double "
+    "z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float nx\nproperty "
+    "float ny\nproperty float nz\nproperty float heat\nend_header\n"
+    "1 2 3 9 9 9 0 0 1 5\nnan 0 0 9 9 9 0 0 1 5\n-4 2.5 7 9 9 9 0 0 1 5\n";
 
 static json_t *json_of(const char *arguments)
 {
-    char output[16384], command[512];
+    char output[16384], command[600];
     snprintf(command, sizeof command, "info --json %s", arguments);
     assert_int_equal(run(command, output, sizeof output), 0);
     json_t *json = json_loads(output, 0, NULL);
@@ -78,7 +79,8 @@ static void test_json(void **state)
     (void)state;
     write_text("a.ply", ply);
     json_t *json = json_of("a.ply");
-    assert_true(is(json, "scan", "\"a.ply\"") && is(json, "format", "\"PLY\"") && is(json, "version", "\"1.0, ASCII\""));
+    assert_true(is(json, "scan", "\"a.ply\"") && is(json, "format", "\"PLY\"") &&
+                is(json, "version", "\"1.0, ASCII\""));
     assert_true(is(json, "points", "2") && is(json, "points_skipped", "1") && is(json, "ending_of", "null"));
     assert_true(is(json, "attributes", "[\"color\",\"normal\"]") && is(json, "stations", "0"));
     assert_true(is(json, "bounds", "{\"min\":[-4.0,2.0,3.0],\"max\":[1.0,2.5,7.0]}"));
@@ -125,8 +127,9 @@ static void test_several(void **state)
     (void)state;
     write_text("c.xyz", "100 0 0 9\n100 5 0 200\n");
     write_text("d.pts", "7 7\n");
-    write_text("e.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double "
-                        "z\nend_header\n1 2 3\n1 2 what\n");
+    write_text("e.ply",
+               "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double "
+               "z\nend_header\n1 2 3\n1 2 what\n");
     /* the broken are said, the others still told of */
     assert_int_equal(run("info --json . @none 2>&1 >/dev/null", output, sizeof output), 2);
     assert_non_null(strstr(output, "none: there is no such file with a list of scans"));
@@ -145,8 +148,9 @@ static void test_several(void **state)
     assert_non_null(strstr(output, "e.ply: line 9: "));
     assert_null(strstr(output, "none of the inputs"));
     /* a dataset among them is told of first; nothing but what breaks */
-    assert_int_equal(run("pack a.ply -o a.spld 2>&1 && cd . && \"$SPLATD_BINARY\" info c.xyz a.spld --no-verify", output,
-                         sizeof output), 0);
+    assert_int_equal(run("pack a.ply -o a.spld 2>&1 && cd . && \"$SPLATD_BINARY\" info c.xyz a.spld --no-verify",
+                         output, sizeof output),
+                     0);
     const char *dataset = strstr(output, "a  version "), *scan = strstr(output, "c.xyz  text, ");
     assert_true(dataset && scan && dataset < scan);
     assert_non_null(strstr(scan, "  points        not in the header\n"));
@@ -171,6 +175,33 @@ static void test_options(void **state)
     assert_null(strstr(output, "is packed already"));
 }
 
+static void test_images(void **state)
+{
+    char path[512], command[1200], output[16384];
+    (void)state;
+    snprintf(path, sizeof path, "%s/formats/e57/tiny_pc_and_images.e57",
+             getenv("SPLATD_DATA") ? getenv("SPLATD_DATA") : "");
+    if (access(path, R_OK))
+        skip();
+    snprintf(command, sizeof command, "info '%s'", path);
+    assert_int_equal(run(command, output, sizeof output), 0);
+    assert_non_null(
+        strstr(output, "  images        visual reference, JPEG 100 x 100, 7,722 bytes, without a pose: visual\n"));
+    json_t *json = json_of(path);
+    assert_int_equal(json_array_size(json_object_get(json, "images")), 4);
+    assert_true(is(json_array_get(json_object_get(json, "images"), 1), "posed", "true"));
+    assert_true(is(json_object_get(json, "pack"), "refused", "null"));
+    json_decref(json);
+    /* metres beside feet */
+    snprintf(command, sizeof command, "info --no-verify '%s' '%.*s/als/autzen_trim.las'", path,
+             (int)(strstr(path, "/formats/") - path), path);
+    assert_int_equal(run(command, output, sizeof output), 0);
+    const char *together = strstr(output, "2 scans together");
+    assert_non_null(together);
+    assert_non_null(strstr(together, "  refused       "));
+    assert_non_null(strstr(together, "bring all scans into one unit first"));
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -188,10 +219,8 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_json),
-        cmocka_unit_test(test_headers_that_lie),
-        cmocka_unit_test(test_several),
-        cmocka_unit_test(test_options),
+        cmocka_unit_test(test_json),    cmocka_unit_test(test_headers_that_lie), cmocka_unit_test(test_several),
+        cmocka_unit_test(test_options), cmocka_unit_test(test_images),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
