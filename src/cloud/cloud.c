@@ -198,6 +198,12 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
     return batch->count > 0;
 }
 
+void spl_cloud_take_coordinates(struct spl_cloud *cloud, struct spl_cloud_coordinates *out)
+{
+    *out = cloud->info.coordinates;
+    cloud->info.coordinates = (struct spl_cloud_coordinates){0};
+}
+
 void spl_cloud_destroy(struct spl_cloud *cloud)
 {
     if (!cloud)

@@ -91,6 +91,9 @@ struct spl_cloud_info {
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
     const struct spl_cloud_image *images; /* borrowed until destroy */
+    char version[48];                     /* of the format, and its kind: "1.4, point format 7"; "" = it has none */
+    double bounds[2][3];                  /* least and most of the coordinates, as the header says, which may be wrong */
+    bool has_bounds;                      /* it does */
 };
 
 /* A batch in structure-of-arrays form; arrays for absent attributes are still allocated and zero-filled. */
@@ -132,6 +135,9 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
  * SPL_CLOUD_AGAIN where a point is brighter than sampled colours let expect: nothing that was read holds, info has the
  * right white, and the next batch is the first one. SPL_E_CANCELLED. */
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
+
+/* Moves what the header says of its coordinates to the caller, who releases it with spl_crs_finish(). */
+void spl_cloud_take_coordinates(struct spl_cloud *cloud, struct spl_cloud_coordinates *out);
 
 /* NULL-safe. */
 void spl_cloud_destroy(struct spl_cloud *cloud);

@@ -12,7 +12,8 @@
 #include "cloud/source.h"
 #include "geom/unit.h"
 
-void spl_crs_settle(struct spl_cloud_coordinates *crs)
+/* Units that only the numbers say; a number beside which another unit stands is none. */
+static void settle(struct spl_cloud_coordinates *crs)
 {
     bool angles;
     double unit = spl_crs_get_unit(crs->epsg, &angles);
@@ -28,6 +29,16 @@ void spl_crs_settle(struct spl_cloud_coordinates *crs)
         crs->height_unit_m = unit;
     if (unit == 0 || !spl_unit_is_same(unit, crs->height_unit_m))
         crs->height_epsg = 0;
+}
+
+void spl_crs_replace(struct spl_cloud_coordinates *crs, const struct spl_cloud_coordinates *said)
+{
+    struct spl_cloud_coordinates old = *crs;
+    *crs = *said;
+    memcpy(crs->step, old.step, sizeof crs->step);
+    crs->floats = old.floats;
+    settle(crs);
+    free(old.wkt);
 }
 
 char *spl_crs_print(const struct spl_cloud_coordinates *crs)
@@ -82,10 +93,7 @@ static int read_numbers(const char *text, struct spl_cloud_coordinates *crs, str
             return spl_fail_field(err, SPL_E_USAGE, "crs", "--crs %.60s: EPSG:%u is no coordinate system%s", text,
                                   number, k ? " of heights" : "");
     }
-    memcpy(said.step, crs->step, sizeof said.step);
-    spl_crs_finish(crs);
-    *crs = said;
-    spl_crs_settle(crs);
+    spl_crs_replace(crs, &said);
     return SPL_OK;
 }
 

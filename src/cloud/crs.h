@@ -7,7 +7,7 @@
 
 enum { SPL_CRS_TEXT_MAX = 1 << 16 }; /* bytes of WKT */
 
-/* What a text says, in place of what `crs` says, whose `step` stays: `length` bytes, or up to a NUL. SPL_E_INPUT with
+/* What a text says, in place of what `crs` says, whose precision stays: `length` bytes, or up to a NUL. SPL_E_INPUT with
  * the byte and the reason, crs untouched, for what is no WKT, is not closed, or holds no system. Any thread. */
 int spl_crs_read_wkt(const char *text, size_t length, struct spl_cloud_coordinates *crs, struct spl_error *err);
 
@@ -31,8 +31,9 @@ double spl_crs_get_unit(uint32_t epsg, bool *angles);
 /* Metres of EPSG's unit of length with this number; 0: none. */
 double spl_crs_get_length(uint32_t unit);
 
-/* Once all has been read: units that only the numbers say; a number beside which another unit stands is none. */
-void spl_crs_settle(struct spl_cloud_coordinates *crs);
+/* Puts what has been read of a system, `said`, which is used up, into `crs`, whose precision stays: settled, so that
+ * units are there which only the numbers say, and no number beside which another unit stands. */
+void spl_crs_replace(struct spl_cloud_coordinates *crs, const struct spl_cloud_coordinates *said);
 
 /* As META has it: "EPSG:N", "EPSG:N+EPSG:M", WKT. The caller frees it. NULL: nothing is said, or there is no memory. */
 char *spl_crs_print(const struct spl_cloud_coordinates *crs);

@@ -119,8 +119,5 @@ void spl_crs_read_keys(const struct spl_crs_keys *keys, struct spl_cloud_coordin
     if (said.height_epsg >= old_heights_first && said.height_epsg <= old_heights_last)
         said.height_epsg = 0;
     said.height_unit_m = spl_crs_get_length(get_number(keys, key_height_unit));
-    memcpy(said.step, crs->step, sizeof said.step);
-    spl_crs_settle(&said);
-    spl_crs_finish(crs);
-    *crs = said;
+    spl_crs_replace(crs, &said);
 }

@@ -306,10 +306,7 @@ int spl_crs_read_wkt(const char *text, size_t length, struct spl_cloud_coordinat
     }
     if (!r.said.epsg && !r.said.height_epsg)
         r.said.epsg = r.compound;
-    memcpy(r.said.step, crs->step, sizeof r.said.step);
-    spl_crs_finish(crs);
-    *crs = r.said;
-    crs->wkt = copy;
-    spl_crs_settle(crs);
+    r.said.wkt = copy;
+    spl_crs_replace(crs, &r.said);
     return SPL_OK;
 }

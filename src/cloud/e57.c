@@ -218,7 +218,6 @@ static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
             return spl_fail(err, code, "%s", why.message);
         if (code < 0)
             spl_text_show(text + strspn(text, " \t\r\n"), crs->name, sizeof crs->name);
-        spl_crs_settle(crs);
         if (crs->angles || (crs->unit_m > 0 && crs->unit_m != 1)) {
             spl_log_warn(
                 "%s: its coordinateMetadata names a system that is not in metres (%.63s), as E57 always is; it "

@@ -6,6 +6,7 @@
  * the cloud's thread. */
 #include <endian.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -129,6 +130,18 @@ static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *for
     return code;
 }
 
+/* The header's box: most and least of each axis in turn. */
+static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
+{
+    info->has_bounds = true;
+    for (unsigned k = 0; k < 3; k++) {
+        info->bounds[1][k] = get_double(h + 179 + 16 * k);
+        info->bounds[0][k] = get_double(h + 187 + 16 * k);
+        info->has_bounds &= isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) &&
+                            info->bounds[0][k] <= info->bounds[1][k];
+    }
+}
+
 static int las_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct spl_source *source = &cloud->source;
@@ -202,6 +215,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     if (compressed &&
         (code = spl_copc_take_levels(cloud, records, las->stream, cloud->options->max_points, &las->count, err)) < 0)
         return code;
+    snprintf(cloud->info.version, sizeof cloud->info.version, "1.%u, point format %u", minor, las->format);
+    take_bounds(&cloud->info, h);
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_INTENSITY;

@@ -12,6 +12,7 @@
 #include <endian.h>
 #include <lzf.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -188,6 +189,9 @@ static int pcd_open(struct spl_cloud *cloud, struct spl_error *err)
         code = find_columns(cloud, err);
     if (code < 0)
         return code;
+    static const char *const kinds[] = {
+        [SPL_PCD_ASCII] = "ASCII", [SPL_PCD_BINARY] = "binary", [SPL_PCD_COMPRESSED] = "binary, compressed"};
+    snprintf(cloud->info.version, sizeof cloud->info.version, "%s", kinds[pcd->header.data]);
     pcd->start = spl_source_tell(&cloud->source);
     pcd->start_line = cloud->source.line;
     if (pcd->header.data != SPL_PCD_ASCII)

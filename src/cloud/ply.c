@@ -6,6 +6,7 @@
 #include "cloud/ply.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -261,6 +262,9 @@ static int ply_open(struct spl_cloud *cloud, struct spl_error *err)
         code = check_count(cloud, vertices(ply), err);
     if (code < 0)
         return code;
+    static const char *const kinds[] = {
+        [SPL_PLY_ASCII] = "ASCII", [SPL_PLY_LITTLE] = "binary, little-endian", [SPL_PLY_BIG] = "binary, big-endian"};
+    snprintf(cloud->info.version, sizeof cloud->info.version, "1.0, %s", kinds[ply->header.format]);
     ply->start = spl_source_tell(&cloud->source);
     ply->start_line = cloud->source.line;
     if (ply->header.format != SPL_PLY_ASCII && !vertices(ply)->lists)

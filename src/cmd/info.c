@@ -1,4 +1,4 @@
-/* splatd info: what a dataset holds, what each attribute costs, and how many bits the scene needed. Everything is
+/* splatd info: what a dataset holds (of scans see info_scan.c), what each attribute costs, and how many bits the scene needed. Everything is
  * gathered into a struct first, which both outputs print. */
 #include "cmd/cmd.h"
 
@@ -14,6 +14,7 @@
 
 #include "cmd/dictionary.h"
 #include "cmd/info_report.h"
+#include "cmd/info_scan.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
 #include "dataset/dataset.h"
@@ -23,6 +24,7 @@ enum { bar_max = sizeof bar - 1 };
 
 struct arguments {
     const char *picture; // may be NULL
+    const char *columns; // the same
     bool json, no_verify;
 };
 
@@ -36,19 +38,26 @@ static int take_verify(void *arguments, const char *option, char *text, struct s
 static const struct spl_cmd_option options[] = {
     {"json", NULL, "one JSON object a line", SPL_CMD_FLAG(struct arguments, json)},
     {"dictionary", "PNG", "where the picture goes; one dataset with textures", SPL_CMD_TEXT(struct arguments, picture)},
-    {"verify", NULL, "check the pages' checksums too (default)", .take = take_verify},
-    {"no-verify", NULL, "trust the pages; everything else is always checked",
+    {"columns", "LIST", "of text scans: x y z r g b intensity class nx ny nz -", SPL_CMD_TEXT(struct arguments, columns)},
+    {"verify", NULL, "check the pages' checksums too, read all points of scans (default)", .take = take_verify},
+    {"no-verify", NULL, "trust the pages, and of scans the header; everything else is always checked",
      SPL_CMD_FLAG(struct arguments, no_verify)},
 };
 
 static const struct spl_cmd_table table = {
     .command = "info",
     .before =
-        "usage: splatd info [--json] [--no-verify] [--dictionary PNG] NAME.spld…\n\n"
+        "usage: splatd info [--json] [--no-verify] [--dictionary PNG] [--columns LIST] NAME.spld|SCAN…\n\n"
         "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
-        "histogram of bits that the scene needed. Every section's checksum is verified first.\n\n"
+        "histogram of bits that the scene needed. Every section's checksum is verified first.\n"
+        "Of scans (also folders of them and @LISTs, as pack takes them): format, points, attributes, coordinate system,\n"
+        "bounds, stations, and what pack would make of them, without packing.\n\n"
         "A table to read:\n"
         "  splatd info courtyard.spld\n"
+        "A scan, before it is packed:\n"
+        "  splatd info hall.ply\n"
+        "The headers of a folder's scans alone:\n"
+        "  splatd info --no-verify tiles\n"
         "Only check that files are whole (exit code 2 when one is not):\n"
         "  splatd info *.spld >/dev/null\n"
         "One line of JSON a dataset, for scripts:\n"
@@ -59,20 +68,6 @@ static const struct spl_cmd_table table = {
     .count = sizeof options / sizeof *options,
 };
 
-/* 1234567 -> "1,234,567" */
-static const char *grouped(uint64_t value, char text[32])
-{
-    char digits[24];
-    int length = snprintf(digits, sizeof digits, "%" PRIu64, value), used = 0;
-    for (int i = 0; i < length; i++) {
-        if (i && (length - i) % 3 == 0)
-            text[used++] = ',';
-        text[used++] = digits[i];
-    }
-    text[used] = 0;
-    return text;
-}
-
 /* As figure 9 of the sparse-coding paper. A bar's full length is the largest share. */
 static void print_atoms(const struct spl_info_report *report)
 {
@@ -80,12 +75,12 @@ static void print_atoms(const struct spl_info_report *report)
     char text[32];
     uint64_t most = 1;
     printf("\n  textures of %u x %u from %s atoms, %.1f MB resident; splats by number of atoms\n", info->texture_size,
-           info->texture_size, grouped(info->atoms, text), (double)info->dictionary_bytes / 1e6);
+           info->texture_size, spl_cmd_group(info->atoms, text), (double)info->dictionary_bytes / 1e6);
     for (int count = 0; count <= SPL_ATOMS_MAX; count++)
         most = report->atoms[count] > most ? report->atoms[count] : most;
     for (int count = 0; count <= SPL_ATOMS_MAX; count++) {
         int length = (int)((double)bar_max * (double)report->atoms[count] / (double)most + 0.5);
-        printf("  %-6d%12s%8.1f %%%s%.*s\n", count, grouped(report->atoms[count], text),
+        printf("  %-6d%12s%8.1f %%%s%.*s\n", count, spl_cmd_group(report->atoms[count], text),
                100.0 * (double)report->atoms[count] / (double)info->splats, length ? "  " : "", length, bar);
     }
 }
@@ -105,13 +100,13 @@ static void print_colors(const json_t *colors, uint64_t kept)
         if (!strcmp(from, "photographs")) {
             photographs = true;
             kept -= points < kept ? points : kept;
-            printf("%-16s%s: %s points, with the poses of ", label, from, grouped(points, text));
+            printf("%-16s%s: %s points, with the poses of ", label, from, spl_cmd_group(points, text));
         } else if (!photographs) {
-            printf("%-16s%s: %s points of ", label, from, grouped(points, text));
+            printf("%-16s%s: %s points of ", label, from, spl_cmd_group(points, text));
         } else if (kept && json_array_size(colors) == 2) {
-            printf("%-16s%s: the other %s points, of ", label, from, grouped(kept, text));
+            printf("%-16s%s: the other %s points, of ", label, from, spl_cmd_group(kept, text));
         } else if (kept) {
-            printf("%-16s%s: of the other %s points, those of ", label, from, grouped(kept, text));
+            printf("%-16s%s: of the other %s points, those of ", label, from, spl_cmd_group(kept, text));
         } else {
             continue;
         }
@@ -164,11 +159,11 @@ static void print_table(const struct spl_info_report *report)
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
-    printf("  points        %s read, %s kept\n", grouped(info->points, a), grouped(info->leaf_splats, b));
+    printf("  points        %s read, %s kept\n", spl_cmd_group(info->points, a), spl_cmd_group(info->leaf_splats, b));
     if (whole)
-        printf("  a part of     %s points of the sources\n", grouped((uint64_t)json_integer_value(whole), a));
-    printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
-           grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
+        printf("  a part of     %s points of the sources\n", spl_cmd_group((uint64_t)json_integer_value(whole), a));
+    printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", spl_cmd_group(info->splats, a),
+           spl_cmd_group(info->leaf_splats, b), spl_cmd_group(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
     printf("  attributes    %s", info->has_color ? "color" : "no color");
     uint32_t streams;
@@ -178,11 +173,11 @@ static void print_table(const struct spl_info_report *report)
     printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
-    printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", grouped(report->linear, a),
+    printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", spl_cmd_group(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);
-    printf("  lines         %s pieces between them, %.1f kB\n", grouped(info->pieces, a),
+    printf("  lines         %s pieces between them, %.1f kB\n", spl_cmd_group(info->pieces, a),
            (double)report->bytes[SPL_CHUNK_LINES] / 1e3);
-    printf("  clip lines    %s splats (%.2f %%)\n", grouped(report->clips, a),
+    printf("  clip lines    %s splats (%.2f %%)\n", spl_cmd_group(report->clips, a),
            100.0 * (double)report->clips / (double)info->splats);
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
@@ -194,13 +189,13 @@ static void print_table(const struct spl_info_report *report)
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
     printf("  splat radius  %.4g %s (median)\n", info->splat_radius, spl_unit_word(info));
-    printf("  pages         %s, %.1f MB resident\n\n", grouped(info->pages, a), (double)info->page_bytes / 1e6);
+    printf("  pages         %s, %.1f MB resident\n\n", spl_cmd_group(info->pages, a), (double)info->page_bytes / 1e6);
 
     printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
         const struct spl_info_level *l = &report->levels[level];
-        printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, grouped(l->nodes, a), grouped(l->chunks, b),
-               grouped(l->splats, c), grouped(l->pieces, d), l->spacing);
+        printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, spl_cmd_group(l->nodes, a), spl_cmd_group(l->chunks, b),
+               spl_cmd_group(l->splats, c), spl_cmd_group(l->pieces, d), l->spacing);
     }
     printf("\n  bytes a splat\n");
     int name_width = 14;
@@ -250,10 +245,18 @@ int spl_cmd_info(int argc, char **argv)
         parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of one dataset, not of %d", argc - optind);
     if (!parsed && a.picture)
         parsed = spl_cmd_check_ending("--dictionary", a.picture, "png", &wrong);
+    if (!parsed && a.picture && spl_info_is_scan(argv[optind]))
+        parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of a dataset; %.300s is a scan", argv[optind]);
     if (parsed)
         return spl_cmd_fail(&wrong);
     int worst = 0; /* the remaining files are still told of */
+    const char **scans = (const char **)&argv[optind]; /* what is none has been told of when its place is taken */
+    size_t scan_count = 0;
     for (int i = optind; i < argc; i++) {
+        if (spl_info_is_scan(argv[i])) {
+            scans[scan_count++] = argv[i];
+            continue;
+        }
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
         struct spl_info_report report;
@@ -268,6 +271,11 @@ int spl_cmd_info(int argc, char **argv)
             rc = spl_cmd_write_dictionary(dataset, a.picture, &err);
         spl_dataset_close(dataset);
         int code = rc ? spl_cmd_fail(&err) : 0;
+        worst = code > worst ? code : worst;
+    }
+    if (scan_count) {
+        const struct spl_info_scan_options of_scans = {a.json, !a.no_verify, a.columns};
+        int code = spl_info_print_scans(scans, scan_count, &of_scans);
         worst = code > worst ? code : worst;
     }
     return fflush(stdout) ? spl_cmd_fail(&(struct spl_error){.code = SPL_E_IO, .message = "cannot write to stdout"})

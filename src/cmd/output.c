@@ -4,6 +4,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -36,6 +37,19 @@ void spl_cmd_put_text(FILE *out, const char *text, int width)
         fprintf(out, "%.*s", printable ? (int)length : 1, printable ? text : "?");
     for (; width > 0; width--)
         fputc(' ', out);
+}
+
+const char *spl_cmd_group(uint64_t value, char text[32])
+{
+    char digits[24];
+    int length = snprintf(digits, sizeof digits, "%" PRIu64, value), used = 0;
+    for (int i = 0; i < length; i++) {
+        if (i && (length - i) % 3 == 0)
+            text[used++] = ',';
+        text[used++] = digits[i];
+    }
+    text[used] = 0;
+    return text;
 }
 
 const char *spl_cmd_ending(const char *path)

@@ -3,6 +3,7 @@
 #define SPL_CMD_OUTPUT_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 #include "base/error.h"
@@ -13,6 +14,9 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
 
 /* A text of a file's, as spl_text_show() has it, in at least `width` characters. */
 void spl_cmd_put_text(FILE *out, const char *text, int width);
+
+/* 1234567 as "1,234,567" in `text`, which is returned. */
+const char *spl_cmd_group(uint64_t value, char text[32]);
 
 /* What stands behind the last dot of the path's last name, "" where there is none: "mp4" of "a.b/c.mp4", "" of "a.b/c",
  * ".c", "a.b/" and "..". Borrows from `path`. */

@@ -190,6 +190,24 @@ static int take_quality(void *arguments, const char *option, char *text, struct 
     return spl_cmd_parse_real(option, text, 20, 60, &a->photos.texture_quality, err);
 }
 
+static int take_up(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    const char *axis = text + (*text == '+' || *text == '-');
+    double up[3] = {0};
+    if (*axis >= 'x' && *axis <= 'z' && !axis[1])
+        up[*axis - 'x'] = *text == '-' ? -1 : 1;
+    else if (spl_cmd_parse_vector(option, text, up, err) || (up[0] == 0 && up[1] == 0 && up[2] == 0)) {
+        if (err)
+            *err = (struct spl_error){0};
+        return spl_fail_field(err, SPL_E_USAGE, "up",
+                              "%s takes +x, -x, +y, -y, +z, -z, or a direction X,Y,Z that is not 0,0,0, not '%.60s'",
+                              option, text);
+    }
+    memcpy(a->pack.up, up, sizeof up);
+    return 0;
+}
+
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
      SPL_CMD_TEXT(struct arguments, pack.output)},
@@ -201,6 +219,15 @@ static const struct spl_cmd_option options[] = {
      "fields of the scans beside class, intensity, return_number, number_of_returns and scan, as they are called "
      "there: gps_time, scan_angle, extra bytes, properties, columns; 'none' among them leaves out what is not named",
      SPL_CMD_TEXT(struct arguments, pack.keep)},
+    {"unit", "U",
+     "of coordinates, whatever scans say: m, ft, us-ft, km, cm, mm, yd, in, unknown, or metres a unit such as 0.2m",
+     .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.unit)},
+    {"crs", "WHICH",
+     "the scans' coordinate system, whatever they say: EPSG:25832, EPSG:2994+EPSG:6360 with that of heights, a file of "
+     "WKT, or none",
+     .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.crs)},
+    {"up", "AXIS", "what is up: +z, -y and such, or a direction X,Y,Z",
+     .otherwise = "z; without a coordinate system, what is up in the photographs", .take = take_up},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -246,8 +273,9 @@ static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
-        "                   [--neighbours K] [--position-error X] [--normal-error DEG] [--points-only]\n"
-        "                   [--no-linear] [--no-clip-lines] [--max-points N] [--threads N]\n"
+        "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
+        "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
+        "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"

@@ -111,7 +111,8 @@ uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_
  *   bool (optional, true)}, "counts" {…} (the writer's, see counts.h),
  *   "streams" [{"name": string, "type": string, "unit": string, of type "steps" too "first": whole number,
  *   "steps_a_unit": real}] (optional; the writer's),
- *   "unit" "m" | "ft" | "us-ft" | "unknown" (optional), "crs" string or null (optional), "sources" [string], "pack"
+ *   "unit" "m" | "ft" | "us-ft" | … | "unknown" (optional; geom/unit.h), "crs" string or null (optional), "up"
+ *   {"vector": [3], "from": string} (optional, of no meaning to a reader), "sources" [string], "pack"
  * {...} (optional, free: settings, statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |
  *   "constant" | "photographs", "points": int}] (optional): where colours come from; those from photographs have taken

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "dataset/open.h"
+#include "geom/unit.h"
 
 /* Of what is no number and no text the shape alone. */
 static const char *show_shape(const json_t *value, char text[40])
@@ -159,17 +160,13 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
 /* Optional: what coordinates are in, and where on earth. */
 static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
 {
-    static const char *const units[] = {"unknown", "m", "ft", "us-ft"};
     const json_t *unit = json_object_get(dataset->meta, "unit"), *crs = json_object_get(dataset->meta, "crs");
-    const char *said = unit ? json_string_value(unit) : units[0];
-    size_t i = 0;
-    while (i < sizeof units / sizeof *units && (!said || strcmp(said, units[i])))
-        i++;
-    if (i == sizeof units / sizeof *units)
-        return wrong(dataset, err, "unit", unit, "m, ft, us-ft or unknown");
+    double metres = 0;
+    if (unit && (!json_is_string(unit) || !spl_unit_parse(json_string_value(unit), &metres)))
+        return wrong(dataset, err, "unit", unit, SPL_UNIT_FORMS);
     if (crs && !json_is_null(crs) && !json_is_string(crs))
         return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number), or null");
-    strcpy(dataset->info.unit, units[i]);
+    spl_unit_print(metres, dataset->info.unit);
     return SPL_OK;
 }
 

@@ -117,24 +117,6 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-/* The batch's first point is number `first` of the scan. */
-static int grow_box(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
-{
-    for (size_t i = 0; i < batch->count; i++)
-        for (int c = 0; c < 3; c++) {
-            double v = batch->position[i][c];
-            if (fabs(v) > SPL_COORDINATE_MAX)
-                return spl_fail(
-                    err, SPL_E_INPUT,
-                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
-                    "and columns",
-                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
-            scan->min[c] = fmin(scan->min[c], v);
-            scan->max[c] = fmax(scan->max[c], v);
-        }
-    return SPL_OK;
-}
-
 /* The scan's number of each point of a batch: its station's, or that of the input. */
 static void number_scan(const struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
                         bool stations, size_t input, double *out)
@@ -187,7 +169,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
             continue;
         }
         spl_stage_add(stage, batch->count, 0);
-        rc = grow_box(scan, batch, p->points_read - first, err);
+        rc = spl_scan_grow(scan, batch, p->points_read - first, err);
         if (numbers)
             number_scan(p, batch, attributes, stations, (size_t)(scan - scans->list), numbers);
         if (!rc)
@@ -266,12 +248,15 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
         if (again) {
             spl_points_finish(points);
             spl_scans_share(scans);
+            rc = scans->count ? spl_kept_check(scans, err) : SPL_OK;
+            again = !rc;
         }
     }
     spl_point_batch_finish(&batch);
     free(numbers);
     if (!rc && !scans->count)
         rc = spl_inputs_fail_empty(scans->inputs, err);
+    points->up[2] = 1;
     if (!rc)
         rc = settle_scalars(points, err);
     if (!rc && !points->count)

@@ -109,7 +109,7 @@ int spl_inputs_fail_empty(const struct spl_inputs *inputs, struct spl_error *err
 {
     if (!inputs->left_out_count)
         return spl_fail(err, SPL_E_NOT_FOUND, "no scan is named");
-    return spl_fail_field(err, SPL_E_INPUT, inputs->why.field, "no scan is left of %zu; the first: %.400s",
+    return spl_fail_field(err, SPL_E_INPUT, "inputs", "none of the inputs can be used; the first of %zu: %.400s",
                           inputs->left_out_count, inputs->why.message);
 }
 
@@ -210,7 +210,8 @@ static int search(struct finder *f, const char *path, unsigned depth, struct spl
         finish_entries(&entries);
         return spl_inputs_leave_out(f->inputs, path, rc, &why, err);
     }
-    qsort(entries.list, entries.count, sizeof *entries.list, by_name);
+    if (entries.count)
+        qsort(entries.list, entries.count, sizeof *entries.list, by_name);
     f->pending += entries.count;
     for (size_t i = 0; !rc && i < entries.count; i++) {
         const char *slash = path[strlen(path) - 1] == '/' ? "" : "/";
@@ -310,11 +311,11 @@ static int add_list(struct finder *f, const char *name, struct spl_error *err)
     const char *line;
     size_t length, lines = 0;
     if (!*name)
-        return spl_fail_field(err, SPL_E_USAGE, "inputs", "'@' takes the name of a list of scans: @tiles.txt");
+        return spl_fail(err, SPL_E_USAGE, "'@' takes the name of a list of scans: @tiles.txt");
     if (stat(name, &status) && errno == ENOENT)
         return spl_fail(err, SPL_E_NOT_FOUND,
-                        "%.200s: there is no such list of scans; a scan called @%.200s is named "
-                        "./@%.200s",
+                        "%.200s: there is no such file with a list of scans; a scan called @%.200s is "
+                        "named ./@%.200s",
                         name, name, name);
     int rc = spl_source_open(&list, name, err);
     while (!rc && (rc = spl_source_line(&list, &line, &length, err)) > 0) {

@@ -38,7 +38,7 @@ int spl_inputs_find(struct spl_inputs *inputs, const char *const *given, size_t 
 int spl_inputs_leave_out(struct spl_inputs *inputs, const char *path, int rc, const struct spl_error *why,
                          struct spl_error *err);
 
-/* The error of a pack that has nothing left to read. */
+/* The error of having nothing left to read, all of which has been heard of; its field is "inputs". */
 int spl_inputs_fail_empty(const struct spl_inputs *inputs, struct spl_error *err);
 
 /* The path's last part, which messages and META call a scan by. Borrows from `path`. */

@@ -6,7 +6,7 @@
 
 /* A set of points whose normals have settled signs relative to each other: all within one block. */
 struct spl_component {
-    double up;     /* sum of the normals' z */
+    double up;     /* sum of the normals' components upwards */
     bool anchored; /* holds a point whose normal was given or faces its station: the set is never turned */
     uint8_t flip;  /* result of spl_orient_components(): 1 = turn the set's normals */
 };

@@ -20,13 +20,16 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/dataset.h"
+#include "geom/unit.h"
 #include "pack/emit.h"
 #include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/part.h"
+#include "pack/system.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
+#include "pack/up.h"
 #include "pack/view.h"
 #include "pack/wires/wires.h"
 
@@ -37,6 +40,8 @@ struct pack {
     struct spl_stage *stage;
     struct spl_keep keep;
     struct spl_scans scans;
+    struct spl_system system;
+    const char *up_from; // static; NULL: z is up, because nobody says otherwise
     struct spl_points points;
     struct spl_wires wires;
     struct spl_tree tree;
@@ -65,6 +70,9 @@ static int check_options(struct pack *p, struct spl_error *err)
     if (!(normal >= 0.01 && normal <= 30))
         return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
                               normal);
+    if (!(isfinite(o->up[0]) && isfinite(o->up[1]) && isfinite(o->up[2])))
+        return spl_fail_field(err, SPL_E_USAGE, "up", "%g, %g, %g; up is a direction of three finite numbers", o->up[0],
+                              o->up[1], o->up[2]);
     p->chunk = (struct spl_chunk_options){
         .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05};
     struct stat output, input;
@@ -101,6 +109,7 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
     const struct spl_points *points = &p->points;
     json_t *bits = json_object(), *sources = spl_scans_describe_names(&p->scans),
            *stations = json_array();
+    char unit[SPL_UNIT_TEXT_MAX];
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++)
         json_object_set_new(bits, spl_attribute_name(a), json_integer((json_int_t)p->emitted.bits[a]));
     for (uint32_t s = 0; s < p->emitted.streams.count; s++)
@@ -111,13 +120,14 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
             json_array_append_new(pose, json_real(points->stations[s][i]));
         json_array_append_new(stations, pose);
     }
-    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:n, s:o, s:o,"
+    return json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:s?, s:o, s:o,"
                      " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
                      "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
                      (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min),
                      "max", json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
                      json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
-                     (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit", "unknown", "crs",
+                     (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit",
+                     spl_unit_print(p->system.unit_m, unit), "crs", p->system.crs,
                      "sources", sources, "stations", stations, "color",
                      spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",
                      p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
@@ -144,6 +154,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
     if (spl_part_of(&p->scans))
         json_object_set_new(meta, "part_of", json_integer((json_int_t)spl_part_of(&p->scans)));
+    if (p->up_from)
+        json_object_set_new(meta, "up", json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
@@ -212,11 +224,39 @@ static int join_wires(struct pack *p, struct spl_error *err)
     return rc;
 }
 
+/* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */
+static void settle_up(struct pack *p, const struct spl_view_list *photographs)
+{
+    const double *said = p->options->up;
+    double *up = p->points.up, most = fmax(fmax(fabs(said[0]), fabs(said[1])), fabs(said[2])), length = 0;
+    if (most > 0) {
+        for (int c = 0; c < 3; c++)
+            length += said[c] / most * (said[c] / most);
+        for (int c = 0; c < 3; c++)
+            up[c] = said[c] / most / sqrt(length);
+        p->up_from = "given";
+    } else if (photographs && !p->system.crs && spl_up_from_cameras(photographs, up))
+        p->up_from = "cameras";
+}
+
+/* A scan that turns out to be broken has no say in what the others' coordinates are. */
+static int gather(struct pack *p, struct spl_system_options *said, struct spl_error *err)
+{
+    size_t count = p->scans.count;
+    int rc = spl_points_gather(&p->points, &p->scans, p->stage, err);
+    if (rc || p->scans.count == count)
+        return rc;
+    spl_system_finish(&p->system);
+    said->warn = NULL;
+    return spl_system_find(&p->system, &p->scans, said, err);
+}
+
 static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *inputs, const char *output,
-                     uint32_t photographs, struct spl_stage *stage, struct spl_pack_report *report,
+                     const struct spl_view_list *photographs, struct spl_stage *stage, struct spl_pack_report *report,
                      struct spl_error *err)
 {
     struct pack p = {.options = options, .stage = stage};
+    struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = check_options(&p, err);
     if (!rc)
@@ -232,10 +272,14 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
                             stage, err);
     if (!rc)
         rc = spl_kept_check(&p.scans, err);
+    if (!rc)
+        rc = spl_system_find(&p.system, &p.scans, &said, err);
     if (!rc) {
-        plan(&p, photographs);
-        rc = spl_points_gather(&p.points, &p.scans, stage, err);
+        plan(&p, photographs ? (uint32_t)photographs->count : 0);
+        rc = gather(&p, &said, err);
     }
+    if (!rc)
+        settle_up(&p, photographs);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
@@ -264,6 +308,7 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     spl_tree_finish(&p.tree);
     spl_wires_finish(&p.wires);
     spl_points_finish(&p.points);
+    spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
     return rc;
 }
@@ -321,7 +366,7 @@ static int pack_photos(const struct spl_pack_options *options, struct spl_inputs
         path = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
-    if (!rc && !(rc = pack_scan(options, inputs, path, photos.photographs, stage, report, err))) {
+    if (!rc && !(rc = pack_scan(options, inputs, path, &photographs, stage, report, err))) {
         rc = spl_dataset_open_whole(path, false, &dataset, err);
         unlink(path);
     }
@@ -358,7 +403,7 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
     rc = options->photos ? pack_photos(&found, &inputs, &stage, report, err)
-                         : pack_scan(&found, &inputs, options->output, 0, &stage, report, err);
+                         : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
     spl_inputs_finish(&inputs);
     return rc;
 }

@@ -11,7 +11,6 @@
 #include "pack/scans.h"
 
 #define SPL_NO_STATION UINT16_MAX
-#define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
@@ -36,6 +35,7 @@ struct spl_points {
     size_t station_capacity;
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
+    double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */
     uint64_t points_read, points_skipped, duplicates;
 };
 

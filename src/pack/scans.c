@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "cloud/crs.h"
 #include "pack/kept.h"
 #include "pack/names.h"
 #include "pack/part.h"
@@ -82,7 +83,6 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .format = info->format,
                               .named = info->named,
                               .own_colors = info->colors,
-                              .coordinates = info->coordinates,
                               .attributes = info->attributes,
                               .columns = info->columns,
                               .scalars = info->scalars,
@@ -93,6 +93,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .max = {-INFINITY, -INFINITY, -INFINITY}};
     if (fields)
         snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
+    spl_cloud_take_coordinates(cloud, &scan->coordinates);
     spl_cloud_destroy(cloud);
     return SPL_OK;
 }
@@ -131,12 +132,32 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
 
 void spl_scans_remove(struct spl_scans *scans, size_t place)
 {
+    spl_crs_finish(&scans->list[place].coordinates);
     scans->count--;
     memmove(&scans->list[place], &scans->list[place + 1], (scans->count - place) * sizeof *scans->list);
 }
 
+int spl_scan_grow(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err)
+{
+    for (size_t i = 0; i < batch->count; i++)
+        for (int c = 0; c < 3; c++) {
+            double v = batch->position[i][c];
+            if (fabs(v) > SPL_COORDINATE_MAX)
+                return spl_fail(
+                    err, SPL_E_INPUT,
+                    "%.300s: point %llu has %c = %g, beyond the largest coordinate %g; check the file's scale "
+                    "and columns",
+                    scan->path, (unsigned long long)(first + i), "xyz"[c], v, SPL_COORDINATE_MAX);
+            scan->min[c] = fmin(scan->min[c], v);
+            scan->max[c] = fmax(scan->max[c], v);
+        }
+    return SPL_OK;
+}
+
 void spl_scans_finish(struct spl_scans *scans)
 {
+    for (size_t i = 0; scans->list && i < scans->count; i++)
+        spl_crs_finish(&scans->list[i].coordinates);
     free(scans->list);
     *scans = (struct spl_scans){0};
 }
@@ -259,51 +280,21 @@ static void compare_attributes(const struct saying *s)
     }
 }
 
-static void name_system(const struct spl_cloud_coordinates *c, char text[96])
+/* The first scan whose coordinates have a step against each other one; one sentence is enough. */
+static void compare_steps(const struct saying *s)
 {
-    if (c->epsg)
-        snprintf(text, 96, "EPSG %u", c->epsg);
-    else
-        snprintf(text, 96, "%s", c->name);
-}
-
-/* The first scan that says something against each other one; one sentence a kind is enough. */
-static void compare_systems(const struct saying *s)
-{
-    const struct spl_scan *of[3] = {NULL};
-    bool said[3] = {false};
+    const struct spl_scan *of = NULL;
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
-        const struct spl_cloud_coordinates *c = &scan->coordinates, *f;
-        bool says[3] = {c->epsg || c->name[0], c->unit_m > 0, c->step[0] > 0};
-        for (int k = 0; k < 3; k++)
-            of[k] = of[k] || !says[k] ? of[k] : scan;
-        if (says[0] && !said[0]) {
-            f = &of[0]->coordinates;
-            /* a number and a name may mean the same */
-            if ((f->epsg && c->epsg && f->epsg != c->epsg) || (f->name[0] && c->name[0] && strcmp(f->name, c->name))) {
-                char a[96], b[96];
-                name_system(f, a);
-                name_system(c, b);
-                say(s,
-                    "%s and %s name different coordinate systems (%s, %s): nothing was converted. Bring all scans into "
-                    "one system first",
-                    of[0]->name, scan->name, a, b);
-                said[0] = true;
-            }
-        }
-        if (says[1] && !said[1] && fabs(of[1]->coordinates.unit_m / c->unit_m - 1) > 1e-9) {
-            say(s, "a unit of %s is %.9g m, of %s %.9g m: nothing was converted. Bring all scans into one unit first",
-                of[1]->name, of[1]->coordinates.unit_m, scan->name, c->unit_m);
-            said[1] = true;
-        }
-        for (int k = 0; k < 3 && says[2] && !said[2]; k++) {
-            double ratio = c->step[k] / of[2]->coordinates.step[k];
+        const double *step = scan->coordinates.step;
+        of = of || !(step[0] > 0) ? of : scan;
+        for (int k = 0; k < 3 && step[0] > 0; k++) {
+            double ratio = step[k] / of->coordinates.step[k];
             if (!(ratio >= like_steps) && !(ratio <= 1 / like_steps))
                 continue;
             say(s, "coordinates of %s are multiples of %g, of %s of %g: the coarser scan is no finer than that",
-                of[2]->name, of[2]->coordinates.step[k], scan->name, c->step[k]);
-            said[2] = true;
+                of->name, of->coordinates.step[k], scan->name, step[k]);
+            return;
         }
     }
 }
@@ -333,7 +324,7 @@ static void look_at_floats(const struct saying *s)
         double largest = 0;
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fmax(fabs(scan->min[k]), fabs(scan->max[k])));
-        if (!scan->coordinates.floats || !has_points(scan))
+        if (!scan->coordinates.floats || !has_points(scan) || !isfinite(largest))
             continue;
         double own = nextafterf((float)largest, INFINITY) - (float)largest;
         if (own <= float_step || own <= float_step_diagonals * diagonal(scan))
@@ -390,7 +381,7 @@ void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context
     compare_kinds(&saying);
     compare_ranges(&saying);
     compare_attributes(&saying);
-    compare_systems(&saying);
+    compare_steps(&saying);
     look_at_floats(&saying);
     compare_places(&saying);
 }

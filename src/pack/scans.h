@@ -9,6 +9,8 @@
 #include "pack/inputs.h"
 #include "pack/stage.h"
 
+#define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
+
 struct spl_scan {
     const char *path, *name;            /* borrowed; the name is the path's last part */
     const char *format, *named;         /* as of struct spl_cloud_info */
@@ -48,6 +50,10 @@ void spl_scans_remove(struct spl_scans *scans, size_t place);
 void spl_scans_share(struct spl_scans *scans);
 
 void spl_scans_finish(struct spl_scans *scans);
+
+/* Takes a batch into the scan's box; its first point is number `first` of the scan. SPL_E_INPUT for a coordinate beyond
+ * SPL_COORDINATE_MAX. */
+int spl_scan_grow(struct spl_scan *scan, const struct spl_point_batch *batch, uint64_t first, struct spl_error *err);
 
 /* Hands out what a user may not know and would see: scans that disagree in colours, attributes or coordinates, that
  * hold no point, or lie far from the others. Says what was done and how to avoid it. For after reading. */

@@ -87,7 +87,8 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
         return false;
     for (size_t i = begin; i < end; i++) {
         struct spl_component *c = &block->components[o->label[i - begin]];
-        c->up += s->points->normal[i][2];
+        for (int k = 0; k < 3; k++)
+            c->up += s->points->up[k] * s->points->normal[i][k];
         c->anchored |= o->anchored[i - begin];
         s->label[i] = o->label[i - begin];
     }
@@ -250,7 +251,8 @@ static void lone_point(struct spl_points *p)
     p->radius[0] = lone_radius;
     p->uncertainty[0] = lone_radius;
     if (p->normal[0][0] == 0 && p->normal[0][1] == 0 && p->normal[0][2] == 0)
-        p->normal[0][2] = 1;
+        for (int c = 0; c < 3; c++)
+            p->normal[0][c] = (float)p->up[c];
 }
 
 int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines, struct spl_stage *stage,

@@ -1,10 +1,12 @@
-/* The default view, from an even sample of the sorted points. z is up. */
+/* The default view, from an even sample of the sorted points. */
 #include "pack/view.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
+#include "pack/up.h"
 
 enum { sample_max = 100000, sectors = 36, sector_width = 3 }; /* a view spans 2 * width + 1 sectors of 10 degrees */
 
@@ -17,6 +19,18 @@ static int compare_doubles(const void *a, const void *b)
 static size_t sample_of(const struct spl_points *p)
 {
     return p->count < sample_max ? p->count : sample_max;
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Out of the frame whose third axis is up. */
+static void to_world(double frame[3][3], const double local[3], double world[3])
+{
+    for (int c = 0; c < 3; c++)
+        world[c] = frame[0][c] * local[0] + frame[1][c] * local[1] + frame[2][c] * local[2];
 }
 
 /* A station whose points all lie around its z axis is a camera: x right, y down, z forward. A scanner stands upright,
@@ -43,16 +57,19 @@ static bool view_from_camera(const struct spl_points *p, struct spl_default_view
     if (!seen || (double)ahead < 0.95 * (double)seen)
         return false;
     depth /= (double)seen;
+    /* what somebody knows of up, unless the camera looks there */
+    const double forward[3] = {pose[2], pose[6], pose[10]};
+    bool told = p->up[2] != 1 && fabs(dot(p->up, forward)) < 0.9 * sqrt(dot(forward, forward));
     for (int c = 0; c < 3; c++) {
         view->eye[c] = pose[4 * c + 3];
         view->target[c] = view->eye[c] + depth * pose[4 * c + 2];
-        view->up[c] = -pose[4 * c + 1];
+        view->up[c] = told ? p->up[c] : -pose[4 * c + 1];
     }
     view->fov = 60;
     return true;
 }
 
-static void view_from_station(const struct spl_points *p, struct spl_default_view *view)
+static void view_from_station(const struct spl_points *p, double frame[3][3], struct spl_default_view *view)
 {
     const double *pose = p->stations[0];
     const double eye[3] = {pose[3], pose[7], pose[11]};
@@ -60,7 +77,8 @@ static void view_from_station(const struct spl_points *p, struct spl_default_vie
     size_t sample = sample_of(p);
     for (size_t s = 0; s < sample; s++) {
         size_t i = s * p->count / sample;
-        double d[3] = {p->axis[0][i] - eye[0], p->axis[1][i] - eye[1], p->axis[2][i] - eye[2]};
+        double arm[3] = {p->axis[0][i] - eye[0], p->axis[1][i] - eye[1], p->axis[2][i] - eye[2]};
+        double d[3] = {dot(frame[0], arm), dot(frame[1], arm), dot(frame[2], arm)};
         double range = sqrt(d[0] * d[0] + d[1] * d[1]);
         if (range == 0)
             continue;
@@ -87,43 +105,50 @@ static void view_from_station(const struct spl_points *p, struct spl_default_vie
         }
     }
     double angle = (direction + 0.5) / sectors * 2 * M_PI - M_PI;
-    *view = (struct spl_default_view){
-        {eye[0], eye[1], eye[2]},
-        {eye[0] + distance * cos(angle), eye[1] + distance * sin(angle), eye[2] + distance * slope},
-        {0, 0, 1},
-        75};
+    double arm[3];
+    to_world(frame, (double[]){distance * cos(angle), distance * sin(angle), distance * slope}, arm);
+    *view = (struct spl_default_view){.fov = 75};
+    for (int c = 0; c < 3; c++) {
+        view->eye[c] = eye[c];
+        view->target[c] = eye[c] + arm[c];
+        view->up[c] = p->up[c];
+    }
 }
 
 int spl_default_view_find(const struct spl_points *p, struct spl_default_view *view, struct spl_error *err)
 {
+    double frame[3][3];
+    spl_up_get_frame(p->up, frame);
     if (p->station_count && p->station[0] != SPL_NO_STATION) {
         if (!view_from_camera(p, view))
-            view_from_station(p, view);
+            view_from_station(p, frame, view);
         return 0;
     }
     size_t sample = sample_of(p);
-    double *values = spl_alloc_raw(sample, sizeof *values, err), half[3], diagonal = 0;
+    double *values = spl_alloc_raw(sample, sizeof *values, err), middle[3], half[3], diagonal = 0;
     if (!values)
         return SPL_E_NOMEM;
     for (int c = 0; c < 3; c++) {
-        for (size_t s = 0; s < sample; s++)
-            values[s] = p->axis[c][s * p->count / sample];
+        for (size_t s = 0; s < sample; s++) {
+            size_t i = s * p->count / sample;
+            values[s] = dot(frame[c], (double[]){p->axis[0][i], p->axis[1][i], p->axis[2][i]});
+        }
         qsort(values, sample, sizeof *values, compare_doubles);
         double low = values[sample / 100], high = values[sample - 1 - sample / 100];
-        view->target[c] = 0.5 * (low + high);
+        middle[c] = 0.5 * (low + high);
         half[c] = 0.5 * (high - low);
         diagonal += half[c] * half[c];
     }
     free(values);
     /* From the long side, a third above it: what is flat shows its top, what stands shows its front. */
     static const double direction[3] = {-0.45, -0.75, 0.48};
-    double reach = fmax(sqrt(diagonal), 10 * p->radius[p->count / 2]);
+    double reach = fmax(sqrt(diagonal), 10 * p->radius[p->count / 2]), eye[3];
     bool turned = half[1] > half[0];
+    for (int c = 0; c < 3; c++)
+        eye[c] = middle[c] + 1.8 * reach * direction[turned && c < 2 ? 1 - c : c];
+    to_world(frame, middle, view->target);
+    to_world(frame, eye, view->eye);
+    memcpy(view->up, p->up, sizeof view->up);
     view->fov = 45;
-    for (int c = 0; c < 3; c++) {
-        double along = direction[turned && c < 2 ? 1 - c : c];
-        view->eye[c] = view->target[c] + 1.8 * reach * along;
-        view->up[c] = c == 2;
-    }
     return 0;
 }

@@ -19,7 +19,7 @@ static inline double uniform(uint64_t *state)
 /* A gathered cloud of `count` points without colours: arrays as spl_points_gather() leaves them. */
 static inline struct spl_points cloud_of(const double (*position)[3], size_t count)
 {
-    struct spl_points p = {.count = count, .capacity = count, .points_read = count};
+    struct spl_points p = {.count = count, .capacity = count, .points_read = count, .up = {0, 0, 1}};
     for (int c = 0; c < 3; c++) {
         p.axis[c] = malloc((count + SPL_POINTS_PAD) * sizeof(double));
         for (size_t i = 0; i < count; i++)

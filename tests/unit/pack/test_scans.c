@@ -283,28 +283,113 @@ static void test_attributes_and_places(void **state)
         strstr(pack_two(path_of("a.ply"), path_of("some.las"), false, NULL), "classes are given in 1 (some.las)"));
 }
 
+/* What comes of `a` and `b` (may be NULL): *code, META's "UNIT | CRS", and what was said, or why it was refused. */
+static const char *pack_in(const struct las *a, const struct las *b, const char *unit, const char *crs, int *code,
+                           char meta[512])
+{
+    const char *inputs[2] = {write_las("a.las", a), b ? write_las("b.las", b) : NULL}, *output = path_of("out.spld");
+    struct spl_pack_options options = {.size = sizeof options,
+                                       .inputs = inputs,
+                                       .input_count = b ? 2 : 1,
+                                       .output = output,
+                                       .threads = 1,
+                                       .warn = listen,
+                                       .unit = unit,
+                                       .crs = crs};
+    struct spl_error err = {0};
+    struct spl_dataset *dataset;
+    said[0] = 0;
+    remove(output);
+    if ((*code = spl_pack(&options, NULL, &err))) {
+        assert_int_not_equal(access(output, F_OK), 0);
+        snprintf(meta, 512, "-");
+        snprintf(said, sizeof said, "%s", err.message);
+        return said;
+    }
+    if (spl_dataset_open(output, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    const char *kept = json_string_value(json_object_get(spl_dataset_get_meta(dataset), "crs"));
+    snprintf(meta, 512, "%s | %s", spl_dataset_get_info(dataset)->unit, kept ? kept : "null");
+    spl_dataset_close(dataset);
+    return said;
+}
+
+#define GRID 0.001
+#define REST 2, 100
+
 static void test_coordinate_systems(void **state)
 {
     (void)state;
-    static const struct {
-        struct las a, b;
-        const char *said; /* NULL: nothing */
+    static const char *degrees = "GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174],AUTHORITY[\"EPSG\",\"4326\"]]",
+                      *here = "PROJCS[\"Here\",UNIT[\"metre\",1]]", *there = "PROJCS[\"There\",UNIT[\"metre\",1]]",
+                      *nameless = "PROJCS[\"unnamed\",UNIT[\"metre\",1]]", *mixed = "COMPD_CS[\"C\",PROJCS[\"P\","
+                      "UNIT[\"metre\",1]],VERT_CS[\"V\",UNIT[\"foot\",0.3048]]]",
+                      *alike = "COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"foot\",0.3048]],VERT_CS[\"V\","
+                               "UNIT[\"US survey foot\",0.304800609601219]]]";
+    const struct {
+        struct las a, b; /* b.scale 0: no such file */
+        const char *unit, *crs, *meta, *said; /* meta "-": refused; said NULL: nothing */
     } rows[] = {
-        {{0.001, 25832, 9001, NULL, 2, 100}, {0.001, 25832, 9001, NULL, 2, 100}, NULL},
-        {{0.001, 25832, 0, NULL, 2, 100}, {0.001, 25833, 0, NULL, 2, 100}, "(EPSG 25832, EPSG 25833): nothing was"},
-        {{0.001, 0, 9001, NULL, 2, 100}, {0.001, 0, 9003, NULL, 2, 100}, "of b.las 0.30480061 m"},
-        {{0.001, 0, 0, "PROJCS[\"Here\",GEOGCS[]]", 2, 100},
-         {0.001, 0, 0, "PROJCS[\"There\",GEOGCS[]]", 2, 100},
-         "(Here, There)"},
-        {{0.001, 25832, 0, NULL, 2, 100}, {0.001, 0, 0, "PROJCS[\"ETRS89 / UTM 32N\"]", 2, 100}, NULL},
-        {{0.001, 0, 0, NULL, 2, 100}, {0.001, 25832, 0, NULL, 2, 100}, NULL},
-        {{0.001, 0, 0, "PROJCS[\"no end", 2, 100}, {0.001, 0, 0, "nothing", 2, 100}, NULL},
-        {{0.001, 0, 0, NULL, 2, 100}, {0.01, 0, 0, NULL, 2, 100}, "multiples of 0.001, of b.las of 0.01"},
+        {{GRID, 0, 0, NULL, REST}, {0}, NULL, NULL, "unknown | null", NULL},
+        {{GRID, 25832, 9001, NULL, REST}, {GRID, 25832, 9001, NULL, REST}, NULL, NULL, "m | EPSG:25832", NULL},
+        {{GRID, 2994, 0, NULL, REST}, {0}, NULL, NULL, "ft | EPSG:2994", NULL},
+        {{GRID, 0, 9003, NULL, REST}, {0}, NULL, NULL, "us-ft | null", NULL},
+        {{GRID, 0, 9098, NULL, REST}, {0}, NULL, NULL, "0.201168 m | null", NULL},
+        {{GRID, 0, 0, here, REST}, {GRID, 0, 0, here, REST}, NULL, NULL, "m | PROJCS[\"Here\",UNIT[\"metre\",1]]", NULL},
+        /* different ones */
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 25833, 0, NULL, REST}, NULL, NULL, "-",
+         "a.las and /tmp/splatd"},
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 25833, 0, NULL, REST}, NULL, NULL, "-",
+         "b.las are in different coordinate systems (EPSG:25832, EPSG:25833)"},
+        {{GRID, 0, 0, here, REST}, {GRID, 0, 0, there, REST}, NULL, NULL, "-", "(Here, There)"},
+        {{GRID, 0, 9001, NULL, REST}, {GRID, 0, 9002, NULL, REST}, NULL, NULL, "-", "a.las is in m, "},
+        {{GRID, 0, 9002, NULL, REST}, {GRID, 0, 9003, NULL, REST}, NULL, NULL, "-", "b.las in us-ft"},
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 0, 0, degrees, REST}, NULL, NULL, "-", "(EPSG:25832, EPSG:4326)"},
+        /* overruled */
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 25833, 0, NULL, REST}, NULL, "EPSG:25833", "m | EPSG:25833", NULL},
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 25833, 0, NULL, REST}, NULL, "none", "m | null", NULL},
+        {{GRID, 0, 9001, NULL, REST}, {GRID, 0, 9002, NULL, REST}, "ft", NULL, "ft | null",
+         "a.las says that it is in m: taken as ft, as --unit says"},
+        {{GRID, 0, 9001, NULL, REST}, {GRID, 0, 9002, NULL, REST}, NULL, "none", "-", "a.las is in m, "},
+        {{GRID, 25832, 0, NULL, REST}, {0}, "unknown", NULL, "unknown | EPSG:25832", NULL},
+        {{GRID, 0, 9001, NULL, REST}, {0}, NULL, "EPSG:2994", "ft | EPSG:2994",
+         "a.las says that it is in m: taken as ft, as --crs says"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", "EPSG:25832+EPSG:7837", "0.2 m | EPSG:25832+EPSG:7837", NULL},
+        /* what users get wrong */
+        {{GRID, 0, 0, NULL, REST}, {0}, "metre", NULL, "-", "--unit takes m, ft, us-ft"},
+        {{GRID, 0, 0, NULL, REST}, {0}, NULL, "25832", "-", "--crs takes EPSG and a number"},
+        {{GRID, 0, 0, NULL, REST}, {0}, NULL, "EPSG:4326", "-", "--crs EPSG:4326: longitudes"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "unknown", "EPSG:4326", "unknown | EPSG:4326", NULL},
+        /* angles, and heights of their own */
+        {{GRID, 0, 0, degrees, REST}, {0}, NULL, NULL, "-", "longitude and latitude (EPSG:4326)"},
+        {{GRID, 0, 0, degrees, REST}, {0}, "unknown", NULL, "unknown | EPSG:4326", NULL},
+        {{GRID, 0, 0, degrees, REST}, {0}, NULL, "none", "-", "longitude and latitude"},
+        {{GRID, 0, 0, degrees, REST}, {0}, NULL, "EPSG:25832", "m | EPSG:25832", NULL},
+        {{GRID, 0, 0, mixed, REST}, {0}, NULL, NULL, "-", "x and y are in m, heights in ft: bring"},
+        {{GRID, 0, 0, mixed, REST}, {0}, "m", "none", "m | null", NULL},
+        {{GRID, 0, 0, alike, REST}, {0}, NULL, "none", "ft | null", "differ in the sixth digit: taken as ft"},
+        /* not said beside said */
+        {{GRID, 0, 0, NULL, REST}, {GRID, 25832, 0, NULL, REST}, NULL, NULL, "m | EPSG:25832",
+         "a.las does not say its coordinate system: taken as that of b.las, EPSG:25832"},
+        {{GRID, 0, 9002, NULL, REST}, {GRID, 0, 0, NULL, REST}, NULL, NULL, "ft | null",
+         "b.las does not say its unit: taken as that of a.las, ft"},
+        {{GRID, 0, 0, "PROJCS[\"no end", REST}, {GRID, 0, 0, "nothing", REST}, NULL, NULL, "unknown | null", NULL},
+        /* cannot be told */
+        {{GRID, 25832, 0, NULL, REST}, {GRID, 0, 0, here, REST}, NULL, NULL, "m | EPSG:25832",
+         "a.las and b.las name their coordinate systems in ways that cannot be compared (EPSG:25832, Here)"},
+        {{GRID, 0, 0, here, REST}, {GRID, 0, 0, nameless, REST}, NULL, NULL,
+         "m | PROJCS[\"Here\",UNIT[\"metre\",1]]", "cannot be compared"},
+        {{GRID, 0, 0, NULL, REST}, {0.01, 0, 0, NULL, REST}, NULL, NULL, "unknown | null",
+         "multiples of 0.001, of b.las of 0.01"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const char *text = pack_two(write_las("a.las", &rows[i].a), write_las("b.las", &rows[i].b), false, NULL);
-        if (rows[i].said ? !strstr(text, rows[i].said) : *text)
-            fail_msg("row %zu: %s", i, text);
+        char meta[512];
+        int code;
+        const char *text =
+            pack_in(&rows[i].a, rows[i].b.scale > 0 ? &rows[i].b : NULL, rows[i].unit, rows[i].crs, &code, meta);
+        if (strcmp(meta, rows[i].meta) != 0 || (rows[i].said ? !strstr(text, rows[i].said) : *text))
+            fail_msg("row %zu: %s: %s", i, meta, text);
+        assert_true(!code || code == SPL_E_INPUT || code == SPL_E_USAGE);
     }
 }
 

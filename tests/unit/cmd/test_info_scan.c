@@ -1,0 +1,231 @@
+/* splatd info of scans, as people and scripts meet it. */
+#include "../cloud/las_bytes.h"
+#include "support/e57_writer.h"
+
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <jansson.h>
+
+static char folder[256] = "/tmp/splatd-info-XXXXXX";
+
+/* Runs `splatd COMMAND` in the folder; returns the exit code, what was printed in `output`. */
+static int run(const char *command, char *output, size_t size)
+{
+    char line[1024];
+    snprintf(line, sizeof line, "cd '%s' && '%s' %s", folder, getenv("SPLATD_BINARY"), command);
+    FILE *pipe = popen(line, "r");
+    size_t used = fread(output, 1, size - 1, pipe);
+    output[used] = 0;
+    return WEXITSTATUS(pclose(pipe));
+}
+
+static void write_file(const char *name, const void *bytes, size_t length)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, length, f), length);
+    fclose(f);
+}
+
+static void write_text(const char *name, const char *text)
+{
+    write_file(name, text, strlen(text));
+}
+
+/* LAS whose header says nothing true of its bounds. */
+static void write_las(const char *name)
+{
+    static struct bytes b;
+    struct las las = las_default(4, 7, 0, 50);
+    las_build(&b, &las);
+    for (unsigned k = 0; k < 3; k++) {
+        las_set_double(&b, 179 + 16 * k, 1000 + k);
+        las_set_double(&b, 187 + 16 * k, 900 + k);
+    }
+    write_file(name, b.data, b.length);
+}
+
+static const char ply[] =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double "
+    "z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float nx\nproperty "
+    "float ny\nproperty float nz\nproperty float heat\nend_header\n"
+    "1 2 3 9 9 9 0 0 1 5\nnan 0 0 9 9 9 0 0 1 5\n-4 2.5 7 9 9 9 0 0 1 5\n";
+
+static json_t *json_of(const char *arguments)
+{
+    char output[16384], command[512];
+    snprintf(command, sizeof command, "info --json %s", arguments);
+    assert_int_equal(run(command, output, sizeof output), 0);
+    json_t *json = json_loads(output, 0, NULL);
+    assert_non_null(json);
+    return json;
+}
+
+static bool is(const json_t *json, const char *key, const char *text)
+{
+    char *value = json_dumps(json_object_get(json, key), JSON_ENCODE_ANY | JSON_COMPACT);
+    bool same = value && !strcmp(value, text);
+    if (!same)
+        print_message("%s: %s\n", key, value ? value : "missing");
+    free(value);
+    return same;
+}
+
+static void test_json(void **state)
+{
+    (void)state;
+    write_text("a.ply", ply);
+    json_t *json = json_of("a.ply");
+    assert_true(is(json, "scan", "\"a.ply\"") && is(json, "format", "\"PLY\"") &&
+                is(json, "version", "\"1.0, ASCII\""));
+    assert_true(is(json, "points", "2") && is(json, "points_skipped", "1") && is(json, "ending_of", "null"));
+    assert_true(is(json, "attributes", "[\"color\",\"normal\"]") && is(json, "stations", "0"));
+    assert_true(is(json, "bounds", "{\"min\":[-4.0,2.0,3.0],\"max\":[1.0,2.5,7.0]}"));
+    assert_true(is(json, "color_from", "{\"rgb\":2}") && is(json, "unit", "\"unknown\"") && is(json, "crs", "null"));
+    assert_non_null(strstr(json_string_value(json_object_get(json, "fields")), "heat"));
+    const json_t *pack = json_object_get(json, "pack");
+    assert_true(json_integer_value(json_object_get(pack, "memory_bytes")) >= 30000000);
+    assert_true(is(pack, "warnings", "[]"));
+    json_decref(json);
+    /* of the header alone a PLY has a count and no bounds */
+    json = json_of("--no-verify a.ply");
+    assert_true(is(json, "points", "3") && is(json, "bounds", "null") && is(json, "points_skipped", "null"));
+    assert_true(is(json, "color_from", "[\"rgb\"]") && json_is_false(json_object_get(json, "read")));
+    json_decref(json);
+}
+
+static void test_headers_that_lie(void **state)
+{
+    char output[16384];
+    (void)state;
+    write_las("b.laz");
+    json_t *json = json_of("--no-verify b.laz"), *read = json_of("b.laz");
+    assert_true(is(json, "format", "\"LAS\"") && is(json, "version", "\"1.4, point format 7\""));
+    assert_true(is(json, "ending_of", "\"LAZ\"") && is(json, "points", "50"));
+    assert_true(is(json, "bounds", "{\"min\":[900.0,901.0,902.0],\"max\":[1000.0,1001.0,1002.0]}"));
+    assert_true(is(read, "header_bounds", "{\"min\":[900.0,901.0,902.0],\"max\":[1000.0,1001.0,1002.0]}"));
+    assert_null(json_object_get(json, "header_bounds"));
+    assert_false(json_equal(json_object_get(read, "bounds"), json_object_get(json, "bounds")));
+    assert_int_equal(json_array_size(json_object_get(json_object_get(read, "pack"), "warnings")), 1);
+    json_decref(json);
+    json_decref(read);
+    assert_int_equal(run("info b.laz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "b.laz  LAS 1.4, point format 7, "));
+    assert_non_null(strstr(output, "  ending        of LAZ, which it is not\n"));
+    assert_non_null(strstr(output, "the header says 900 901 902 to 1000 1001 1002\n"));
+    assert_non_null(strstr(output, "b.laz holds LAS"));
+    assert_int_equal(run("info --no-verify b.laz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "  points        50 as the header says\n"));
+}
+
+static void test_several(void **state)
+{
+    char output[32768];
+    (void)state;
+    write_text("c.xyz", "100 0 0 9\n100 5 0 200\n");
+    write_text("d.pts", "7 7\n");
+    write_text("e.ply",
+               "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double "
+               "z\nend_header\n1 2 3\n1 2 what\n");
+    /* the broken are said, the others still told of */
+    assert_int_equal(run("info --json . @none 2>&1 >/dev/null", output, sizeof output), 2);
+    assert_non_null(strstr(output, "none: there is no such file with a list of scans"));
+    assert_int_equal(run("info --json . gone.las 2>said", output, sizeof output), 2);
+    char *last = strstr(output, "{\"scans\":");
+    assert_non_null(last);
+    json_t *json = json_loads(last, 0, NULL);
+    assert_true(is(json, "scans", "3") && is(json, "points", "54"));
+    assert_true(json_array_size(json_object_get(json_object_get(json, "pack"), "warnings")) > 1);
+    json_decref(json);
+    assert_null(strstr(output, "d.pts"));
+    assert_int_equal(run("info . gone.las 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "3 scans together\n  points        54\n"));
+    assert_non_null(strstr(output, "splatd: gone.las: there is no such file\n"));
+    assert_non_null(strstr(output, "d.pts: line "));
+    assert_non_null(strstr(output, "e.ply: line 9: "));
+    assert_null(strstr(output, "none of the inputs"));
+    /* a dataset among them is told of first; nothing but what breaks */
+    assert_int_equal(run("pack a.ply -o a.spld 2>&1 && cd . && \"$SPLATD_BINARY\" info c.xyz a.spld --no-verify",
+                         output, sizeof output),
+                     0);
+    const char *dataset = strstr(output, "a  version "), *scan = strstr(output, "c.xyz  text, ");
+    assert_true(dataset && scan && dataset < scan);
+    assert_non_null(strstr(scan, "  points        not in the header\n"));
+    assert_int_equal(run("info e.ply gone.ply 2>&1", output, sizeof output), 2);
+    assert_null(strstr(output, "points  "));
+}
+
+static void test_options(void **state)
+{
+    char output[16384];
+    (void)state;
+    assert_int_equal(run("info c.xyz --columns x,y,z,class", output, sizeof output), 0);
+    assert_non_null(strstr(output, "  attributes    class\n"));
+    assert_int_equal(run("info c.xyz --columns x,y,z,class,r 2>&1", output, sizeof output), 2);
+    assert_int_equal(run("info c.xyz --dictionary atoms.png 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "--dictionary is the picture of a dataset; c.xyz is a scan"));
+    write_text("half.spld", "SPLD\r\nand no more");
+    write_text("named.spld", "1 2 3\n");
+    write_text("dataset", "SPLD\r\nand no more");
+    assert_int_equal(run("info half.spld named.spld dataset 2>&1", output, sizeof output), 2);
+    assert_null(strstr(output, "points"));
+    assert_null(strstr(output, "is packed already"));
+}
+
+static void test_images(void **state)
+{
+    static const double at[1] = {1};
+    const struct e57_field fields[] = {{.name = "cartesianX", .type = E57_DOUBLE, .values = at},
+                                       {.name = "cartesianY", .type = E57_DOUBLE, .values = at},
+                                       {.name = "cartesianZ", .type = E57_DOUBLE, .values = at}};
+    char output[16384];
+    struct e57_writer w;
+    size_t length;
+    (void)state;
+    e57_begin(&w);
+    e57_add_scan(&w, &(struct e57_scan){"scan", e57_pose(1, 0, 0, 0, 0, 0, 0), fields, 3, 1, 0});
+    e57_add_image(&w,
+                  "<name>east</name>%s<pinholeRepresentation><imageWidth>640</imageWidth><imageHeight>480</imageHeight>"
+                  "<jpegImage type=\"Blob\" fileOffset=\"48\" length=\"1234\"/></pinholeRepresentation>",
+                  e57_pose(1, 0, 0, 0, 0, 0, 0));
+    e57_add_image(&w, "<visualReferenceRepresentation/>");
+    uint8_t *file = e57_end(&w, NULL, &length);
+    write_file("images.e57", file, length);
+    free(file);
+    assert_int_equal(run("info images.e57", output, sizeof output), 0);
+    assert_non_null(strstr(output, "stations      1"));
+    assert_non_null(strstr(output, "images        pinhole, 640 x 480 JPEG, 1,234 bytes: east\n"));
+    assert_non_null(strstr(output, "visual reference, 0 x 0 without data, 0 bytes, no pose\n"));
+    json_t *json = json_of("images.e57"), *images = json_object_get(json, "images");
+    assert_int_equal(json_array_size(images), 2);
+    assert_string_equal(json_string_value(json_object_get(json_array_get(images, 0), "name")), "east");
+    assert_int_equal(json_integer_value(json_object_get(json_array_get(images, 0), "bytes")), 1234);
+    json_decref(json);
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) ? 0 : 1;
+}
+
+static int remove_folder(void **state)
+{
+    char command[300];
+    (void)state;
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_json),    cmocka_unit_test(test_headers_that_lie), cmocka_unit_test(test_several),
+        cmocka_unit_test(test_options), cmocka_unit_test(test_images),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
