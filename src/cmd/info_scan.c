@@ -284,9 +284,10 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
         printf("  stations      %u\n", info->station_count);
     for (uint32_t i = 0; i < info->image_count; i++) {
         const struct spl_cloud_image *image = &info->images[i];
-        printf("  %-14s%s, %s %.0f x %.0f, %s bytes%s: ", i ? "" : "images", image->kind,
-               image->coding[0] ? image->coding : "unknown coding", image->width, image->height,
-               spl_cmd_group(image->bytes, text), image->posed ? "" : ", without a pose");
+        printf("  %-14s%s, %.10g x %.10g %s, %s bytes%s", i ? "" : "images", image->kind, image->width, image->height,
+               image->coding[0] ? image->coding : "without data", spl_cmd_group(image->bytes, text),
+               image->posed ? "" : ", no pose");
+        printf("%s", image->name[0] ? ": " : "");
         spl_cmd_put_text(stdout, image->name, 0);
         putchar('\n');
     }

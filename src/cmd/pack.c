@@ -278,7 +278,7 @@ static const struct spl_cmd_table table = {
         "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
-        "Turns scans (PLY, LAS, LAZ, COPC, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
+        "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
         "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are "
         "kept once.\n"
         "IN is a scan, a folder (all scans in it and below, by the endings of their names) or @LIST, a text with a\n"
