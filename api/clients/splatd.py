@@ -58,6 +58,10 @@ class Dataset:
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
         return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
 
+    def place(self, crs, **point):
+        """A point both ways: give position=[longitude, latitude, height], in crs ("EPSG:4326"), or world=[x, y, z]."""
+        return json.loads(self.ask(f"{self.info['uri']}/place", {"crs": crs, **point})[0])
+
     def ask(self, path, params):
         """(bytes, headers): a `camera` only goes as JSON. What is None is left out."""
         given = {name: value for name, value in params.items() if value is not None}

@@ -6,7 +6,7 @@ import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
 import {toWorld} from "./place.js";
-import {Points, coordinates} from "./points.js";
+import {Points, coordinates, withUnit} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
@@ -108,7 +108,8 @@ async function open() {
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
-      `${thousands(dataset.points)} points, ${size} ${dataset.unit}, drawn by ${device.name.replace(/ \(.*/, "")}`;
+      `${thousands(dataset.points)} points, ${withUnit(size, dataset.unit)}, ` +
+      `drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
@@ -131,7 +132,9 @@ function showFrame({detail: frame}) {
   $("legend").hidden = !distances;
   const [near, far] = $("legend").querySelectorAll("span");
   if (distances)
-    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) => `${x.toFixed(x < 10 ? 2 : 1)} ${dataset.unit}`);
+    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) =>
+      withUnit(x.toFixed(x < 10 ? 2 : 1), dataset.unit),
+    );
   const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
   const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
   $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;

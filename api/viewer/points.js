@@ -16,7 +16,9 @@ function shape(name, attributes, text = "") {
 
 /** A length in the dataset's unit, as people read it. */
 export const lengthText = (x, unit) =>
-  unit === "m" && x < 1 ? `${(x * 1000).toFixed(1)} mm` : `${x < 1 ? x.toPrecision(4) : x.toFixed(3)} ${unit}`;
+  unit === "m" && x < 1 ? `${(x * 1000).toFixed(1)} mm` : withUnit(x < 1 ? x.toPrecision(4) : x.toFixed(3), unit);
+/** Units without a name are numbers of metres: "0.201168 m". */
+export const withUnit = (text, unit) => `${text} ${/^\d/.test(unit) ? "× " : ""}${unit}`;
 export const coordinates = (p) => p.map((x) => (Math.round(x * 1000) / 1000 + 0).toFixed(3)).join(", ");
 
 export class Points extends EventTarget {

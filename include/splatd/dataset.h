@@ -123,6 +123,12 @@ SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dat
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 
+/* Reads the value that splat `id` has in stream `stream` (of info.streams; less than 0: none): NaN where it is one of
+ * those that have no value. False (*value untouched) where there is no such splat, it is the vertex of a wire, the
+ * stream is of a type that this library does not know, or the file was cut short in place. Any thread; blocks on
+ * disk. */
+SPL_API bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
+
 SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */
 
 SPL_END_DECLARATIONS

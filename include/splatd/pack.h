@@ -95,9 +95,12 @@ struct spl_pack_options {
     /* Each input that cannot be read, and why: the dataset is made of the others, META names it. NULL: the first one
      * fails all. */
     void (*left_out)(void *context, const struct spl_error *why);
-    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them leaves
-     * those out. NULL = none of them. */
+    /* Fields of the scans to keep beside class, intensity and returns, as "gps_time,Amplitude"; "none" among them
+     * leaves those out. NULL = no others. */
     const char *keep;
+    /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others so many. A
+     * scan gives one point at least. 0 = all. */
+    uint64_t max_points;
     const char *unit;          /* of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say */
     const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
     double up[3];              /* what is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it */
@@ -121,13 +124,14 @@ struct spl_pack_report {
     double normal_error;       /* measured mean, degrees */
     double seconds;
     struct spl_photo_report photos;
+    uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
  * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
  * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
- * and about 30 MB, 80 bytes a point and 100 more for each point on a wire, a pole or a cable; photographs take
- * photos->memory_bytes beside them. `report` may be NULL. Any thread. */
+ * and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for each point on a wire, a pole
+ * or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 SPL_END_DECLARATIONS

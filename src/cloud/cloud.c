@@ -41,6 +41,34 @@ void spl_point_batch_finish(struct spl_point_batch *batch)
     *batch = (struct spl_point_batch){0};
 }
 
+/* Decides which points make the part that is wanted. Not before colours are known, which all points have a say in. */
+static int find_part(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct spl_cloud_info *info = &cloud->info;
+    uint64_t most = cloud->options->max_points, given = info->points_expected;
+    int code = SPL_OK;
+    if (most && (!given || cloud->sampling == SPL_SAMPLE_ALL)) /* a text's count is that of its first block */
+        given = cloud->options->points;
+    if (most && !given) {
+        while ((code = cloud->reader->rows(cloud, &cloud->rows, SPL_ROWS, err)) > 0)
+            given += cloud->rows.count;
+        if (code == SPL_OK)
+            code = cloud->reader->seek(cloud, 0, 1, err);
+        info->points_skipped = 0;
+    }
+    if (code < 0)
+        return code;
+    if (!info->points_total)
+        info->points_total = given;
+    info->points_expected = given;
+    if (!most || given <= most)
+        return SPL_OK;
+    cloud->part = info->points_expected = most;
+    cloud->part_of = given;
+    cloud->part_sum = given - most;
+    return SPL_OK;
+}
+
 int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
                    struct spl_error *err)
 {
@@ -65,6 +93,8 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
     code = cloud->reader->open(cloud, err);
     if (code == SPL_OK)
         code = spl_cloud_find_colors(cloud, err);
+    if (code == SPL_OK)
+        code = find_part(cloud, err);
     if (code < 0)
         goto fail;
     cloud->info.named = spl_cloud_find_wrong_ending(path, cloud->reader, cloud->info.format);
@@ -123,6 +153,28 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud)
     return spl_source_tell(&cloud->source);
 }
 
+/* Of the points from `from` on, leaves those that belong to the part, as even as whole numbers can be. */
+static void thin(struct spl_cloud *cloud, struct spl_point_batch *batch, size_t from)
+{
+    size_t to = from;
+    for (size_t i = from; i < batch->count; i++) {
+        cloud->part_sum += cloud->part;
+        if (cloud->part_sum < cloud->part_of)
+            continue;
+        cloud->part_sum -= cloud->part_of;
+        memcpy(batch->position[to], batch->position[i], sizeof batch->position[i]);
+        memcpy(batch->color[to], batch->color[i], sizeof batch->color[i]);
+        memcpy(batch->normal[to], batch->normal[i], sizeof batch->normal[i]);
+        batch->classification[to] = batch->classification[i];
+        batch->station[to] = batch->station[i];
+        for (int s = 0; s < SPL_SCALAR_COUNT; s++)
+            if (cloud->info.scalars >> s & 1)
+                batch->scalar[s][to] = batch->scalar[s][i];
+        to++;
+    }
+    batch->count = to;
+}
+
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err)
 {
     batch->count = 0;
@@ -136,6 +188,8 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
             break;
         if (code < 0)
             return code;
+        if (cloud->part)
+            thin(cloud, batch, before);
         cloud->row += cloud->rows.count;
         cloud->info.points_from[cloud->info.colors.from] += batch->count - before;
     }

@@ -54,13 +54,16 @@ struct spl_cloud_options {
     bool intensity;      /* grey from intensity where there is one, whatever colours there are */
     const struct spl_cloud_colors *colors; /* what an earlier open found, or that of several files; NULL = find out */
     const struct spl_keep *keep;           /* NULL = class, intensity and returns where there are any */
+    uint64_t max_points;                   /* an even part: of COPC whole levels, of others so many; 0 = all */
+    uint64_t points; /* info.points_total of an earlier open; 0 = find out, which may take a pass over the file */
 };
 
 struct spl_cloud_info {
-    const char *format;       /* static: "PLY", "LAS", "LAZ", "PCD", "PTX", "PTS", "text" */
+    const char *format;       /* static: "PLY", "LAS", "LAZ", "E57", "PCD", "PTX", "PTS", "text" */
     const char *named;        /* static: the format that the name's ending is of, where it is another; else NULL */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
+    uint64_t points_total;    /* with those that max_points leaves out; 0 = unknown, never where it is set */
     uint64_t file_bytes;
     uint32_t station_count;         /* grows while a PTX is read; final at the end */
     double (*stations)[16];         /* row-major station-to-world; borrowed until the next read or destroy */
@@ -95,7 +98,7 @@ bool spl_cloud_is_named_scan(const char *path);
 /* These endings, ".ply, .las, …", into `text`, cut to `size`. */
 void spl_cloud_list_endings(char *text, size_t size);
 
-/* Opens and checks the header. E57 gives SPL_E_UNSUPPORTED, everything malformed SPL_E_INPUT with file,
+/* Opens and checks the header. Everything malformed gives SPL_E_INPUT with file,
  * offset or line, field and reason. On success the caller owns *out. `options` may be NULL. */
 int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
                    struct spl_error *err);

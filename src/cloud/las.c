@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "cloud/copc.h"
 #include "cloud/las_fields.h"
 #include "cloud/laz/stream.h"
 
@@ -155,6 +156,7 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     uint64_t legacy = get32(h + 107), large = minor >= 4 ? get64(h + 247) : 0;
     las->count = large ? large : legacy;
     las->start = points_at;
+    cloud->info.points_total = las->count;
     struct spl_las_record records = {.at = header_bytes, .end = points_at, .count = vlrs};
     struct spl_laz_format format;
     bool compressed;
@@ -179,6 +181,9 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
     cloud->info.format = compressed ? "LAZ" : "LAS";
     if (compressed && (code = spl_laz_stream_open(&las->stream, source, &format, points_at, las->count, 0, err)) < 0)
+        return code;
+    if (compressed &&
+        (code = spl_copc_take_levels(cloud, records, las->stream, cloud->options->max_points, &las->count, err)) < 0)
         return code;
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;

@@ -42,11 +42,13 @@ struct spl_cloud {
     char fields[400]; /* see info.fields */
     bool fields_cut;  /* there are more */
     struct spl_color_rule color;
-    uint64_t row; /* index of the next row */
+    uint64_t row;                     /* index of the next row */
+    uint64_t part, part_of, part_sum; /* so many of so many points are given, 0 = all; the sum decides on the next */
     struct spl_rows rows;
 };
 
-extern const struct spl_cloud_reader spl_ply_reader, spl_las_reader, spl_pcd_reader, spl_ptx_reader, spl_text_reader;
+extern const struct spl_cloud_reader spl_e57_reader, spl_las_reader, spl_pcd_reader, spl_ply_reader, spl_ptx_reader,
+    spl_text_reader;
 
 /* The reader that the first bytes of a file ask for; says so to the source where lines end with '\r' alone. */
 int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_reader **reader, struct spl_error *err);

@@ -28,6 +28,11 @@ static bool is_las(const uint8_t *bytes, size_t available)
     return begins_with(bytes, available, "LASF");
 }
 
+static bool is_e57(const uint8_t *bytes, size_t available)
+{
+    return begins_with(bytes, available, "ASTM-E57");
+}
+
 static bool is_pcd(const uint8_t *bytes, size_t available)
 {
     return spl_pcd_is_header((const char *)bytes, available);
@@ -62,17 +67,14 @@ static const struct {
     const struct spl_cloud_reader *reader;
     bool (*is)(const uint8_t *bytes, size_t available);
 } readers[] = {
-    {&spl_ply_reader, is_ply},
-    {&spl_las_reader, is_las},
-    {&spl_pcd_reader, is_pcd},
-    {&spl_ptx_reader, is_ptx},
-    {&spl_text_reader, is_text},
+    {&spl_ply_reader, is_ply}, {&spl_las_reader, is_las}, {&spl_e57_reader, is_e57},
+    {&spl_pcd_reader, is_pcd}, {&spl_ptx_reader, is_ptx}, {&spl_text_reader, is_text},
 };
 
 /* What scans are called. Of formats that one reader has, `formats` has those that the ending is right for. */
 static const struct ending {
     const char *ending;
-    const struct spl_cloud_reader *reader; // may be NULL: none yet
+    const struct spl_cloud_reader *reader;
     const char *format;                    /* for people */
     const char *formats;                   // may be NULL: all of the reader
     bool loose;                            /* other things are called so too: no folder is searched for it */
@@ -80,7 +82,7 @@ static const struct ending {
     {"ply", &spl_ply_reader, "PLY", NULL, false},
     {"las", &spl_las_reader, "LAS", "LAS", false},
     {"laz", &spl_las_reader, "LAZ", "LAZ COPC", false},
-    {"e57", NULL, "E57", NULL, false},
+    {"e57", &spl_e57_reader, "E57", NULL, false},
     {"pcd", &spl_pcd_reader, "PCD", NULL, false},
     {"ptx", &spl_ptx_reader, "PTX", NULL, false},
     {"pts", &spl_text_reader, "PTS", NULL, false},
@@ -136,15 +138,12 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
             source, SPL_E_INPUT, "", err,
             "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
             "is; pack takes the scans that it was made of");
-    if (begins_with(bytes, available, "ASTM-E57"))
-        return spl_source_fail(source, SPL_E_UNSUPPORTED, "", err,
-                               "is E57, which is not supported yet: convert it first, with \"pdal translate IN.e57 "
-                               "OUT.las\" or CloudCompare");
     while (found < sizeof readers / sizeof *readers && !readers[found].is(bytes, available))
         found++;
     if (found == sizeof readers / sizeof *readers)
-        return spl_source_fail(source, SPL_E_INPUT, "", err,
-                               "is no point cloud known here (PLY, LAS, LAZ, PCD, PTX, PTS, or UTF-8 text with columns)");
+        return spl_source_fail(
+            source, SPL_E_INPUT, "", err,
+            "is no point cloud known here (PLY, LAS, LAZ, E57, PCD, PTX, PTS, or UTF-8 text with columns)");
     *reader = readers[found].reader;
     if ((*reader)->text && !memchr(bytes, '\n', available) && memchr(bytes, '\r', available))
         source->newline = '\r';

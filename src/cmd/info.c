@@ -120,20 +120,23 @@ static void print_colors(const json_t *colors, uint64_t kept)
     }
 }
 
-/* ", name (unit, where it comes from)" */
-static void print_stream(const struct spl_stream_info *stream)
+/* ", name (unit, in what steps, where it comes from)" */
+static void print_stream(const struct spl_stream *stream)
 {
     const char *about = NULL, *unit = stream->unit;
+    char steps[48] = "";
+    if (stream->steps_a_unit > 0)
+        snprintf(steps, sizeof steps, "%sin steps of %.3g", *unit ? ", " : "", 1 / stream->steps_a_unit);
     for (int k = 0; k < SPL_STREAM_KNOWN_COUNT; k++)
         if (!strcmp(spl_streams_known[k].name, stream->name))
             about = spl_streams_known[k].about;
     printf(", ");
     spl_cmd_put_text(stdout, stream->name, 0);
-    if (!about && !*unit)
+    if (!about && !*unit && !*steps)
         return;
     printf(" (");
     spl_cmd_put_text(stdout, unit, 0);
-    printf("%s%s)", about && *unit ? ", " : "", about ? about : "");
+    printf("%s%s%s)", steps, about && (*unit || *steps) ? ", " : "", about ? about : "");
 }
 
 static void print_line(const char *label, const char *text)
@@ -143,10 +146,10 @@ static void print_line(const char *label, const char *text)
     printf("\n");
 }
 
-static void print_bytes(const char *attribute, double bytes)
+static void print_bytes(const char *attribute, double bytes, int width)
 {
     printf("  ");
-    spl_cmd_put_text(stdout, attribute, 14);
+    spl_cmd_put_text(stdout, attribute, width);
     printf("%6.2f\n", bytes);
 }
 
@@ -160,13 +163,18 @@ static void print_table(const struct spl_info_report *report)
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
+    const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     printf("  points        %s read, %s kept\n", grouped(info->points, a), grouped(info->leaf_splats, b));
+    if (whole)
+        printf("  a part of     %s points of the sources\n", grouped((uint64_t)json_integer_value(whole), a));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", grouped(info->splats, a),
            grouped(info->leaf_splats, b), grouped(info->splats - info->leaf_splats, c),
            100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
     printf("  attributes    %s", info->has_color ? "color" : "no color");
-    for (uint32_t s = 0; s < info->stream_count; s++)
-        print_stream(&info->streams[s]);
+    uint32_t streams;
+    const struct spl_stream *stream = spl_dataset_get_streams(report->dataset, &streams);
+    for (uint32_t s = 0; s < streams; s++)
+        print_stream(&stream[s]);
     printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
@@ -195,10 +203,13 @@ static void print_table(const struct spl_info_report *report)
                grouped(l->splats, c), grouped(l->pieces, d), l->spacing);
     }
     printf("\n  bytes a splat\n");
+    int name_width = 14;
+    for (uint32_t s = 0; s < streams; s++)
+        name_width = (int)strlen(stream[s].name) > name_width ? (int)strlen(stream[s].name) : name_width;
     for (int attribute = 0; attribute < spl_info_count(info); attribute++)
         if (info->atoms || (attribute != SPL_ATTRIBUTE_TEXTURE && attribute != SPL_ATTRIBUTE_DICTIONARY))
-            print_bytes(spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute));
-    print_bytes("total", spl_info_total_bytes_per_splat(info));
+            print_bytes(spl_info_name(info, attribute), spl_info_bytes_per_splat(info, attribute), name_width);
+    print_bytes("total", spl_info_total_bytes_per_splat(info), name_width);
     printf("\n  bits that the scene needed (share of the splats)\n");
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
         printf("  ");

@@ -172,7 +172,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -186,6 +186,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         textures_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
         json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
-        json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "up",
+        json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
+        json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "up",
         json_object_get(spl_dataset_get_meta(report->dataset), "up"));
 }

@@ -85,6 +85,9 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
     fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
     fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
             r->normal_error);
+    if (r->part_of)
+        fprintf(stderr, "a part (--max-points) of the %llu points that the scans have\n",
+                (unsigned long long)r->part_of);
     if (r->linear)
         fprintf(stderr, "%llu points on wires, poles and cables, joined by %llu pieces of all levels\n",
                 (unsigned long long)r->linear, (unsigned long long)r->pieces);
@@ -260,6 +263,8 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, photos.device)},
     {"skip-broken", NULL, "scans that cannot be read are named and left out",
      SPL_CMD_FLAG(struct arguments, skip_broken)},
+    {"max-points", "N", "an even part of the scans: the coarse levels of COPC, so many points of other files",
+     .otherwise = "all", SPL_CMD_COUNT(struct arguments, pack.max_points, 1, UINT64_MAX)},
     {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
      SPL_CMD_COUNT_32(struct arguments, pack.threads, 1, 64)},
 };
@@ -268,9 +273,9 @@ static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
-        "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K]\n"
-        "                   [--position-error X] [--normal-error DEG] [--points-only] [--no-linear]\n"
-        "                   [--no-clip-lines] [--threads N]\n"
+        "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
+        "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
+        "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
@@ -292,6 +297,8 @@ static const struct spl_cmd_table table = {
         "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
         "Points as they are, several times faster, for the methods that need no normals and radii:\n"
         "  splatd pack street.las --points-only -o street.spld\n"
+        "A first look at a large scan, a second or two where it is COPC:\n"
+        "  splatd pack tile.copc.laz --max-points 2000000 -o look.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
     .after = "\nAbout 80 bytes of memory a point, 180 on a wire. Progress and the summary go to stderr.\n",

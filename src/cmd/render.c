@@ -15,20 +15,32 @@
 #include "cmd/drawing.h"
 #include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "geom/camera_json.h"
 #include "geom/size.h"
+#include "service/place/places.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
+    uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
 
 _Static_assert(offsetof(struct arguments, drawing) == 0, "its rows know it there");
+
+static int take_crs(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_value value = {0};
+    int rc = spl_value_from_choice(&value, SPL_KIND_CRS, option, text, err);
+    ((struct arguments *)arguments)->crs = (uint32_t)value.n[0];
+    return rc ? SPL_E_USAGE : SPL_OK;
+}
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
+    {"crs", "EPSG:N", "what --eye and --target are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
     {"up", "X,Y,Z", "what is up in the image", SPL_CMD_VECTOR(struct arguments, up)},
     {"fov", "DEG", "vertical field of view; or a pinhole in pixels:", SPL_CMD_REAL(struct arguments, fov, 1e-6, 179)},
     {"fx", "F", "focal length", SPL_CMD_REAL(struct arguments, fx, 1e-6, 1e9)},
@@ -90,12 +102,30 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Eye and target into the dataset's coordinates. */
+static int place(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_places *places = NULL;
+    struct spl_places_hook hook;
+    int rc = a->crs ? spl_places_create(dataset, &places, err) : SPL_OK;
+    if (rc || !a->crs)
+        return rc;
+    spl_places_hook_init(&hook, places, true);
+    rc = hook.hook.to_world(&hook.hook, a->crs, "crs", NULL, NULL, err);
+    if (!rc && !isnan(a->eye[0]))
+        rc = hook.hook.to_world(&hook.hook, a->crs, "--eye", a->eye, a->eye, err);
+    if (!rc && !isnan(a->target[0]))
+        rc = hook.hook.to_world(&hook.hook, a->crs, "--target", a->target, a->target, err);
+    spl_places_destroy(places);
+    return rc;
+}
+
 static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     struct spl_camera *camera = &a->drawing.view.camera;
     int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
-    if (rc)
+    if (rc || (rc = place(a, dataset, err)))
         return rc;
     if (!isnan(a->fov) && !isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");

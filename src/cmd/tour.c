@@ -27,6 +27,7 @@
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "image/video.h"
+#include "service/place/places.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
@@ -120,13 +121,21 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     struct spl_path_motion motion = {a->positions, a->rotations, a->ease};
     struct spl_camera_path path = {0};
     struct spl_camera camera = {0};
+    struct spl_places *places = NULL;
+    struct spl_places_hook hook;
     memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
     memcpy(defaults.target, info->default_target, sizeof defaults.target);
     memcpy(defaults.up, info->default_up, sizeof defaults.up);
     int rc = spl_dataset_get_default_camera(dataset, 16, 9, &camera, err);
     defaults.near = camera.near;
     defaults.far = camera.far;
-    if (rc || (rc = spl_camera_path_load(a->path, &path_options, &path, err)))
+    if (rc || (rc = spl_places_create(dataset, &places, err)))
+        return rc;
+    spl_places_hook_init(&hook, places, true);
+    defaults.places = &hook.hook;
+    rc = spl_camera_path_load(a->path, &path_options, &path, err);
+    spl_places_destroy(places);
+    if (rc)
         return rc;
     path.closed |= a->closed;
     if ((rc = spl_camera_path_count(&path, a->frames, a->fps, a->seconds, SPL_CAMERA_PATH_MAX, &a->count, &a->fps,

@@ -134,7 +134,8 @@ static bool read_value(const struct spl_dataset *dataset, const struct spl_place
 
 bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value)
 {
-    if (stream < 0)
+    if (stream < 0 || (uint32_t)stream >= dataset->info.stream_count ||
+        dataset->stream_types[stream] == SPL_STREAM_UNKNOWN)
         return false;
     struct spl_place place = spl_dataset_find_place(dataset, id);
     bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices have no attributes

@@ -99,23 +99,20 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, stru
 /* Optional attributes: `streams` has a row for each, in the order of the file. */
 const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *dataset, uint32_t *count);
 
-/* Index of the stream of this name; -1 where there is none, or none that we can read. */
+/* Index of the stream of this name, for spl_dataset_find_value(); -1 where there is none, or none that we can read. */
 int spl_dataset_find_stream(const struct spl_dataset *dataset, const char *name);
-
-/* Reads the value of stream `stream` (as find_stream says; -1: none) of splat `id`; false (*value untouched) as
- * find_splat. Any thread; blocks on disk. */
-bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
 
 /* Words that the first `streams` streams of a chunk take behind its own; of a dataset that keeps all its tables. */
 uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_t streams, uint64_t chunk);
 
 /* META's keys, written by pack and read by open (all required unless said):
- *   "points" int, "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
+ *   "points" int, "part_of" int (optional, at least "points": of how many points those are an even part), "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
  *   bool (optional, true)}, "counts" {…} (the writer's, see counts.h),
- *   "streams" [{"name": string, "type": string, "unit": string}] (optional; the writer's),
- *   "unit" "m" | "ft" | "us-ft" | … | "unknown" (optional; geom/unit.h), "crs" string or null (optional), "up" {"vector": [3], "from":
- *   string} (optional, of no meaning to a reader), "sources" [string], "pack"
+ *   "streams" [{"name": string, "type": string, "unit": string, of type "steps" too "first": whole number,
+ *   "steps_a_unit": real}] (optional; the writer's),
+ *   "unit" "m" | "ft" | "us-ft" | … | "unknown" (optional; geom/unit.h), "crs" string or null (optional),
+ *   "up" {"vector": [3], "from": string} (optional, of no meaning to a reader), "sources" [string], "pack"
  * {...} (optional, free: settings, statistics), "stations"
  *   [[16 reals: row-major station-to-world]] (optional), "color" [{"source": string, "from": "rgb" | "intensity" |
  *   "constant" | "photographs", "points": int}] (optional): where colours come from; those from photographs have taken

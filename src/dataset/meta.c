@@ -231,10 +231,14 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
                         dataset->name);
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     const char *count = "a whole number, 1 or more";
-    uint64_t levels = 0;
+    uint64_t levels = 0, whole = UINT64_MAX;
     int rc = get_count(dataset, "points", INT64_MAX, count, &info->points, err);
     if (!rc)
         rc = get_count(dataset, "leaf_splats", INT64_MAX, count, &info->leaf_splats, err);
+    if (!rc && json_object_get(dataset->meta, "part_of"))
+        rc = get_count(dataset, "part_of", INT64_MAX, count, &whole, err);
+    if (!rc && whole <= info->points)
+        rc = wrong(dataset, err, "part_of", json_object_get(dataset->meta, "part_of"), "more than \"points\"");
     if (!rc && info->leaf_splats > info->points)
         rc = wrong(dataset, err, "leaf_splats", json_object_get(dataset->meta, "leaf_splats"), "at most \"points\"");
     if (!rc)

@@ -46,8 +46,8 @@ struct spl_value {
 
 /* Who knows where other coordinates lie in a dataset's world. */
 struct spl_camera_places {
-    /* `in`, longitude or east, latitude or north, and height in EPSG:`crs`, to `out`. `in` NULL: may it be asked? Errors
-     * carry "crs", or `name` where the point is at fault. */
+    /* `in`, longitude or east, latitude or north, and height in EPSG:`crs`, to `out`, which may be `in`. `in` NULL: may
+     * it be asked? Errors carry "crs", or `name` where the point is at fault. */
     int (*to_world)(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
                     double out[3], struct spl_error *err);
 };

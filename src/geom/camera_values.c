@@ -128,7 +128,7 @@ static int check_places(const struct spl_value *v, const struct spl_camera_defau
             return conflict(v, SPL_CAMERA_crs, other, err);
     if (!defaults->places)
         return spl_fail_field(err, SPL_E_INPUT, "crs",
-                              "crs goes with a dataset that the service serves; give world coordinates here");
+                              "no dataset stands behind this that could say where its coordinates lie; leave crs out");
     return defaults->places->to_world(defaults->places, (uint32_t)v[SPL_CAMERA_crs].n[0], "crs", NULL, NULL, err);
 }
 

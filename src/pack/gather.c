@@ -149,8 +149,10 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
                        struct spl_scan *scan, double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
-    struct spl_cloud_options options = {
-        .columns = scans->columns, .intensity = scans->intensity, .colors = &scan->colors, .keep = scans->keep};
+    struct spl_cloud_options options = scans->how;
+    options.colors = &scan->colors;
+    options.max_points = scan->max_points;
+    options.points = scan->points_total;
     int rc = spl_cloud_open(scan->path, &options, &cloud, err);
     if (rc)
         return rc;
@@ -194,7 +196,7 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
                   double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
     int rc = SPL_OK;
-    points->keep = scans->keep;
+    points->keep = scans->how.keep;
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_scan *scan = &scans->list[i];
         struct spl_error why = {0};

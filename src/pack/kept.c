@@ -35,7 +35,7 @@ int spl_kept_check(const struct spl_scans *scans, struct spl_error *err)
     uint32_t columns = 0;
     for (size_t i = 0; i < scans->count; i++)
         columns |= scans->list[i].columns;
-    const char *missing = spl_keep_find_missing(scans->keep, columns);
+    const char *missing = spl_keep_find_missing(scans->how.keep, columns);
     if (!missing)
         return SPL_OK;
     return spl_fail_field(err, SPL_E_USAGE, "keep", "keep: no field \"%s\" in %s%s%s%s", missing, scans->list[0].name,
@@ -70,5 +70,5 @@ bool spl_kept_has_scan(const struct spl_scans *scans, bool *stations)
     *stations = false;
     for (size_t i = 0; i < scans->count; i++)
         *stations |= scans->list[i].attributes & SPL_CLOUD_STATION;
-    return scans->keep->scan || (!scans->keep->none && (*stations || scans->count > 1));
+    return scans->how.keep->scan || (!scans->how.keep->none && (*stations || scans->count > 1));
 }

@@ -78,13 +78,14 @@ static bool is_value(double v)
     return fabs(v) <= largest;
 }
 
-/* Is it, but for the rounding of how it was computed, a whole number of steps? */
-static bool is_multiple(double v, double steps_a_unit)
+/* Is it a whole number of steps, but for the rounding of how it was computed? Differences of numbers as large as `size`
+ * are as exact as those. */
+static bool is_multiple(double v, double steps_a_unit, double size)
 {
     double nearest = rint(v * steps_a_unit) / steps_a_unit;
     if ((double)(float)v == v && (float)nearest == (float)v)
         return true;
-    return fabs(v - nearest) <= 0x1p-51 * fabs(v);
+    return fabs(v - nearest) <= 0x1p-51 * size;
 }
 
 /* What the values have in common, with one more. */
@@ -97,7 +98,8 @@ static void look(struct spl_scalar_values *s, double v)
     s->min = fmin(s->min, v);
     s->max = fmax(s->max, v);
     s->floats &= (double)(float)v == v;
-    while (s->decimals <= decimals_max && !is_multiple(v, powers[s->decimals]))
+    double size = fmax(fabs(s->min), fabs(s->max));
+    while (s->decimals <= decimals_max && !is_multiple(v, powers[s->decimals], size))
         s->decimals++;
     while (s->halvings <= halvings_max && v * (1 << s->halvings) != rint(v * (1 << s->halvings)))
         s->halvings++;
@@ -198,8 +200,10 @@ static bool fits(const struct spl_scalar_values *s, double steps)
 int spl_scalar_settle(struct spl_scalar_values *scalar, size_t count, struct spl_error *err)
 {
     double steps = 1, half_range;
+    scalar->first = 0;
+    scalar->steps_a_unit = 1;
     if (scalar->min > scalar->max)
-        scalar->min = scalar->max = 0;
+        return SPL_OK;
     if (scalar->decimals <= decimals_max) {
         steps = powers[scalar->decimals];
         if (!fits(scalar, steps))

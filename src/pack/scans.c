@@ -14,7 +14,9 @@
 
 #include "base/memory.h"
 #include "cloud/crs.h"
+#include "pack/kept.h"
 #include "pack/names.h"
+#include "pack/part.h"
 
 enum { bytes_a_line = 40, names_kept = 1000 };
 static const double like_ranges = 8; /* times the smallest white less black: of one kind */
@@ -64,6 +66,7 @@ void spl_scans_share(struct spl_scans *scans)
             colors->white = white;
         }
     }
+    spl_part_share(scans);
 }
 
 /* `fields`: room for the names of the scan's, or NULL. */
@@ -83,6 +86,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .attributes = info->attributes,
                               .columns = info->columns,
                               .scalars = info->scalars,
+                              .points_total = info->points_total,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
@@ -94,19 +98,18 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
     return SPL_OK;
 }
 
-int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err)
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
+                   struct spl_stage *stage, struct spl_error *err)
 {
-    const struct spl_cloud_options options = {.columns = columns, .intensity = intensity, .keep = keep};
     int rc = SPL_OK;
-    *scans = (struct spl_scans){.inputs = inputs, .columns = columns, .intensity = intensity, .keep = keep};
+    *scans = (struct spl_scans){.inputs = inputs, .how = *how};
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "looking at colours", "scans", inputs->count);
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &options, scans->count ? NULL : scans->fields, &why)))
+        if ((rc = look(&scans->list[scans->count], inputs->paths[i], how, scans->count ? NULL : scans->fields, &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;
@@ -162,12 +165,12 @@ static void compare_kinds(const struct saying *s)
     }
     if (blank.count && s->scans->count > 1)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", spl_names_list(&blank));
-    if (s->scans->intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
+    if (s->scans->how.intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
         say(s,
             "--intensity changes nothing: no scan has an intensity, or none that is not the same everywhere; colours "
             "are %s",
             text);
-    else if (kinds > 1 && s->scans->intensity) {
+    else if (kinds > 1 && s->scans->how.intensity) {
         struct spl_names lack = {0};
         for (size_t i = 0; i < s->scans->count; i++)
             if (s->scans->list[i].points_from[SPL_COLORS_RGB] || s->scans->list[i].points_from[SPL_COLORS_CONSTANT])
@@ -244,6 +247,16 @@ static void compare_attributes(const struct saying *s)
         if (with.count && without.count)
             say(s, "%s are given in %zu (%s), in the others (%s) they are %s", rows[r].what, with.count,
                 spl_names_list(&with), spl_names_list(&without), rows[r].done);
+    }
+    for (int scalar = 0; scalar < SPL_SCALAR_COUNT; scalar++) {
+        struct spl_names with = {0}, without = {0};
+        for (size_t i = 0; i < s->scans->count; i++)
+            if (has_points(&s->scans->list[i]))
+                spl_names_add(s->scans->list[i].scalars >> scalar & 1 ? &with : &without, s->scans->list[i].name);
+        if (with.count && without.count)
+            say(s, "%s is given in %zu (%s), points of the others (%s) have none",
+                spl_kept_name(s->scans->how.keep, scalar), with.count, spl_names_list(&with),
+                spl_names_list(&without));
     }
 }
 

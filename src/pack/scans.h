@@ -18,6 +18,8 @@ struct spl_scan {
     uint32_t attributes;       /* enum spl_cloud_attribute */
     uint32_t columns, scalars; /* as of struct spl_cloud_info */
     uint64_t points_expected;  /* of the header, or a guess by the file's size */
+    uint64_t points_total;     /* as of struct spl_cloud_info */
+    uint64_t max_points;       /* its share of a part; 0 = all */
     uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */
     double min[3], max[3];     /* of their coordinates; nothing while there is no point */
 };
@@ -28,22 +30,21 @@ struct spl_scans {
     struct spl_inputs *inputs; /* borrowed */
     struct spl_scan *list;     // owned; without what was left out
     size_t count;
-    const char *columns;         /* as of struct spl_cloud_options */
-    bool intensity;              /* likewise */
-    const struct spl_keep *keep; /* likewise, never NULL */
+    struct spl_cloud_options how;  /* each is read so, but for colours and what follows from a part; of all together
+                                    * at most max_points. `keep` is not NULL */
     char fields[SPL_SCANS_FIELDS]; /* names of the first scan's */
 };
 
 /* Opens each scan once, so that one that cannot be read is refused, or left out, before hours of work, and decides how
  * colours are taken. `inputs` is held. Points are counted by spl_points_gather(). On failure nothing is held. Blocks.
  */
-int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const char *columns, bool intensity,
-                   const struct spl_keep *keep, struct spl_stage *stage, struct spl_error *err);
+int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
+                   struct spl_stage *stage, struct spl_error *err);
 
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
 void spl_scans_remove(struct spl_scans *scans, size_t place);
 
-/* Gives the scans in the list their common range of intensities. */
+/* Gives the scans in the list their common range of intensities, and their shares of a part. */
 void spl_scans_share(struct spl_scans *scans);
 
 void spl_scans_finish(struct spl_scans *scans);

@@ -101,7 +101,7 @@ int main(int argc, char **argv)
     const struct spl_keep keep = {0};
     int rc = spl_inputs_find(&inputs, &scan, 1, &(struct spl_inputs_listener){0}, &err);
     if (!rc)
-        rc = spl_scans_init(&scans, &inputs, NULL, false, &keep, &stage, &err);
+        rc = spl_scans_init(&scans, &inputs, &(struct spl_cloud_options){.keep = &keep}, &stage, &err);
     if (!rc)
         rc = spl_points_gather(&points, &scans, &stage, &err);
     if (!rc && argc > (out ? 4 : 2))

@@ -37,7 +37,7 @@ def a_pick_agrees_with_the_layers_and_the_camera(d):
             reply = d.ask(f"{PICK}?{camera}&width={WIDTH}&height={HEIGHT}&x={column + 0.5}&y={row + 0.5}")
             got, at = reply.json(), row * WIDTH + column
             if math.isnan(depth[at][0]):
-                assert {got[k] for k in ("depth", "distance", "class", "splat", "color")} == {None}, got
+                assert {got[k] for k in ("depth", "distance", "class", "splat", "color", "attributes")} == {None}, got
                 assert got["position"] is None and got["normal"] is None
                 continue
             hits += 1
@@ -52,6 +52,8 @@ def a_pick_agrees_with_the_layers_and_the_camera(d):
             assert math.dist(got["normal"], normal[at]) < 0.05 and abs(math.hypot(*got["normal"]) - 1) < 1e-3
             assert max(abs(a - b) for a, b in zip(got["color"], color[at])) <= 2, (got, color[at])
             assert got["splat"] == ids[at][0] and got["class"] == 0
+            assert got["attributes"].keys() == {"class", "uncertainty"} and got["attributes"]["class"] == 0, got
+            assert got["attributes"]["uncertainty"] >= 0
             # the wall is x = 0.2 sin y, splats have a radius of 5 cm
             assert abs(got["position"][0] - 0.2 * math.sin(got["position"][1])) < 0.05, got
     assert hits > 25, hits

@@ -5,12 +5,12 @@ import json
 import math
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
 
-import openapi
-from harness import REAL, VIEW, Daemon, eventually, run
+from harness import REAL, VIEW, WALL, Daemon, eventually, run
 
 if os.environ["SPLATD_PROJ"] != "1":
     print("skipped: built without PROJ")
@@ -185,13 +185,15 @@ def test_what_is_wrong_is_said():
 
 def test_what_a_dataset_does_not_say_is_not_guessed():
     bad = ["PROJCS[\"x\",EXTENSION[\"PROJ4\",\"+proj=utm +zone=1\"]]", "+proj=utm +zone=18", "/etc/passwd", "EPSG:2263+x",
-           "GEOGCS[\"@/etc/passwd\"]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
+           "GEOGCS[\"@/etc/passwd\"]", "BOUNDCRS[x,PARAMETERFILE[\"a\",\"/etc/passwd\"]]", "GEOGCS[\"x\",GRIDS]",
+           "CONVERSION[METHOD[\"PROJ-based operation method: utm\"]]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
     with tempfile.TemporaryDirectory() as folder:
         paths = [make(folder, "m", crs, f"bad{i}") for i, crs in enumerate(bad)]
         paths.append(make(folder, "", "", "none"))
         with Daemon(REAL, datasets=paths) as d:
             for i in range(len(bad)):
-                refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs")
+                why = "extensions" if re.search(r"EXTENSION|@|grids|PARAMETERFILE|PROJ-based", bad[i]) else "own" if "[" in bad[i] else "--crs"
+                refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs", why)
                 assert d.ask(f"/v1/datasets/bad{i}").json()["crs"] == bad[i]
             refused(d.ask("/v1/datasets/none/place?crs=EPSG:4326&world=1,2,3"), 400, "crs", "--crs")
             refused(d.ask("/v1/datasets/none/view?crs=EPSG:4326&eye=1,2,3"), 400, "crs", "--crs")
@@ -248,6 +250,28 @@ def test_a_tour_by_longitude_and_latitude():
                                     {}, "keyframes[0].camera.eye")):
             body = json.dumps({"path": path, "frames": 2, "settings": {**settings, **extra}})
             refused(d.ask(f"{DATASET}/tours", "POST", body, {"Content-Type": "application/json"}), 400, field)
+
+
+def test_the_commands_do_the_same():
+    with Daemon(REAL) as d, tempfile.TemporaryDirectory() as folder:
+        eye, target = text(lonlat(d, (3, 0.2, 1))), text(lonlat(d, (0, 0, 1)))
+        served = d.ask(f"{VIEW}?{SMALL}&format=png&crs=EPSG:4326&eye={eye}&target={target}").body
+        camera = ["--crs", "EPSG:4326", f"--eye={eye}", f"--target={target}"]
+        render = [REAL, "render", WALL, "--size", "64x48", "--format", "png", "-o"]
+        drawn = subprocess.run([*render, "-", *camera], capture_output=True)
+        assert drawn.stdout == served, drawn.stderr
+        keys = [{"camera": {"eye": [float(x) for x in eye.split(",")], "target": [float(x) for x in target.split(",")]}}]
+        path = pathlib.Path(folder) / "path.json"
+        path.write_text(json.dumps({"crs": "EPSG:4326", "frames": keys}))
+        subprocess.run([REAL, "tour", WALL, "--path", path, "--size", "64x48", "--format", "png", "-o", f"{folder}/tour"],
+                       check=True, capture_output=True)
+        assert (pathlib.Path(folder) / "tour" / "000000.png").read_bytes() == served
+        for wrong, said in ((["--crs", "EPSG:4326", "--eye=40,-74,1"], b"--eye 40,-74,1"), (["--crs", "+proj=utm"], b"--crs"),
+                            (["--crs", "EPSG:999999"], b"EPSG:999999")):
+            failed = subprocess.run([*render, f"{folder}/none.png", *wrong], capture_output=True)
+            assert failed.returncode == 2 and said in failed.stderr, failed
+        depth = subprocess.run([*render, "-", *camera, "--layer", "depth"], capture_output=True)
+        assert b"1000 steps per us-ft," in depth.stdout
 
 
 def test_looking_up_ends_with_the_deadline():

@@ -11,7 +11,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "cloud/laz/items.h"
-#include "cloud/laz/table.h"
 
 enum {
     round_bytes = 32 << 20,
@@ -49,7 +48,7 @@ struct spl_laz_stream {
 struct round {
     struct spl_laz_stream *stream;
     size_t first_chunk, count;
-    uint64_t offset; /* of input[0] in the file */
+    size_t input_at[round_chunks]; /* of each chunk's bytes */
     int code[round_chunks];
     struct spl_laz_fault fault[round_chunks];
 };
@@ -166,6 +165,24 @@ void spl_laz_stream_destroy(struct spl_laz_stream *s)
     free(s);
 }
 
+const struct spl_laz_table *spl_laz_stream_get_table(const struct spl_laz_stream *s)
+{
+    return s->has_table ? &s->table : NULL;
+}
+
+void spl_laz_stream_choose(struct spl_laz_stream *s, const uint8_t *wanted)
+{
+    size_t count = 0;
+    s->points = 0;
+    for (size_t i = 0; i < s->table.count; i++)
+        if (wanted[i]) {
+            s->table.chunks[count] = s->table.chunks[i];
+            s->table.chunks[count++].first = s->points;
+            s->points += s->table.chunks[i].points;
+        }
+    s->table.count = count;
+}
+
 void spl_laz_stream_seek(struct spl_laz_stream *s, uint64_t point, bool few)
 {
     s->next = point;
@@ -205,9 +222,24 @@ static void decode_chunks(void *context, size_t begin, size_t end, unsigned work
     const struct spl_laz_chunk *chunks = s->table.chunks + round->first_chunk;
     for (size_t i = begin; i < end; i++)
         if (chunks[i].points > 0)
-            round->code[i] = decode_chunk(
-                s->decoders[worker], &chunks[i], s->input + (chunks[i].at - chunks[0].at), s->wanted,
-                s->records + (chunks[i].first - chunks[0].first) * s->format.record_bytes, &round->fault[i]);
+            round->code[i] = decode_chunk(s->decoders[worker], &chunks[i], s->input + round->input_at[i], s->wanted,
+                                          s->records + (chunks[i].first - chunks[0].first) * s->format.record_bytes,
+                                          &round->fault[i]);
+}
+
+/* The bytes of chunks, one behind the other, with a read for each run that lies so in the file. */
+static int read_chunks(const struct spl_laz_stream *s, const struct spl_laz_chunk *chunks, size_t count,
+                       struct spl_error *err)
+{
+    int code = SPL_OK;
+    size_t into = 0, bytes;
+    for (size_t i = 0, run; code == SPL_OK && i < count; i = run, into += bytes) {
+        bytes = chunks[i].bytes;
+        for (run = i + 1; run < count && chunks[run].at == chunks[i].at + bytes; run++)
+            bytes += chunks[run].bytes;
+        code = spl_source_read_at(s->source, chunks[i].at, s->input + into, bytes, err);
+    }
+    return code;
 }
 
 static int decode_round(struct spl_laz_stream *s, size_t chunk, struct spl_error *err)
@@ -217,6 +249,7 @@ static int decode_round(struct spl_laz_stream *s, size_t chunk, struct spl_error
     size_t most = (size_t)s->threads * chunks_a_worker, points = 0, bytes = 0;
     while (round.count < round_chunks && round.count < most && chunk + round.count < s->table.count &&
            (round.count == 0 || fits_round(s, points + chunks[round.count].points))) {
+        round.input_at[round.count] = bytes;
         points += chunks[round.count].points;
         bytes += chunks[round.count++].bytes;
     }
@@ -226,7 +259,7 @@ static int decode_round(struct spl_laz_stream *s, size_t chunk, struct spl_error
     if (code == SPL_OK)
         code = make_room(&s->input, &s->input_bytes, bytes, err);
     if (code == SPL_OK)
-        code = spl_source_read_at(s->source, chunks[0].at, s->input, bytes, err);
+        code = read_chunks(s, chunks, round.count, err);
     for (unsigned i = 0; code == SPL_OK && i < workers; i++)
         code = make_decoder(s, i, err);
     if (code < 0)

@@ -5,6 +5,7 @@
 #define SPL_CLOUD_LAZ_STREAM_H
 
 #include "cloud/laz/decoder.h"
+#include "cloud/laz/table.h"
 #include "cloud/source.h"
 
 struct spl_laz_stream;
@@ -17,6 +18,12 @@ int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, 
 
 /* NULL-safe. */
 void spl_laz_stream_destroy(struct spl_laz_stream *stream);
+
+/* The table of chunks, NULL where there is none that can be trusted. Valid until the next call. */
+const struct spl_laz_table *spl_laz_stream_get_table(const struct spl_laz_stream *stream);
+
+/* Before the first read: leaves only the chunks with wanted[i] != 0 of its table; points are numbered anew. */
+void spl_laz_stream_choose(struct spl_laz_stream *stream, const uint8_t *wanted);
 
 /* The next 1 to `most` records, record_bytes each, valid until the next call; *count 0 at the end. Of layers only the
  * `wanted` ones (enum spl_laz_want); those may change after a seek alone. */

@@ -2,7 +2,9 @@
  * pipelines: only codes of EPSG and plain WKT get through here. A point must lie within reach of the dataset, so that
  * latitude before longitude is an error and no empty picture.
  *
- * Invariant: transforms are used under the mutex, made outside it, and at most `kept` live. Any thread. */
+ * Transforms are kept for all datasets together, since the tiles of a country have one coordinate system, and each
+ * takes some 0.4 MiB. Invariant: they are used under the mutex, made outside it, and at most `kept` live. Any thread.
+ */
 #include "service/place/places.h"
 
 #include <ctype.h>
@@ -17,24 +19,26 @@
 #include "geom/unit.h"
 #include "service/place/transform.h"
 
-enum { kept = 8, made_max = 4, wkt_bytes_max = 64 << 10 };
+enum { kept = 64, made_max = 4, wkt_bytes_max = 64 << 10 };
 static const double reach_m = 1e6, degree_m = 111195; /* of a great circle */
 
-struct place {
-    uint32_t crs; /* 0 = none */
-    struct spl_transform *transform;
+struct slot {
+    uint32_t crs;                    /* 0 = none */
+    char *world;                     // owned; META's text
+    struct spl_transform *transform; // owned
     uint64_t used;
 };
 
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static struct slot slots[kept]; // guarded by: mutex
+static uint64_t uses;           // guarded by: mutex
+
 struct spl_places {
-    char *crs;         // META's, "" where it has none
-    uint32_t epsg;     /* of it; 0 = WKT */
-    const char *fault; // why it cannot be used; NULL = it may
+    char *crs;                      // META's, "" where it has none
+    uint32_t epsg;                  /* of it; 0 = WKT */
+    const char *fault;              // why it cannot be used; NULL = it may
     double low[3], high[3], unit_m; /* 0 = not known */
-    pthread_mutex_t mutex;
-    struct place places[kept]; // guarded by: mutex, as the next
-    uint64_t uses;
-    uint32_t missing; // owned by: loop
+    uint32_t missing;               // owned by: loop
 };
 
 /* "EPSG:2994" and what says its heights' system as well: "EPSG:2994+EPSG:5703", "EPSG:2994+5703"; 0 for other texts. */
@@ -100,10 +104,9 @@ int spl_places_create(const struct spl_dataset *dataset, struct spl_places **out
     memcpy(places->crs, crs ? crs : "", length);
     places->epsg = read_epsg(places->crs);
     places->fault = find_fault(places);
-    spl_unit_parse(info->unit, &places->unit_m); /* else 0 */
+    spl_unit_parse(info->unit, &places->unit_m); // else 0
     memcpy(places->low, info->bounds_min, sizeof places->low);
     memcpy(places->high, info->bounds_max, sizeof places->high);
-    pthread_mutex_init(&places->mutex, NULL);
     return 0;
 }
 
@@ -111,57 +114,67 @@ void spl_places_destroy(struct spl_places *places)
 {
     if (!places)
         return;
-    for (int i = 0; i < kept; i++)
-        spl_transform_destroy(places->places[i].transform);
-    pthread_mutex_destroy(&places->mutex);
     free(places->crs);
     free(places);
 }
 
 /* With the mutex held; NULL: it is not there. */
-static struct spl_transform *find(struct spl_places *places, uint32_t crs)
+static struct spl_transform *find(const struct spl_places *places, uint32_t crs)
 {
     for (int i = 0; i < kept; i++)
-        if (places->places[i].crs == crs) {
-            places->places[i].used = ++places->uses;
-            return places->places[i].transform;
+        if (slots[i].crs == crs && !strcmp(slots[i].world, places->crs)) {
+            slots[i].used = ++uses;
+            return slots[i].transform;
         }
     return NULL;
 }
 
-/* With the mutex held: in the place of the one that was not used for longest. Takes *transform where there is none yet, and
- * leaves what is to be destroyed in it. */
-static void keep(struct spl_places *places, uint32_t crs, struct spl_transform **transform)
+/* Puts what is new in the place of the one that was not used for longest, and leaves what is to be freed in it. */
+static void keep(const struct spl_places *places, struct slot *slot)
 {
-    struct place *oldest = places->places;
-    if (find(places, crs))
-        return;
-    for (int i = 1; i < kept; i++)
-        if (places->places[i].used < oldest->used)
-            oldest = &places->places[i];
-    struct spl_transform *old = oldest->transform;
-    *oldest = (struct place){crs, *transform, ++places->uses};
-    *transform = old;
+    pthread_mutex_lock(&mutex);
+    if (!find(places, slot->crs)) {
+        struct slot *oldest = slots;
+        for (int i = 1; i < kept; i++)
+            if (slots[i].used < oldest->used)
+                oldest = &slots[i];
+        struct slot old = *oldest;
+        slot->used = ++uses;
+        *oldest = *slot;
+        *slot = old;
+    }
+    pthread_mutex_unlock(&mutex);
+}
+
+static void get_middle(const struct spl_places *places, double middle[2])
+{
+    for (int i = 0; i < 2; i++)
+        middle[i] = (places->low[i] + places->high[i]) / 2;
 }
 
 int spl_places_prepare(struct spl_places *places, uint32_t crs, struct spl_error *err)
 {
-    struct spl_transform *transform = NULL;
-    pthread_mutex_lock(&places->mutex);
+    struct slot slot = {.crs = crs};
+    double middle[2], ignored[2];
+    pthread_mutex_lock(&mutex);
     bool there = find(places, crs);
-    pthread_mutex_unlock(&places->mutex);
+    pthread_mutex_unlock(&mutex);
     if (there)
         return 0;
     if (spl_transform_is_built && places->fault)
         return spl_fail_field(err, SPL_E_INPUT, "crs", "%s", places->fault);
-    int rc = spl_transform_create(crs, places->epsg, places->crs, &transform, err);
-    if (rc)
-        return rc;
-    pthread_mutex_lock(&places->mutex);
-    keep(places, crs, &transform);
-    pthread_mutex_unlock(&places->mutex);
-    spl_transform_destroy(transform);
-    return 0;
+    if (!(slot.world = strdup(places->crs)))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a coordinate system");
+    int rc = spl_transform_create(crs, places->epsg, places->crs, &slot.transform, err);
+    if (!rc) {
+        get_middle(places, middle);
+        spl_transform_apply(slot.transform, false, middle,
+                            ignored); // reads what grids there are, here and not on the loop
+        keep(places, &slot);
+    }
+    spl_transform_destroy(slot.transform);
+    free(slot.world);
+    return rc;
 }
 
 /* Leaves the mutex held where it succeeds. `made` counts what was made; may be NULL. */
@@ -171,10 +184,10 @@ static int enter(struct spl_places *places, uint32_t crs, bool waits, unsigned *
     if (spl_transform_is_built && places->fault)
         return spl_fail_field(err, SPL_E_INPUT, "crs", "%s", places->fault);
     for (;;) { // another thread may need other ones in between
-        pthread_mutex_lock(&places->mutex);
+        pthread_mutex_lock(&mutex);
         if ((*out = find(places, crs)))
             return 0;
-        pthread_mutex_unlock(&places->mutex);
+        pthread_mutex_unlock(&mutex);
         if (!waits) {
             places->missing = crs;
             return spl_fail_field(err, SPL_E_BUSY, "crs", "EPSG:%u is being looked up; come back later", crs);
@@ -195,8 +208,7 @@ static double get_world_m(const struct spl_places *places, const struct spl_tran
 }
 
 /* Metres from the dataset's box, roughly. */
-static double get_distance_m(const struct spl_places *places, const struct spl_transform *transform,
-                             const double at[3])
+static double get_distance_m(const struct spl_places *places, const struct spl_transform *transform, const double at[3])
 {
     double axes_m = spl_transform_get_world_m(transform), sum = 0;
     for (int i = 0; i < 3; i++) {
@@ -217,16 +229,18 @@ static int to_world(const struct spl_camera_places *hook, uint32_t crs, const ch
     int rc = enter(places, crs, own->waits, &own->made, &transform, err);
     if (rc || !in) {
         if (!rc)
-            pthread_mutex_unlock(&places->mutex);
+            pthread_mutex_unlock(&mutex);
         return rc;
     }
     double height_m = spl_transform_get_height_m(transform);
-    bool good = spl_transform_apply(transform, true, in, out);
-    out[2] = in[2] * height_m / get_world_m(places, transform);
-    double distance_m = good ? get_distance_m(places, transform, out) : INFINITY;
-    pthread_mutex_unlock(&places->mutex);
-    if (distance_m <= reach_m)
+    double at[3] = {0, 0, in[2] * height_m / get_world_m(places, transform)};
+    bool good = spl_transform_apply(transform, true, in, at);
+    double distance_m = good ? get_distance_m(places, transform, at) : INFINITY;
+    pthread_mutex_unlock(&mutex);
+    if (distance_m <= reach_m) {
+        memcpy(out, at, sizeof at);
         return 0;
+    }
     char far[64] = "has no place in the dataset's coordinate system";
     if (isfinite(distance_m))
         snprintf(far, sizeof far, "lies %.0f km from the dataset", distance_m / 1000);
@@ -245,11 +259,11 @@ int spl_places_from_world(struct spl_places *places, uint32_t crs, bool waits, c
         return rc;
     bool good = spl_transform_apply(transform, false, in, out);
     out[2] = in[2] * get_world_m(places, transform) / spl_transform_get_height_m(transform);
-    pthread_mutex_unlock(&places->mutex);
+    pthread_mutex_unlock(&mutex);
     if (good && isfinite(out[2]))
         return 0;
-    return spl_fail_field(err, SPL_E_INPUT, "crs", "the world's %.10g,%.10g,%.10g has no place in EPSG:%u", in[0], in[1],
-                          in[2], crs);
+    return spl_fail_field(err, SPL_E_INPUT, "crs", "the world's %.10g,%.10g,%.10g has no place in EPSG:%u", in[0],
+                          in[1], in[2], crs);
 }
 
 int spl_places_bounds(struct spl_places *places, uint32_t crs, double world[2][3], double out[2][3],
@@ -260,10 +274,10 @@ int spl_places_bounds(struct spl_places *places, uint32_t crs, double world[2][3
     if (rc)
         return rc;
     double box[4];
-    bool good = spl_transform_bounds(
-        transform, (const double[]){world[0][0], world[0][1], world[1][0], world[1][1]}, box);
+    bool good =
+        spl_transform_bounds(transform, (const double[]){world[0][0], world[0][1], world[1][0], world[1][1]}, box);
     double scale = get_world_m(places, transform) / spl_transform_get_height_m(transform);
-    pthread_mutex_unlock(&places->mutex);
+    pthread_mutex_unlock(&mutex);
     if (!good)
         return spl_fail_field(err, SPL_E_INPUT, "crs", "the dataset's bounds have no place in EPSG:%u", crs);
     for (int i = 0; i < 2; i++) {
@@ -277,13 +291,13 @@ int spl_places_bounds(struct spl_places *places, uint32_t crs, double world[2][3
 double spl_places_get_accuracy(struct spl_places *places, uint32_t crs)
 {
     struct spl_transform *transform;
-    double ignored[2], accuracy = -1;
-    const double middle[2] = {(places->low[0] + places->high[0]) / 2, (places->low[1] + places->high[1]) / 2};
+    double middle[2], ignored[2], accuracy = -1;
+    get_middle(places, middle);
     if (enter(places, crs, false, NULL, &transform, NULL))
         return accuracy;
     if (spl_transform_apply(transform, false, middle, ignored))
         accuracy = spl_transform_get_accuracy(transform);
-    pthread_mutex_unlock(&places->mutex);
+    pthread_mutex_unlock(&mutex);
     return accuracy;
 }
 

@@ -1,8 +1,8 @@
 /* Where on earth a version of a dataset lies: its world coordinates from those of other coordinate systems, and back.
  *
  * A point is longitude, latitude and height, or east, north and height, in a system of EPSG's list. Heights are the
- * dataset's own, in metres or in the system's unit: no geoid and no datum moves them. Transformations are made when they are first asked
- * for and kept, the last used. All calls: any thread. */
+ * dataset's own, in metres or in the system's unit: no geoid and no datum moves them. Transformations are made when
+ * they are first asked for, and the last used are kept. All calls: any thread. */
 #ifndef SPL_SERVICE_PLACES_H
 #define SPL_SERVICE_PLACES_H
 
@@ -15,8 +15,9 @@ struct spl_places;
 int spl_places_create(const struct spl_dataset *dataset, struct spl_places **out, struct spl_error *err);
 void spl_places_destroy(struct spl_places *places); /* NULL-safe */
 
-/* For spl_camera_from_values(). `waits`: makes what is missing, tens of ms each and a few for each hook that it is, so no
- * thread may do it that others wait for; else SPL_E_BUSY, field "crs". A hook that waits is one parser's at a time. */
+/* For spl_camera_from_values(). `waits`: makes what is missing, tens of ms each and a few for each hook that it is, so
+ * no thread may do it that others wait for; else SPL_E_BUSY, field "crs". A hook that waits is one parser's at a time.
+ */
 struct spl_places_hook {
     struct spl_camera_places hook; /* first */
     struct spl_places *places;

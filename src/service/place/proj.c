@@ -41,8 +41,8 @@ static double axis_m(PJ_CONTEXT *context, const PJ *crs, int axis)
     return known && factor > 0 && isfinite(factor) ? factor : 0;
 }
 
-/* The horizontal part of `crs`, which is taken, and what heights beside it are in; NULL where that is neither geographic
- * nor projected. */
+/* The horizontal part of `crs`, which is taken, and what heights beside it are in; NULL where that is neither
+ * geographic nor projected. */
 static PJ *take_horizontal(PJ_CONTEXT *context, PJ *crs, double *axes_m, double *height_m)
 {
     PJ *vertical = NULL;
@@ -88,10 +88,10 @@ static int open_systems(struct spl_transform *t, uint32_t asked, uint32_t world_
         return spl_fail_field(err, SPL_E_UNSUPPORTED, "crs",
                               "PROJ finds no list of coordinate systems; the operator may install proj-data");
     if (!crs || !(*from = take_horizontal(t->context, crs, &axes_m, &t->height_m)))
-        return spl_fail_field(err, SPL_E_INPUT, "crs", "EPSG:%u is no geographic or projected coordinate system%s", asked,
-                              crs ? "" : " that PROJ knows");
-    crs = world_epsg ? open_epsg(t->context, world_epsg)
-                     : proj_create_from_wkt(t->context, world_wkt, NULL, NULL, NULL);
+        return spl_fail_field(err, SPL_E_INPUT, "crs", "EPSG:%u is no geographic or projected coordinate system%s",
+                              asked, crs ? "" : " that PROJ knows");
+    crs =
+        world_epsg ? open_epsg(t->context, world_epsg) : proj_create_from_wkt(t->context, world_wkt, NULL, NULL, NULL);
     if (!crs || !(*to = take_horizontal(t->context, crs, &t->world_m, &own_height_m)))
         return spl_fail_field(err, SPL_E_INPUT, "crs",
                               "the dataset's own coordinate system is none that PROJ knows as geographic or projected; "
@@ -150,8 +150,7 @@ void spl_transform_destroy(struct spl_transform *transform)
 bool spl_transform_apply(struct spl_transform *transform, bool to_world, const double in[2], double out[2])
 {
     proj_errno_reset(transform->operation);
-    PJ_COORD at =
-        proj_trans(transform->operation, to_world ? PJ_FWD : PJ_INV, proj_coord(in[0], in[1], 0, HUGE_VAL));
+    PJ_COORD at = proj_trans(transform->operation, to_world ? PJ_FWD : PJ_INV, proj_coord(in[0], in[1], 0, HUGE_VAL));
     out[0] = at.xy.x;
     out[1] = at.xy.y;
     return !proj_errno(transform->operation) && isfinite(out[0]) && isfinite(out[1]);

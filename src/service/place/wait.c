@@ -1,5 +1,5 @@
-/* A coordinate system takes PROJ tens of milliseconds the first time, which the loop has not: the pool looks it up while
- * the request waits like one for a view.
+/* A coordinate system takes PROJ tens of milliseconds the first time, which the loop has not: the pool looks it up
+ * while the request waits like one for a view.
  *
  * Invariant: a wish belongs to the pool until after(), whether its request still waits or not; its reference to the
  * dataset is given back before the library stops. Owned by the loop's thread, but for look_up(). */
@@ -15,7 +15,10 @@
 #include "service/reply.h"
 #include "service/state.h"
 
-enum { waits_max = 4 }; /* of a request: one for each coordinate system, unless they push each other out */
+enum {
+    waits_max = 4, /* of a request: one for each coordinate system, unless they push each other out */
+    wishes_max = 32
+};
 
 struct spl_place_wish {
     uv_work_t work;
@@ -50,6 +53,7 @@ static void after(uv_work_t *work, int status)
     }
     spl_catalog_entry_unref(wish->call.entry);
     service->library->tasks--;
+    service->library->places--;
     free(wish);
 }
 
@@ -65,7 +69,7 @@ bool spl_place_wait(struct request *request, const struct spl_call *call, spl_ha
                     const struct spl_error *err)
 {
     struct spl_service *service = request->service;
-    if (err->code != SPL_E_BUSY || request->places == waits_max)
+    if (err->code != SPL_E_BUSY || request->places == waits_max || service->library->places >= wishes_max)
         return false;
     struct spl_place_wish *wish = spl_alloc(1, sizeof *wish, NULL);
     if (!wish)
@@ -77,6 +81,7 @@ bool spl_place_wait(struct request *request, const struct spl_call *call, spl_ha
     request->place = wish;
     request->places++;
     service->library->tasks++;
+    service->library->places++;
     spl_waiting_add(request, spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
     uv_queue_work(&service->loop, &wish->work, look_up, after); // fails without a callback only
     return true;

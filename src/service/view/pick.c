@@ -5,8 +5,12 @@
 #include <math.h>
 #include <string.h>
 
+#include <splatd/dataset.h>
+
 #include "base/error.h"
 #include "render/pick.h"
+
+static const double most_whole = 0x1p53; /* that doubles count to */
 
 static json_t *vector(const double v[3])
 {
@@ -18,7 +22,25 @@ static json_t *normal(const double n[3])
     return n[0] == 0 && n[1] == 0 && n[2] == 0 ? json_null() : vector(n);
 }
 
-static void fill(json_t *json, const struct spl_pick *p)
+/* What the splat has by name; null where it is none, or has nothing: on wires. */
+static json_t *attributes(const struct spl_dataset *dataset, int64_t splat)
+{
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    json_t *all = json_object();
+    double value;
+    for (uint32_t s = 0; s < info->stream_count && splat >= 0; s++)
+        if (spl_dataset_find_value(dataset, (int)s, (uint64_t)splat, &value))
+            json_object_set_new(all, info->streams[s].name,
+                                isnan(value)                                        ? json_null()
+                                : value == rint(value) && fabs(value) <= most_whole ? json_integer((json_int_t)value)
+                                                                                    : json_real(value));
+    if (json_object_size(all) > 0)
+        return all;
+    json_decref(all);
+    return json_null();
+}
+
+static void fill(json_t *json, const struct spl_pick *p, const struct spl_dataset *dataset)
 {
     bool hit = p->hit;
     json_object_set_new(json, "position", hit ? vector(p->position) : json_null());
@@ -26,6 +48,7 @@ static void fill(json_t *json, const struct spl_pick *p)
     json_object_set_new(json, "color",
                         hit ? json_pack("[i, i, i]", p->color[0], p->color[1], p->color[2]) : json_null());
     json_object_set_new(json, "class", hit && p->classification >= 0 ? json_integer(p->classification) : json_null());
+    json_object_set_new(json, "attributes", hit && dataset ? attributes(dataset, p->splat) : json_null());
     json_object_set_new(json, "depth", hit ? json_real(p->depth) : json_null());
     json_object_set_new(json, "distance", hit && isfinite(p->distance) ? json_real(p->distance) : json_null());
     json_object_set_new(json, "splat", hit && p->splat >= 0 ? json_integer(p->splat) : json_null());
@@ -54,7 +77,7 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
     spl_pick_read(&request->pick.camera, x, y, frame, dataset, &pick);
     json_t *json = json_pack("{s:f, s:f, s:s}", "x", x, "y", y, "unit", request->encode.unit);
     if (json)
-        fill(json, &pick);
+        fill(json, &pick, dataset);
     int rc = json && request->pick.crs ? place(json, request->pick.crs, &pick, places, err) : 0;
     if (rc) {
         json_decref(json);

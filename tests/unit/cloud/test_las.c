@@ -151,7 +151,6 @@ static void what_says_it_is_compressed_and_is_not(void **state)
     refused(&b, NULL, SPL_E_INPUT, "point data record format", "no LASzip record");
     las_set(&b, 227 + 18, 22204, 2);
     refused(&b, NULL, SPL_E_INPUT, "LASzip record", "10 bytes");
-    refused_text("ASTM-E57 and whatever follows", SPL_E_UNSUPPORTED, "", "E57");
 }
 
 static void the_chain_of_vlrs_may_be_broken(void **state)

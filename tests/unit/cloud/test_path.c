@@ -123,6 +123,47 @@ static void test_own_sizes_and_defaults(void **state)
     spl_camera_path_finish(&path);
 }
 
+/* East is west where EPSG:7 has it. */
+static int mirror(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
+                  double out[3], struct spl_error *err)
+{
+    (void)places;
+    if (crs != 7)
+        return spl_fail_field(err, SPL_E_INPUT, "crs", "%s in %u", name, crs);
+    for (int i = 0; in && i < 3; i++)
+        out[i] = i ? in[i] : -in[i];
+    return 0;
+}
+
+static void test_other_coordinates(void **state)
+{
+    (void)state;
+    const struct spl_camera_places places = {mirror};
+    const struct spl_camera_defaults defaults = {.up = {0, 0, 1}, .fov = 90, .near = 2, .far = 9, .places = &places};
+    const struct spl_path_options options = {.defaults = &defaults};
+#define POSE "\"eye\":[1,2,3],\"target\":[4,5,6]"
+#define KEY "{\"camera\":{" POSE "}}"
+    static const char *const same[] = {
+        "{\"crs\":\"EPSG:7\",\"keyframes\":[" KEY "," KEY "]}",
+        "{\"crs\":\"EPSG:7\",\"frames\":[" KEY ",{\"crs\":\"EPSG:7\",\"camera\":{" POSE "}}]}",
+        "{\"crs\":\"EPSG:9\",\"frames\":[{\"crs\":\"EPSG:7\",\"camera\":{" POSE "}},"
+        "{\"camera\":{" POSE ",\"crs\":\"EPSG:7\"}}]}",
+    };
+    struct spl_camera_path path;
+    struct spl_error err = {0};
+    for (size_t i = 0; i < sizeof same / sizeof *same; i++) {
+        if (parse(same[i], options, &path, &err))
+            fail_msg("%s: %s", same[i], err.message);
+        for (size_t k = 0; k < 2; k++)
+            assert_true(path.cameras[k].eye[0] == -1 && path.cameras[k].eye[1] == 2 && path.cameras[k].eye[2] == 3);
+        spl_camera_path_finish(&path);
+    }
+    assert_int_equal(parse("{\"crs\":\"EPSG:8\",\"frames\":[" KEY "]}", options, &path, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "frames[0].crs");
+#undef KEY
+#undef POSE
+}
+
 static void test_times_and_order(void **state)
 {
     (void)state;
@@ -318,6 +359,7 @@ static void test_files(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_other_coordinates),
         cmocka_unit_test(test_golden_vectors),  cmocka_unit_test(test_own_sizes_and_defaults),
         cmocka_unit_test(test_times_and_order), cmocka_unit_test(test_bad_paths_are_named),
         cmocka_unit_test(test_what_is_no_trajectory_says_so),

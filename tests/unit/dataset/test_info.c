@@ -12,6 +12,7 @@
 #include <cmocka.h>
 #include <jansson.h>
 
+#include "dataset/dataset.h"
 #include "image/load.h"
 #include "support/make_dataset.h"
 #include "support/make_textures.h"
@@ -86,6 +87,9 @@ static void test_json(void **state)
     assert_string_equal(json_string_value(json_object_get(json_array_get(streams, 1), "type")), "half-octaves");
     assert_string_equal(json_string_value(json_object_get(json, "unit")), "us-ft");
     assert_string_equal(json_string_value(json_object_get(json, "crs")), "EPSG:2263");
+    assert_string_equal(spl_unit_word(&(struct spl_dataset_info){.unit = "us-ft"}), "us-ft");
+    assert_string_equal(spl_unit_word(&(struct spl_dataset_info){.unit = "unknown"}), "unit");
+    assert_string_equal(spl_unit_word(&(struct spl_dataset_info){0}), "unit");
     assert_true(json_object_size(json_object_get(json, "widths")) == 6);
     assert_true(number(json, "points") == 4000 && number(json, "splats") == 4500 && number(json, "levels") == 2);
     const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");

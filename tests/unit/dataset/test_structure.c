@@ -175,6 +175,8 @@ FORGE(levels_few, json_object_set_new(p->meta, "levels", json_integer(1)))
 FORGE(levels_many, json_object_set_new(p->meta, "levels", json_integer(257)))
 FORGE(leaf_splats, json_object_set_new(p->meta, "leaf_splats", json_integer(399)))
 FORGE(points_few, json_object_set_new(p->meta, "points", json_integer(399)))
+FORGE(part_of_less, json_object_set_new(p->meta, "part_of", json_integer(400)))
+FORGE(part_of_text, json_object_set_new(p->meta, "part_of", json_string("all")))
 FORGE(points_text, json_object_set_new(p->meta, "points", json_string("400")))
 FORGE(points_gone, json_object_del(p->meta, "points"))
 FORGE(radius_gone, json_object_del(p->meta, "splat_radius"))
@@ -258,6 +260,8 @@ static const struct {
     {levels_many, "section META: \"levels\" is 257, and must be a whole number from 1 to 256"},
     {leaf_splats, "section META: \"leaf_splats\" is not what the nodes"},
     {points_few, "section META: \"leaf_splats\" is 400, and must be at most \"points\""},
+    {part_of_less, "section META: \"part_of\" is 400, and must be more than \"points\""},
+    {part_of_text, "section META: \"part_of\" is \"all\", and must be a whole number"},
     {points_text, "section META: \"points\" is \"400\", and must be a whole number"},
     {points_gone, "section META: \"points\" is missing, and must be"},
     {radius_gone, "section META: \"splat_radius\" is missing, and must be"},

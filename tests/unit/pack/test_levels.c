@@ -1,4 +1,5 @@
-/* One inner node over clusters whose parts are known: what the splat that stands for four of them is, by the numbers. */
+/* One inner node over clusters whose parts are known: what the splat that stands for four of them is, by the numbers.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,6 +8,7 @@
 #include <cmocka.h>
 
 #include "clouds.h"
+#include "dataset/streams.h"
 #include "pack/tree.h"
 
 enum { groups = 16, parts = 4, count = groups * parts };
@@ -119,6 +121,39 @@ static void most_parts_give_class_and_linear(void **state)
     done(&made);
 }
 
+/* As numbers of steps: the mean by area, or what most have, of those that have any. */
+static void scalars_are_means_or_votes(void **state)
+{
+    (void)state;
+    static const double means[groups][parts] = {[1] = {10, 10, 10, 13},
+                                                [2] = {10, 10, 11, 11},
+                                                [4] = {40, (double)NAN, 20, (double)NAN},
+                                                [5] = {(double)NAN, (double)NAN, (double)NAN, (double)NAN},
+                                                [9] = {200, 100, 100, 100}};
+    static const double votes[groups][parts] = {[1] = {7, 7, 7, 1}, [6] = {1, 7, 7, 7}, [8] = {(double)NAN, 3, 3, 9}};
+    struct made made = make();
+    made.points.radius[9 * parts] = 0.2f; /* as much as four of the others: 1100 / 7 */
+    struct spl_scalar_values *mean = &made.points.scalar[SPL_SCALAR_INTENSITY],
+                             *vote = &made.points.scalar[SPL_SCALAR_RETURN];
+    assert_int_equal(spl_scalar_add(mean, count, 0, &means[0][0], count, NULL), 0);
+    assert_int_equal(spl_scalar_add(vote, count, 0, &votes[0][0], count, NULL), 0);
+    assert_int_equal(spl_scalar_settle(mean, count, NULL) | spl_scalar_settle(vote, count, NULL), 0);
+    vote->votes = true;
+    build(&made, groups);
+    const struct spl_tree_node *root = &made.tree.nodes[0];
+    static const struct {
+        int group;
+        uint32_t mean, vote;
+    } rows[] = {{0, 0, 0}, {1, 11, 7}, {2, 11, 0}, {4, 30, 0}, {5, SPL_STREAM_NONE, 0},
+                {6, 0, 7}, {8, 0, 3},  {9, 157, 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        size_t at = (size_t)(of_group(&made, rows[i].group, 0) - root->splats);
+        if (root->numbers[2 * at] != rows[i].mean || root->numbers[2 * at + 1] != rows[i].vote)
+            fail_msg("group %d: %u and %u", rows[i].group, root->numbers[2 * at], root->numbers[2 * at + 1]);
+    }
+    done(&made);
+}
+
 /* A disc has the area of its parts, reaches over them, and is no smaller than the largest. */
 static void radii_hold_the_parts(void **state)
 {
@@ -154,9 +189,8 @@ static void a_thin_wall_keeps_both_faces(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(colours_are_rounded_means),
-        cmocka_unit_test(most_parts_give_class_and_linear),
-        cmocka_unit_test(radii_hold_the_parts),
+        cmocka_unit_test(colours_are_rounded_means),    cmocka_unit_test(most_parts_give_class_and_linear),
+        cmocka_unit_test(scalars_are_means_or_votes),   cmocka_unit_test(radii_hold_the_parts),
         cmocka_unit_test(a_thin_wall_keeps_both_faces),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -399,6 +399,46 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
+static char *write_text(const char *name, int count)
+{
+    char *path = path_of(name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    for (int i = 0; i < count; i++)
+        fprintf(f, "%d %d %s\n", i, i % 7, name);
+    assert_int_equal(fclose(f), 0);
+    return path;
+}
+
+/* Each scan gives by its size, one point at least, and the dataset knows that it is a part. */
+static void test_a_part_of_the_points(void **state)
+{
+    static const struct {
+        uint64_t most, read, part_of;
+    } rows[] = {{0, 130, 0}, {1000, 130, 0}, {130, 130, 0}, {129, 128, 130}, {65, 65, 130}, {13, 13, 130}, {1, 2, 130}};
+    const char *inputs[2] = {write_text("1", 100), write_text("2", 30)}, *output = path_of("out.spld");
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_pack_options options = {.size = sizeof options,
+                                           .inputs = inputs,
+                                           .input_count = 2,
+                                           .output = output,
+                                           .points_only = true,
+                                           .max_points = rows[i].most};
+        struct spl_pack_report report;
+        struct spl_dataset *dataset;
+        struct spl_error err = {0};
+        if (spl_pack(&options, &report, &err) || spl_dataset_open(output, true, &dataset, &err))
+            fail_msg("%s", err.message);
+        const json_t *part_of = json_object_get(spl_dataset_get_meta(dataset), "part_of");
+        assert_int_equal(report.points_read, rows[i].read);
+        assert_int_equal(report.part_of, rows[i].part_of);
+        assert_int_equal(json_integer_value(part_of), rows[i].part_of);
+        assert_true(!part_of == !rows[i].part_of);
+        spl_dataset_close(dataset);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -410,6 +450,7 @@ int main(void)
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
         cmocka_unit_test(test_coarse_floats),
+        cmocka_unit_test(test_a_part_of_the_points),
     };
     if (!mkdtemp(folder))
         return 1;

@@ -27,6 +27,62 @@ static int json(const char *text, struct spl_view_request *out, struct spl_error
     return spl_view_request_from_json(text, strlen(text), &defaults, &limits, out, err);
 }
 
+/* Moves points by 100 in EPSG:4326; knows of 9 later, and of nothing else. */
+static int move(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
+                double out[3], struct spl_error *err)
+{
+    (void)places;
+    if (crs == 9)
+        return spl_fail_field(err, SPL_E_BUSY, "crs", "not yet");
+    if (crs != 4326)
+        return spl_fail_field(err, SPL_E_INPUT, "crs", "no");
+    for (int i = 0; in && i < 3; i++)
+        out[i] = in[i] + 100;
+    return in && in[0] > 1000 ? spl_fail_field(err, SPL_E_INPUT, name, "%s is too far", name) : 0;
+}
+
+static void points_of_other_coordinates_are_moved_into_the_world(void **state)
+{
+    (void)state;
+    const struct spl_camera_places places = {move};
+    struct spl_camera_defaults placed = defaults;
+    struct spl_view_request r;
+    struct spl_error err;
+    placed.places = &places;
+    const char *moved = "crs=EPSG:4326&eye=1,2,3&target=4,5,6", *half = "crs=OGC:CRS84&target=4,5,6";
+    assert_int_equal(spl_view_request_from_query(moved, strlen(moved), &placed, &limits, &r, &err), 0);
+    assert_true(r.view.camera.eye[0] == 101 && r.view.camera.eye[1] == 102 && r.view.camera.eye[2] == 103);
+    assert_int_equal(spl_view_request_from_query(half, strlen(half), &placed, &limits, &r, &err), 0);
+    assert_true(r.view.camera.eye[0] == 10); // the default view's, which is in the world
+    const struct {
+        const char *text, *field;
+        int code;
+    } wrong[] = {
+        {"crs=EPSG:9", "crs", SPL_E_BUSY},
+        {"crs=EPSG:5", "crs", SPL_E_INPUT},
+        {"crs=EPSG:4326&eye=1001,0,0", "eye", SPL_E_INPUT},
+        {"crs=EPSG:4326&target=1001,0,0", "target", SPL_E_INPUT},
+        {"crs=EPSG:4326&crs=EPSG:4326", "crs", SPL_E_INPUT},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        err = (struct spl_error){0};
+        assert_int_equal(
+            spl_view_request_from_query(wrong[i].text, strlen(wrong[i].text), &placed, &limits, &r, &err),
+            wrong[i].code);
+        assert_string_equal(err.field, wrong[i].field);
+    }
+    static const char *const bad[] = {"EPSG:", "EPSG:0", "EPSG:01", "EPSG:1234567", "4326", "EPSG:4326+5", "+proj=utm",
+                                      "EPSG:-1", "EPSG:1.5", "OGC:CRS83", "EPSG:4326 ", "a=b"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct spl_value value = {0};
+        err = (struct spl_error){0};
+        assert_int_equal(spl_value_from_choice(&value, SPL_KIND_CRS, "crs", bad[i], &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "crs");
+    }
+    assert_int_equal(query("crs=EPSG:4326", &r, &err), SPL_E_INPUT); // nobody here knows where the world lies
+    assert_string_equal(err.field, "crs");
+}
+
 static void nothing_given_is_the_default_view(void **state)
 {
     (void)state;
@@ -513,6 +569,7 @@ static void percent_decoding_is_exact(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points_of_other_coordinates_are_moved_into_the_world),
         cmocka_unit_test(nothing_given_is_the_default_view),
         cmocka_unit_test(every_parameter_arrives),
         cmocka_unit_test(ogc_names_mean_the_same),
