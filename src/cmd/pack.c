@@ -215,7 +215,7 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, pack.columns)},
     {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
      SPL_CMD_FLAG(struct arguments, pack.intensity)},
-    {"keep", "NAME,…",
+    {"keep", "LIST",
      "fields of the scans beside class, intensity, return_number, number_of_returns and scan, as they are called "
      "there: gps_time, scan_angle, extra bytes, properties, columns; 'none' among them leaves out what is not named",
      SPL_CMD_TEXT(struct arguments, pack.keep)},
@@ -272,7 +272,7 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "pack",
     .before =
-        "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep NAME,…]\n"
+        "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep LIST]\n"
         "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
         "                   [--max-points N] [--threads N]\n"
