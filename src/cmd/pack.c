@@ -282,7 +282,7 @@ static const struct spl_cmd_table table = {
         "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are "
         "kept once.\n"
         "IN is a scan, a folder (all scans in it and below, by the endings of their names) or @LIST, a text with a\n"
-        "path a line, relative to its own folder, '#' before comments. What is named twice is taken once.\n\n"
+        "path a line, relative to its own folder (those with # in front are comments). What is named twice is taken once.\n\n"
         "One scan, and what came of it:\n"
         "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
         "Several scans of one place, in the same coordinates, into one dataset:\n"

@@ -189,6 +189,31 @@ static void mention_overruled(const struct finding *f, double unit_m)
     }
 }
 
+/* A dataset has one unit, which is also its system's: one in another unit is none of these coordinates, and would place
+ * them elsewhere. The user's own is refused, that of the scans, whose unit the user knows better, left out (*crs NULL). */
+static int check_system(const struct finding *f, const struct spl_scan *of, const struct spl_cloud_coordinates **crs,
+                        double unit_m, struct spl_error *err)
+{
+    const struct spl_cloud_coordinates *c = *crs;
+    char a[SPL_UNIT_TEXT_MAX], b[SPL_UNIT_TEXT_MAX], name[96];
+    const char *own = c->angles ? "degrees" : spl_unit_print(c->unit_m, a);
+    if (f->has_crs && c->height_unit_m > 0 && c->unit_m > 0 && fabs(c->unit_m / c->height_unit_m - 1) > heights_alike)
+        return spl_fail_field(err, SPL_E_USAGE, "crs",
+                              "--crs %.60s: x and y are in %s, heights in %s, and a dataset has one unit: name the "
+                              "system of x and y alone",
+                              name_system(c, name), own, spl_unit_print(c->height_unit_m, b));
+    if (!f->has_unit || unit_m == 0 || (!c->angles && (c->unit_m == 0 || spl_unit_is_same(c->unit_m, unit_m))))
+        return SPL_OK;
+    if (f->has_crs)
+        return spl_fail_field(err, SPL_E_USAGE, "unit",
+                              "--unit %.40s contradicts --crs %.60s, which is in %s: leave one of them out",
+                              f->options->unit, name_system(c, name), own);
+    say(f, "the coordinate system of %.60s, %s, is in %s and left out: --crs says which one it is in %s", of->name,
+        name_system(c, name), own, spl_unit_print(unit_m, b));
+    *crs = NULL;
+    return SPL_OK;
+}
+
 static int read_options(struct finding *f, struct spl_error *err)
 {
     const struct spl_system_options *o = f->options;
@@ -221,6 +246,8 @@ static int find(struct finding *f, struct spl_system *system, struct spl_error *
         return rc;
     if (f->has_crs || f->has_unit)
         mention_overruled(f, system->unit_m);
+    if (crs && (rc = check_system(f, of, &crs, system->unit_m, err)))
+        return rc;
     if (crs && spl_crs_is_said(crs) && (crs->epsg || crs->wkt) && !(system->crs = spl_crs_print(crs)))
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the coordinate system");
     return SPL_OK;

@@ -354,10 +354,17 @@ static void test_coordinate_systems(void **state)
         {{GRID, 25832, 0, NULL, REST}, {0}, "unknown", NULL, "unknown | EPSG:25832", NULL},
         {{GRID, 0, 9001, NULL, REST}, {0}, NULL, "EPSG:2994", "ft | EPSG:2994",
          "a.las says that it is in m: taken as ft, as --crs says"},
-        {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", "EPSG:25832+EPSG:7837", "0.2 m | EPSG:25832+EPSG:7837", NULL},
+        {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", NULL, "0.2 m | null", NULL},
+        {{GRID, 0, 0, NULL, REST}, {0}, NULL, "EPSG:25832+EPSG:7837", "m | EPSG:25832+EPSG:7837", NULL},
+        {{GRID, 0, 0, NULL, REST}, {0}, "m", "EPSG:25832", "m | EPSG:25832", NULL},
+        {{GRID, 2994, 0, NULL, REST}, {0}, "m", NULL, "m | null", "EPSG:2994, is in ft and left out"},
+        {{GRID, 0, 0, degrees, REST}, {0}, "m", NULL, "m | null", "EPSG:4326, is in degrees and left out"},
         /* what users get wrong */
         {{GRID, 0, 0, NULL, REST}, {0}, "metre", NULL, "-", "--unit takes m, ft, us-ft"},
         {{GRID, 0, 0, NULL, REST}, {0}, NULL, "25832", "-", "--crs takes EPSG and a number"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", "EPSG:25832", "-", "--unit 0.2 m contradicts --crs EPSG:25832"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "m", "EPSG:4326", "-", "EPSG:4326, which is in degrees"},
+        {{GRID, 0, 0, NULL, REST}, {0}, NULL, "EPSG:2992+EPSG:5703", "-", "x and y are in ft, heights in m"},
         {{GRID, 0, 0, NULL, REST}, {0}, NULL, "EPSG:4326", "-", "--crs EPSG:4326: longitudes"},
         {{GRID, 0, 0, NULL, REST}, {0}, "unknown", "EPSG:4326", "unknown | EPSG:4326", NULL},
         /* angles, and heights of their own */
