@@ -149,15 +149,25 @@ function showFrame({detail: frame}) {
   writeLink();
 }
 
-function showPoints({detail}) {
-  const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
-  if (points.distance !== null) rows.push(["A – B", points.distanceText]);
-  $("points").replaceChildren(
+/** [term, text] rows into a <dl>. */
+function fill(list, rows) {
+  list.replaceChildren(
     ...rows.flat().map((text, i) => {
       const cell = document.createElement(i % 2 ? "dd" : "dt");
       cell.textContent = text;
       return cell;
     }),
+  );
+}
+
+function showPoints({detail}) {
+  const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
+  if (points.distance !== null) rows.push(["A – B", points.distanceText]);
+  fill($("points"), rows);
+  const had = Object.entries(points.list.at(-1)?.attributes ?? {}).filter(([, value]) => value !== null);
+  fill(
+    $("attributes"),
+    had.map(([name, value]) => [name.replaceAll("_", " "), `${+value.toPrecision(9)}`]),
   );
   $("clear").disabled = !points.list.length;
   if (typeof detail === "string") say(detail);

@@ -238,6 +238,8 @@ def test_clicks_give_coordinates_and_a_distance():
         tab.run("document.querySelector('#stage').focus()")
         tab.key("Enter")
         tab.until("document.querySelectorAll('#points dd').length === 3")
+        had = tab.run("[...document.querySelectorAll('#attributes dt')].map(e => e.textContent)")
+        assert had == [a["name"] for a in daemon.ask("/v1/datasets/wall").json()["attributes"]] and had, had
         a, b = points(tab)
         focal = tab.run("document.querySelector('#stage').clientHeight") / 2 / math.tan(math.radians(25))
         for (px, py, pz), (u, v) in zip((a, b), ((60, -40), (0, 0))):

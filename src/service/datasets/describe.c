@@ -56,6 +56,16 @@ static json_t *describe_textures(const struct spl_dataset_info *info)
     return json_pack("{s:i, s:i, s:o}", "size", (int)info->texture_size, "atoms", (int)info->atoms, "methods", methods);
 }
 
+/* What picks give of a splat beside what every dataset has. */
+static json_t *describe_attributes(const struct spl_dataset_info *info)
+{
+    json_t *all = json_array();
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        json_array_append_new(all,
+                              json_pack("{s:s, s:s}", "name", info->streams[s].name, "unit", info->streams[s].unit));
+    return all;
+}
+
 /* A copy: a reply is taken apart while other threads may read META. */
 static json_t *describe_color(const struct spl_dataset *dataset)
 {
@@ -92,6 +102,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", describe_layers());
     set(json, "methods", describe_methods(info));
+    set(json, "attributes", describe_attributes(info));
     set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     json_t *formats = json_array();
