@@ -69,6 +69,16 @@ static int find_part(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+/* What was taken for text, and is none, may be a damaged file of what its name says. */
+static void name_ending(const struct spl_cloud *cloud, const char *path, struct spl_error *err)
+{
+    const char *named = spl_cloud_find_wrong_ending(path, cloud->reader, cloud->reader->format);
+    size_t used = err ? strlen(err->message) : 0;
+    if (named && used && cloud->reader == &spl_text_reader)
+        snprintf(err->message + used, sizeof err->message - used,
+                 "; by its name it is %s, but it does not begin like that: it may be damaged", named);
+}
+
 int spl_cloud_open(const char *path, const struct spl_cloud_options *options, struct spl_cloud **out,
                    struct spl_error *err)
 {
@@ -91,6 +101,8 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
         goto fail;
     cloud->info.format = cloud->reader->format;
     code = cloud->reader->open(cloud, err);
+    if (code < 0)
+        name_ending(cloud, path, err);
     if (code == SPL_OK)
         code = spl_cloud_find_colors(cloud, err);
     if (code == SPL_OK)

@@ -30,6 +30,11 @@ int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint
     char *end;
     errno = 0;
     uint64_t value = strtoull(text, &end, 10);
+    if (isdigit((unsigned char)*text) && (*end == '.' || *end == 'e' || *end == 'E')) { /* "2e6" */
+        double real = strtod(text, &end);
+        value = real >= 0 && real <= 0x1p53 ? (uint64_t)real : 0;
+        errno = (double)value == real ? 0 : ERANGE;
+    }
     if (!isdigit((unsigned char)*text) || *end || errno || value < min || value > max)
         return spl_fail(err, SPL_E_USAGE, "%s takes a whole number from %" PRIu64 " to %" PRIu64 ", not '%s'", option,
                         min, max, text);
