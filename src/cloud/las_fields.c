@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "cloud/laz/decoder.h"
+#include "cloud/numbers.h"
 
 enum { description_bytes = 192, name_bytes = 32, record_extra = 4 };
 enum { has_no_data = 1, has_scale = 8, has_offset = 16 };
@@ -35,10 +36,20 @@ static const struct {
 static const unsigned with_time = 1 << 1 | 1 << 3 | 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7 | 1 << 8 | 1 << 9 | 1 << 10;
 static const unsigned with_infrared = 1 << 8 | 1 << 10;
 
+static const uint8_t numbers[] = {
+    SPL_NUMBER_NONE,
+    [SPL_LAS_U8] = SPL_NUMBER_UINT8,   [SPL_LAS_I8] = SPL_NUMBER_INT8,     [SPL_LAS_U16] = SPL_NUMBER_UINT16,
+    [SPL_LAS_I16] = SPL_NUMBER_INT16,  [SPL_LAS_U32] = SPL_NUMBER_UINT32,  [SPL_LAS_I32] = SPL_NUMBER_INT32,
+    [SPL_LAS_U64] = SPL_NUMBER_UINT64, [SPL_LAS_I64] = SPL_NUMBER_INT64,   [SPL_LAS_F32] = SPL_NUMBER_FLOAT32,
+    [SPL_LAS_F64] = SPL_NUMBER_FLOAT64,
+};
+
+/* Types 11 to 30 are two and three of the first ten. */
 static unsigned type_bytes(unsigned type)
 {
-    static const uint8_t bytes[] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
-    return type < sizeof bytes ? bytes[type] : type <= 30 ? type_bytes((type - 1) % 10 + 1) * ((type - 1) / 10 + 1) : 0;
+    return type <= SPL_LAS_F64 ? spl_number_bytes(numbers[type])
+           : type <= 30        ? type_bytes((type - 1) % 10 + 1) * ((type - 1) / 10 + 1)
+                               : 0;
 }
 
 static void add(struct spl_las_fields *fields, struct spl_cloud *cloud, const char *name, size_t length,
@@ -136,47 +147,12 @@ int spl_las_find_fields(struct spl_las_fields *fields, struct spl_cloud *cloud, 
     return SPL_OK;
 }
 
-#define READ(TYPE, BITS, TO_HOST)                                                                                      \
-    for (size_t i = 0; i < count; i++, p += stride) {                                                                  \
-        uint##BITS##_t word;                                                                                           \
-        TYPE v;                                                                                                        \
-        memcpy(&word, p, sizeof word);                                                                                 \
-        word = TO_HOST(word);                                                                                          \
-        memcpy(&v, &word, sizeof v);                                                                                   \
-        out[i] = (double)v;                                                                                            \
-    }                                                                                                                  \
-    break
-
-#define AS_IS(word) (word)
-
 void spl_las_read_field(const struct spl_las_field *field, const uint8_t *records, size_t stride, size_t count,
                         double *out)
 {
-    const uint8_t *p = records + field->at;
-    switch ((enum spl_las_type)field->type) {
-    case SPL_LAS_U8:
-        for (size_t i = 0; i < count; i++, p += stride)
-            out[i] = *p >> field->shift & (field->bits ? (1 << field->bits) - 1 : 0xff);
-        break;
-    case SPL_LAS_I8:
-        READ(int8_t, 8, AS_IS);
-    case SPL_LAS_U16:
-        READ(uint16_t, 16, le16toh);
-    case SPL_LAS_I16:
-        READ(int16_t, 16, le16toh);
-    case SPL_LAS_U32:
-        READ(uint32_t, 32, le32toh);
-    case SPL_LAS_I32:
-        READ(int32_t, 32, le32toh);
-    case SPL_LAS_U64:
-        READ(uint64_t, 64, le64toh);
-    case SPL_LAS_I64:
-        READ(int64_t, 64, le64toh);
-    case SPL_LAS_F32:
-        READ(float, 32, le32toh);
-    case SPL_LAS_F64:
-        READ(double, 64, le64toh);
-    }
+    spl_numbers_decode(numbers[field->type], false, records + field->at, stride, count, out);
+    for (size_t i = 0; field->bits && i < count; i++) /* of a byte */
+        out[i] = (unsigned)out[i] >> field->shift & ((1u << field->bits) - 1);
     if (field->scale == 1 && field->offset == 0 && isnan(field->no_data))
         return;
     for (size_t i = 0; i < count; i++)

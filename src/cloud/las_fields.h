@@ -25,7 +25,7 @@ enum spl_las_type {
 struct spl_las_field {
     int8_t column;                 // enum spl_column
     uint8_t type;                  // enum spl_las_type
-    uint8_t shift, bits;           /* of an integer's bits; bits 0: all of them */
+    uint8_t shift, bits;           /* of a byte; bits 0: all of the number */
     uint16_t at;                   /* in the record */
     uint32_t layer;                // enum spl_laz_want
     double scale, offset, no_data; /* value = number × scale + offset; NaN: every number is one */
