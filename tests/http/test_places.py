@@ -187,17 +187,27 @@ def test_what_is_wrong_is_said():
         assert d.ask(f"{VIEW}?{SMALL}").status == 200
 
 
+DERIVED = ('PROJCRS["site",BASEGEOGCRS["WGS 84",DATUM["WGS 84",ELLIPSOID["WGS 84",6378137,298.257223563]]],CONVERSION["c",'
+           'METHOD["{}"],PARAMETER["{}",{}]],CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]]')
+
+
 def test_what_a_dataset_does_not_say_is_not_guessed():
     bad = ["PROJCS[\"x\",EXTENSION[\"PROJ4\",\"+proj=utm +zone=1\"]]", "+proj=utm +zone=18", "/etc/passwd", "EPSG:2263+x",
            "GEOGCS[\"@/etc/passwd\"]", "BOUNDCRS[x,PARAMETERFILE[\"a\",\"/etc/passwd\"]]", "GEOGCS[\"x\",GRIDS]",
            "CONVERSION[METHOD[\"PROJ-based operation method: utm\"]]", "LOCAL_CS[\"site\",UNIT[\"metre\",1]]",
-           "PROJCS[" * 5000, "EPSG:999999", "nonsense["]
+           "PROJCS[" * 5000, "EPSG:999999", "nonsense[",
+           # methods that are PROJ's own texts: they name files, which may be a pipe that never ends
+           *(DERIVED.format(method, "x", "1") for method in ("PROJ defmodel model=PIPE", "proj utm zone=10", "PROJ")),
+           DERIVED.format("Proj defmodel", "model=PIPE +x", "1"), DERIVED.format("utm", "zone=10", "1")]
     with tempfile.TemporaryDirectory() as folder:
+        pipe = os.path.join(folder, "pipe")
+        os.mkfifo(pipe)
+        bad = [crs.replace("PIPE", pipe) for crs in bad]
         paths = [make(folder, "m", crs, f"bad{i}") for i, crs in enumerate(bad)]
         paths.append(make(folder, "", "", "none"))
         with Daemon(REAL, datasets=paths) as d:
             for i in range(len(bad)):
-                files = re.search(r"(?i)EXTENSION|@|grids|PARAMETERFILE|PROJ-based", bad[i])
+                files = "[" in bad[i] and re.search(r"(?i)EXTENSION|@|grids|PARAMETERFILE|PROJ(?![A-Z])|=", bad[i])
                 why = "extensions" if files else "own" if "[" in bad[i] else "--crs"
                 refused(d.ask(f"/v1/datasets/bad{i}/view?crs=EPSG:4326"), 400, "crs", "--crs", why)
                 assert d.ask(f"/v1/datasets/bad{i}").json()["crs"] == bad[i]

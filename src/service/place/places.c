@@ -57,12 +57,16 @@ static uint32_t read_epsg(const char *text)
     return count && count <= 6 && !*rest ? (uint32_t)strtoul(text, NULL, 10) : 0;
 }
 
-/* What in a WKT makes PROJ read files or run a pipeline of the text's. */
+/* What in a WKT makes PROJ read files or run a pipeline of the text's: an extension, a grid, a method whose name is a text
+ * of PROJ's own ("PROJ utm zone=10", "PROJ defmodel model=FILE"; no other word of WKT ends with PROJ), a setting. */
 static bool names_files(const char *wkt)
 {
-    static const char *const words[] = {"@", "EXTENSION", "PARAMETERFILE", "PROJ-based", "proj=", "init=", "grids"};
+    static const char *const words[] = {"@", "EXTENSION", "PARAMETERFILE", "grids", "="};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strcasestr(wkt, words[i]))
+            return true;
+    for (const char *at = wkt; (at = strcasestr(at, "PROJ")); at++)
+        if (!isalpha((unsigned char)at[4]))
             return true;
     return false;
 }
