@@ -157,6 +157,8 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+enum { crs_bytes_max = 64 << 10 };
+
 /* Optional: what coordinates are in, and where on earth. */
 static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
 {
@@ -164,8 +166,8 @@ static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
     double metres = 0;
     if (unit && (!json_is_string(unit) || !spl_unit_parse(json_string_value(unit), &metres)))
         return wrong(dataset, err, "unit", unit, SPL_UNIT_FORMS);
-    if (crs && !json_is_null(crs) && !json_is_string(crs))
-        return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number), or null");
+    if (crs && !json_is_null(crs) && (!json_is_string(crs) || json_string_length(crs) > crs_bytes_max))
+        return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number) of at most 64 KiB, or null");
     spl_unit_print(metres, dataset->info.unit);
     return SPL_OK;
 }

@@ -41,7 +41,8 @@ bool spl_unit_parse(const char *text, double *metres)
             return true;
         }
     char *end;
-    double value = isdigit((unsigned char)*text) ? strtod(text, &end) : 0;
+    bool decimal = isdigit((unsigned char)*text) && !strpbrk(text, "xX");
+    double value = decimal ? strtod(text, &end) : 0;
     if (!(value >= metres_least && value <= metres_most))
         return false;
     end += *end == ' ';

@@ -161,6 +161,7 @@ FORGE(unit_text, json_object_set_new(p->meta, "unit", json_string("furlong")))
 FORGE(unit_number, json_object_set_new(p->meta, "unit", json_integer(1)))
 FORGE(unit_gone, (json_object_del(p->meta, "unit"), json_object_del(p->meta, "crs")))
 FORGE(crs_number, json_object_set_new(p->meta, "crs", json_integer(2056)))
+FORGE(crs_long, json_object_set_new(p->meta, "crs", json_sprintf("%*s", (64 << 10) + 1, "")))
 FORGE(crs_null, json_object_set_new(p->meta, "crs", json_null()))
 FORGE(many_lines, p->chunks[0].extra_bits |= 255u << SPL_EXTRA_CLIP)
 FORGE(lines_past_page,
@@ -247,6 +248,7 @@ static const struct {
     {unit_number, "section META: \"unit\" is 1, and must be m, ft"},
     {unit_gone, NULL},
     {crs_number, "section META: \"crs\" is 2056, and must be a text"},
+    {crs_long, "section META: \"crs\" is "},
     {crs_null, NULL},
     {many_lines, "section HEAD 0: chunk 0 has more clip lines than splats"},
     {lines_past_page, "reaches beyond the end of its page"},

@@ -31,7 +31,7 @@ static void what_is_no_unit(void **state)
 {
     (void)state;
     static const char *const rows[] = {"",    "M",     "metre", "0.3048", "0 m",   "-1 m", "1e-7 m", "nan m",
-                                       "1 m ", "1  m", "inf m", "1e10 m", "0x1 mm", "m m",  "1 ft",   "ft "};
+                                       "1 m ", "1  m", "inf m", "0x10m", "1e10 m", "0x1 mm", "m m",  "1 ft",   "ft "};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         double metres = 7;
         if (spl_unit_parse(rows[i], &metres) || metres != 7)
