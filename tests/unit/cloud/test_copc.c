@@ -272,8 +272,8 @@ static void memory_refused_at_any_allocation(void **state)
 static void so_many_of_other_files(void **state)
 {
     static const char *const heads[] = {"", "105\n", "60\n", "# .PCD v.7\nFIELDS x y z\nWIDTH 105\nDATA ascii\n",
-                                        "ply\nformat ascii 1.0\nelement vertex 105\nproperty int x\nproperty int y\n"
-                                        "property int z\nend_header\n"};
+                                        ("ply\nformat ascii 1.0\nelement vertex 105\nproperty int x\nproperty int y\n"
+                                         "property int z\nend_header\n")};
     (void)state;
     for (size_t h = 0; h < sizeof heads / sizeof *heads; h++)
         for (uint64_t most = 1; most < 120; most += 13) {

@@ -326,7 +326,7 @@ static void long_headers_are_refused(void **state)
     (void)state;
     assert_non_null(text);
     strcpy(text, HEAD);
-    memset(text + strlen(HEAD), '\n', (2 << 20) - strlen(HEAD));
+    memset(text + sizeof HEAD - 1, '\n', (2 << 20) - (sizeof HEAD - 1));
     write_scratch(text, 2 << 20);
     free(text);
     struct loaded l;
