@@ -499,7 +499,7 @@ static void test_a_part_of_the_points(void **state)
                                            .points_only = true,
                                            .max_points = rows[i].most};
         struct spl_pack_report report;
-        struct spl_dataset *dataset;
+        struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
         if (spl_pack(&options, &report, &err) || spl_dataset_open(output, true, &dataset, &err))
             fail_msg("%s", err.message);
