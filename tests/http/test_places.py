@@ -166,6 +166,7 @@ def test_what_is_wrong_is_said():
         refused(d.ask(f"{DATASET}/place?crs=EPSG:4326"), 400, "position")
         refused(d.ask(f"{position}&world=1,2,3&crs=EPSG:4326"), 400, "position")
         refused(d.ask(f"{DATASET}?crs=EPSG:4326&world=1,2,3"), 400, "world")
+        refused(d.ask(f"{DATASET}/place?crs=EPSG:4326&world=1e9,2,3"), 400, "world", "from the dataset")
         refused(d.ask(f"{DATASET}?eye=1,2,3"), 400, "eye")
         refused(d.ask(f"{VIEW}?world=1,2,3"), 400, "world")
         refused(d.ask(f"{DATASET}/place", "POST", "{}", {"Content-Type": "application/json"}), 405, None)

@@ -262,8 +262,13 @@ int spl_places_from_world(struct spl_places *places, uint32_t crs, bool waits, c
     if (rc)
         return rc;
     bool good = spl_transform_apply(transform, false, in, out);
+    double distance_m = get_distance_m(places, transform, in);
     out[2] = in[2] * get_world_m(places, transform) / spl_transform_get_height_m(transform);
     pthread_mutex_unlock(&mutex);
+    if (!(distance_m <= reach_m))
+        return spl_fail_field(err, SPL_E_INPUT, "world",
+                              "world %.10g,%.10g,%.10g lies %.0f km from the dataset; at most %.0f km are allowed", in[0],
+                              in[1], in[2], distance_m / 1000, reach_m / 1000);
     if (good && isfinite(out[2]))
         return 0;
     return spl_fail_field(err, SPL_E_INPUT, "crs", "the world's %.10g,%.10g,%.10g has no place in EPSG:%u", in[0],
