@@ -1,10 +1,6 @@
 /* E57: scans of one file in turn, each in the frame of its scanner and brought to the world by its pose. A scan whose
  * viewpoint is known (it has a pose, spherical coordinates, or rows and columns) is a station.
  *
- * Colours become 0 to 255 and intensities 0 to 1 by the limits that a scan declares, so that scans with different ones
- * agree. Where a scan with colours has no limits and its type has room for more than 8 bits, all of them are taken as
- * they are and looked at.
- *
  * Invariant: `points` stands at point `taken` of scan `scan`. Owned by the cloud's thread. */
 #include <math.h>
 #include <stdio.h>
@@ -15,64 +11,22 @@
 #include "base/memory.h"
 #include "base/text.h"
 #include "cloud/crs.h"
-#include "cloud/e57/points.h"
+#include "cloud/e57_reader.h"
 #include "cloud/fields.h"
-#include "cloud/reader.h"
 #include "geom/quaternion.h"
 
 _Static_assert(SPL_E57_ROLES - SPL_E57_CLASS == SPL_COLUMN_COUNT - SPL_COLUMN_CLASS, "roles follow the columns");
 
-/* Of a value's range; NaN = it is not known. */
-struct range {
-    double least, most;
-};
-
-struct scan {
-    double pose[16];  /* row-major, scanner to world */
-    uint16_t station; /* UINT16_MAX = it has none */
-    bool posed, spherical;
-    bool misses; /* an unflagged point at the scanner itself is none */
-    struct range color[3], intensity;
-};
-
-struct e57 {
-    struct spl_e57_pages pages;
-    struct spl_e57_document document;
-    struct spl_e57_points points;
-    struct scan *scans;               /* document.scan_count */
-    struct spl_cloud_image *images;   /* document.image_count */
-    size_t scan;                      /* the one that is read; document.scan_count = the end */
-    const struct spl_e57_scan *named; /* the first one with points: its fields' names are known */
-    bool begun;
-    bool scale_colors, scale_intensity;
-    uint64_t room;                /* bytes of the file that no scan has claimed: none is told of twice */
-    struct spl_cloud_colors base; /* of the file as a whole */
-    double state[SPL_ROWS];
-};
-
-static bool known(const struct range *range)
-{
-    return isfinite(range->least) && isfinite(range->most) && range->most > range->least;
-}
-
-static int fail_scan(const struct spl_cloud *cloud, const struct spl_e57_scan *scan, const char *field,
-                     struct spl_error *err, const char *what)
-{
-    const struct e57 *e57 = cloud->state;
-    return spl_source_fail(&cloud->source, SPL_E_INPUT, field, err, "scan %zu ('%s'): %s",
-                           (size_t)(scan - e57->document.scans) + 1, scan->name, what);
-}
-
 /* The scanner's frame in the world's: the quaternion is not always a unit. */
-static int set_pose(const struct spl_cloud *cloud, const struct spl_e57_scan *from, struct scan *scan,
+static int set_pose(const struct spl_cloud *cloud, const struct spl_e57_scan *from, struct spl_e57_frame *scan,
                     struct spl_error *err)
 {
     const double *q = from->pose.rotation, *t = from->pose.translation;
     double r[9], length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(length > 1e-6 && length < 1e6))
-        return fail_scan(cloud, from, "rotation", err, "the quaternion of its pose is no rotation");
+        return spl_e57_fail_scan(cloud, from, "rotation", err, "the quaternion of its pose is no rotation");
     if (!isfinite(t[0]) || !isfinite(t[1]) || !isfinite(t[2]))
-        return fail_scan(cloud, from, "translation", err, "its pose is not finite");
+        return spl_e57_fail_scan(cloud, from, "translation", err, "its pose is not finite");
     spl_quaternion_to_matrix(q, r);
     for (int row = 0; row < 3; row++) {
         memcpy(scan->pose + 4 * row, r + 3 * row, 3 * sizeof *r);
@@ -81,22 +35,6 @@ static int set_pose(const struct spl_cloud *cloud, const struct spl_e57_scan *fr
     scan->pose[15] = 1;
     scan->posed = from->pose.given;
     return SPL_OK;
-}
-
-/* What is black and what is white in a field: the scan's limits, else those of a type whose range means them. */
-static struct range range_of(const struct spl_e57_field *field, const double limits[2], bool color)
-{
-    struct range declared = {limits[0], limits[1]}, range = {NAN, NAN};
-    bool floats = spl_e57_is_float(field);
-    if (known(&declared))
-        return declared;
-    if (floats && field->limits[0] >= 0 && field->limits[1] > 0 && field->limits[1] <= 1)
-        range = (struct range){0, 1};
-    else if (color && !floats && field->limits[0] >= 0 && field->limits[1] <= 255)
-        range = (struct range){0, 255};
-    else if (!color && !floats && field->bits < 64)
-        range = (struct range){field->limits[0], field->limits[1]};
-    return range;
 }
 
 static bool has_field(const struct spl_e57_document *document, const struct spl_e57_scan *scan, const char *name)
@@ -111,7 +49,7 @@ static bool has_field(const struct spl_e57_document *document, const struct spl_
  * of their extension or without. */
 static void find_columns(struct spl_cloud *cloud, struct spl_e57_scan *scan)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     const struct spl_e57_scan *first = e57->named;
     uint32_t taken = (1u << SPL_COLUMN_CLASS) - 1; /* no other field is a position or a colour */
     for (int column = SPL_COLUMN_CLASS; column < SPL_COLUMN_KEPT; column++)
@@ -139,17 +77,17 @@ static void find_columns(struct spl_cloud *cloud, struct spl_e57_scan *scan)
 
 static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     const struct spl_e57_document *document = &e57->document;
     struct spl_e57_scan *from = &e57->document.scans[index];
-    struct scan *scan = &e57->scans[index];
+    struct spl_e57_frame *scan = &e57->scans[index];
     bool cartesian = spl_e57_have3(from, SPL_E57_X), colors = spl_e57_have3(from, SPL_E57_RED);
     int code = set_pose(cloud, from, scan, err);
     if (code < 0)
         return code;
     scan->spherical = !cartesian && spl_e57_have3(from, SPL_E57_RANGE);
     if (from->points && !cartesian && !scan->spherical)
-        return fail_scan(cloud, from, "prototype", err,
+        return spl_e57_fail_scan(cloud, from, "prototype", err,
                          "its points have neither cartesianX, Y, Z nor sphericalRange, Azimuth, Elevation");
     bool cells = from->field[SPL_E57_ROW] >= 0 && from->field[SPL_E57_COLUMN] >= 0;
     scan->misses =
@@ -166,7 +104,8 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
         return code;
     cloud->info.points_expected += from->points;
     for (int k = 0; colors && k < 3; k++)
-        scan->color[k] = range_of(spl_e57_field(document, from, SPL_E57_RED + k), from->color_limits[k], true);
+        scan->color[k] =
+            spl_e57_find_range(spl_e57_field(document, from, SPL_E57_RED + k), from->color_limits[k], true);
     if (colors)
         cloud->columns |= 7u << SPL_COLUMN_RED;
     if (spl_e57_have3(from, SPL_E57_NX))
@@ -175,40 +114,15 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
     if (from->field[SPL_E57_CLASS] >= 0)
         cloud->info.attributes |= SPL_CLOUD_CLASS;
     if (from->field[SPL_E57_INTENSITY] >= 0)
-        scan->intensity = range_of(spl_e57_field(document, from, SPL_E57_INTENSITY), from->intensity_limits, false);
+        scan->intensity =
+            spl_e57_find_range(spl_e57_field(document, from, SPL_E57_INTENSITY), from->intensity_limits, false);
     return SPL_OK;
-}
-
-/* Whether colours and intensities are brought to one range: the former if each scan's is known, the latter if they
- * differ besides. */
-static void agree_on_ranges(struct spl_cloud *cloud)
-{
-    struct e57 *e57 = cloud->state;
-    const struct spl_e57_document *document = &e57->document;
-    const struct range *first = NULL;
-    bool each = true, same = true;
-    e57->scale_colors = true;
-    for (size_t i = 0; i < document->scan_count; i++) {
-        const struct spl_e57_scan *from = &document->scans[i];
-        const struct scan *scan = &e57->scans[i];
-        for (int k = 0; from->points && spl_e57_have3(from, SPL_E57_RED) && k < 3; k++) {
-            e57->scale_colors = e57->scale_colors && known(&scan->color[k]);
-            cloud->integer_colors |= !spl_e57_is_float(spl_e57_field(document, from, SPL_E57_RED + k));
-        }
-        if (!from->points || from->field[SPL_E57_INTENSITY] < 0)
-            continue;
-        first = first ? first : &scan->intensity;
-        each = each && known(&scan->intensity);
-        same = same && first->least == scan->intensity.least && first->most == scan->intensity.most;
-    }
-    e57->scale_intensity = each && !same;
-    cloud->scan_colors = !e57->scale_colors;
 }
 
 /* E57 is in metres, whatever its system is in: one in other units cannot be that of its coordinates. */
 static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
 {
-    const struct e57 *e57 = cloud->state;
+    const struct spl_e57 *e57 = cloud->state;
     struct spl_cloud_coordinates *crs = &cloud->info.coordinates;
     const char *text = e57->document.coordinates;
     struct spl_error why = {0};
@@ -239,7 +153,7 @@ static int list_images(struct spl_cloud *cloud, struct spl_error *err)
 {
     static const char *const kinds[] = {"", "visual reference", "pinhole", "spherical", "cylindrical"},
                              *const codings[] = {"", "JPEG", "PNG"};
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     e57->images = spl_alloc(e57->document.image_count, sizeof *e57->images, err);
     if (!e57->images)
         return SPL_E_NOMEM;
@@ -256,7 +170,7 @@ static int list_images(struct spl_cloud *cloud, struct spl_error *err)
 
 static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
 {
-    struct e57 *e57 = cloud->state = spl_alloc(1, sizeof *e57, err);
+    struct spl_e57 *e57 = cloud->state = spl_alloc(1, sizeof *e57, err);
     if (!e57)
         return SPL_E_NOMEM;
     int code = spl_e57_pages_init(&e57->pages, &cloud->source, err);
@@ -275,37 +189,14 @@ static int e57_open(struct spl_cloud *cloud, struct spl_error *err)
     for (size_t i = 0; i < count; i++)
         if ((code = set_scan(cloud, i, err)) < 0)
             return code;
-    agree_on_ranges(cloud);
+    spl_e57_agree_on_ranges(cloud);
     cloud->sampling = SPL_SAMPLE_INTENSITY;
     code = list_images(cloud, err);
     return code < 0 ? code : read_coordinates(cloud, err);
 }
 
-/* What the colours of a scan are made from, where it lacks what most of the file has. */
-static void set_colors(struct spl_cloud *cloud)
-{
-    struct e57 *e57 = cloud->state;
-    const struct spl_e57_scan *from = &e57->document.scans[e57->scan];
-    const struct scan *scan = &e57->scans[e57->scan];
-    bool rgb = spl_e57_have3(from, SPL_E57_RED), intensity = from->field[SPL_E57_INTENSITY] >= 0;
-    struct spl_cloud_colors colors = e57->base;
-    if (colors.from == SPL_COLORS_RGB && !rgb) {
-        colors = (struct spl_cloud_colors){0};
-        if (intensity && e57->scale_intensity)
-            colors = (struct spl_cloud_colors){.from = SPL_COLORS_INTENSITY, .white = 1};
-        else if (intensity && known(&scan->intensity))
-            colors = (struct spl_cloud_colors){
-                .from = SPL_COLORS_INTENSITY, .black = scan->intensity.least, .white = scan->intensity.most};
-    } else if (colors.from == SPL_COLORS_INTENSITY && !intensity) {
-        colors = (struct spl_cloud_colors){0};
-        if (rgb && e57->scale_colors)
-            colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255};
-    }
-    spl_cloud_set_colors(cloud, &colors);
-}
-
 /* The role's values for the next rows, or `none` where the scan does not have it. */
-static int read_column(struct e57 *e57, enum spl_e57_role role, double *out, size_t count, double none,
+static int read_column(struct spl_e57 *e57, enum spl_e57_role role, double *out, size_t count, double none,
                        struct spl_error *err)
 {
     if (e57->document.scans[e57->scan].field[role] >= 0)
@@ -315,7 +206,7 @@ static int read_column(struct e57 *e57, enum spl_e57_role role, double *out, siz
     return SPL_OK;
 }
 
-static int read_columns(struct e57 *e57, enum spl_e57_role role, struct spl_rows *rows, int column, int columns,
+static int read_columns(struct spl_e57 *e57, enum spl_e57_role role, struct spl_rows *rows, int column, int columns,
                         struct spl_error *err)
 {
     int code = SPL_OK;
@@ -325,9 +216,9 @@ static int read_columns(struct e57 *e57, enum spl_e57_role role, struct spl_rows
 }
 
 /* Positions in the scanner's frame; what is invalid has no place. */
-static int read_positions(struct e57 *e57, struct spl_rows *rows, struct spl_error *err)
+static int read_positions(struct spl_e57 *e57, struct spl_rows *rows, struct spl_error *err)
 {
-    const struct scan *scan = &e57->scans[e57->scan];
+    const struct spl_e57_frame *scan = &e57->scans[e57->scan];
     double *x = rows->value[SPL_COLUMN_X], *y = rows->value[SPL_COLUMN_Y], *z = rows->value[SPL_COLUMN_Z];
     double *state = e57->state;
     int code = read_columns(e57, scan->spherical ? SPL_E57_RANGE : SPL_E57_X, rows, SPL_COLUMN_X, 3, err);
@@ -357,26 +248,6 @@ static void turn(const double pose[16], bool translate, struct spl_rows *rows, i
     }
 }
 
-/* Brings a column's values from `range` to 0 to `white`. A colour beyond the limits contradicts them. */
-static int scale(const struct spl_cloud *cloud, struct spl_rows *rows, int column, const struct range *range,
-                 double white, struct spl_error *err)
-{
-    double *value = rows->value[column], factor = white / (range->most - range->least);
-    bool color = column != SPL_COLUMN_INTENSITY;
-    double most = range->most + (range->most - range->least) / 512;
-    for (size_t r = 0; r < rows->count; r++) {
-        if (color && value[r] > most && isfinite(rows->value[SPL_COLUMN_X][r])) {
-            const struct e57 *e57 = cloud->state;
-            char what[160];
-            snprintf(what, sizeof what, "point %llu has %g, but its limits are %g and %g",
-                     (unsigned long long)(e57->points.next + r), value[r], range->least, range->most);
-            return fail_scan(cloud, &e57->document.scans[e57->scan], spl_column_name(column), err, what);
-        }
-        value[r] = (value[r] - range->least) * factor;
-    }
-    return SPL_OK;
-}
-
 /* Does a batch show it? Intensity is also what grey is made of. */
 static bool is_wanted(const struct spl_cloud *cloud, int column)
 {
@@ -388,7 +259,7 @@ static bool is_wanted(const struct spl_cloud *cloud, int column)
            (column == SPL_COLUMN_INTENSITY && cloud->color.kind != SPL_COLOR_RGB);
 }
 
-static int read_scalars(struct e57 *e57, struct spl_rows *rows, int column, struct spl_error *err)
+static int read_scalars(struct spl_e57 *e57, struct spl_rows *rows, int column, struct spl_error *err)
 {
     double *value = rows->value[column];
     enum spl_e57_role role = SPL_E57_CLASS + (unsigned)(column - SPL_COLUMN_CLASS);
@@ -406,9 +277,9 @@ static int read_scalars(struct e57 *e57, struct spl_rows *rows, int column, stru
 
 static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_error *err)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     const struct spl_e57_scan *from = &e57->document.scans[e57->scan];
-    const struct scan *scan = &e57->scans[e57->scan];
+    const struct spl_e57_frame *scan = &e57->scans[e57->scan];
     int code = read_positions(e57, rows, err);
     if (code == SPL_OK && cloud->info.attributes & SPL_CLOUD_NORMAL)
         code = read_columns(e57, SPL_E57_NX, rows, SPL_COLUMN_NX, 3, err);
@@ -425,16 +296,16 @@ static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_
     }
     for (int k = 0;
          e57->scale_colors && spl_e57_have3(from, SPL_E57_RED) && cloud->color.kind != SPL_COLOR_GREY && k < 3; k++)
-        if ((code = scale(cloud, rows, SPL_COLUMN_RED + k, &scan->color[k], 255, err)) < 0)
+        if ((code = spl_e57_scale(cloud, rows, SPL_COLUMN_RED + k, &scan->color[k], 255, err)) < 0)
             return code;
     if (e57->scale_intensity && from->field[SPL_E57_INTENSITY] >= 0 && is_wanted(cloud, SPL_COLUMN_INTENSITY))
-        code = scale(cloud, rows, SPL_COLUMN_INTENSITY, &scan->intensity, 1, err);
+        code = spl_e57_scale(cloud, rows, SPL_COLUMN_INTENSITY, &scan->intensity, 1, err);
     return code;
 }
 
 static int e57_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     rows->count = 0;
     for (; e57->scan < e57->document.scan_count; e57->scan++, e57->begun = false) {
         const struct spl_e57_scan *from = &e57->document.scans[e57->scan];
@@ -442,7 +313,7 @@ static int e57_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
         if (code < 0)
             return code;
         if (!e57->begun)
-            set_colors(cloud);
+            spl_e57_set_colors(cloud);
         e57->begun = true;
         uint64_t left = from->points - e57->points.next;
         if (left == 0)
@@ -462,7 +333,7 @@ static int e57_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
 /* Parts in their order go forward: from one to the next costs the heads of the packets between them. */
 static int e57_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     const struct spl_e57_scan *scans = e57->document.scans;
     uint64_t to = cloud->info.points_expected / parts * part;
     size_t scan = 0;
@@ -482,7 +353,7 @@ static int e57_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
 
 static void e57_close(struct spl_cloud *cloud)
 {
-    struct e57 *e57 = cloud->state;
+    struct spl_e57 *e57 = cloud->state;
     spl_e57_points_finish(&e57->points);
     spl_e57_document_finish(&e57->document);
     spl_e57_pages_finish(&e57->pages);
