@@ -101,9 +101,11 @@ struct spl_pack_options {
     /* An even part of all scans' points: of COPC the coarse levels, which alone are read; of others so many. A
      * scan gives one point at least. 0 = all. */
     uint64_t max_points;
-    const char *unit;          /* of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say */
+    /* Of coordinates, whatever scans say: "m", "ft", "us-ft", "unknown", …; NULL = as they say. */
+    const char *unit;
     const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
-    double up[3];              /* what is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it */
+    /* What is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it. */
+    double up[3];
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)

@@ -102,7 +102,8 @@ static void complete(struct spl_cloud_coordinates *a, struct spl_cloud_coordinat
         struct spl_cloud_coordinates swapped = *a;
         *a = *b;
         *b = swapped;
-    } else if (same && a->angles == b->angles && (a->unit_m == 0 || b->unit_m == 0 || spl_unit_is_same(a->unit_m, b->unit_m))) {
+    } else if (same && a->angles == b->angles &&
+               (a->unit_m == 0 || b->unit_m == 0 || spl_unit_is_same(a->unit_m, b->unit_m))) {
         a->epsg = a->epsg ? a->epsg : b->epsg;
         a->unit_m = a->unit_m > 0 ? a->unit_m : b->unit_m;
         if (a->height_unit_m == 0 && a->height_epsg == 0) {

@@ -1,4 +1,5 @@
-/* splatd info: what a dataset holds (of scans see info_scan.c), what each attribute costs, and how many bits the scene needed. Everything is
+/* splatd info: what a dataset holds (of scans see info_scan.c), what each attribute costs, and how many bits the scene
+ * needed. Everything is
  * gathered into a struct first, which both outputs print. */
 #include "cmd/cmd.h"
 
@@ -246,7 +247,8 @@ int spl_cmd_info(int argc, char **argv)
     if (!parsed && a.picture)
         parsed = spl_cmd_check_ending("--dictionary", a.picture, "png", &wrong);
     if (!parsed && a.picture && spl_info_is_scan(argv[optind]))
-        parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of a dataset; %.300s is a scan", argv[optind]);
+        parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of a dataset; %.300s is a scan",
+                          argv[optind]);
     if (parsed)
         return spl_cmd_fail(&wrong);
     int worst = 0; /* the remaining files are still told of */

@@ -256,8 +256,7 @@ static int add_folder(struct finder *f, const char *path, struct spl_error *err)
     if (found && others)
         say(f,
             "%.300s: %zu scans are taken, %zu other files left (%s): in a folder the endings %s are a scan's; name "
-            "others "
-            "themselves",
+            "others themselves",
             path, found, others, spl_names_list(&f->other), endings);
     if (found || f->again.count > again || inputs->left_out_count > left_out)
         return SPL_OK;

@@ -155,7 +155,8 @@ static int write_dataset(struct pack *p, struct spl_error *err)
     if (spl_part_of(&p->scans))
         json_object_set_new(meta, "part_of", json_integer((json_int_t)spl_part_of(&p->scans)));
     if (p->up_from)
-        json_object_set_new(meta, "up", json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));
+        json_object_set_new(meta, "up",
+                            json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
     spl_stage_begin(p->stage, "writing", NULL, 0);
