@@ -76,6 +76,10 @@ void put_frame()
     put(frame.fill_levels), put(frame.fill_level);
     put(frame.fill_from), put(frame.fill_to), put(frame.fill_stride);
     put(frame.fill_keep);
+    for (int i = 0; i < 12; i++)
+        put(frame.map_pose[i]);
+    put(frame.map_near), put(frame.map_slack);
+    put(frame.map_sides);
 }
 
 void put_chunk(spl_draw_chunk c)

@@ -108,6 +108,35 @@
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
 #define SPL_FILL_SLOPE 4.0f
 
+/* Maps of stations: polar-capped atlases (src/geom/polar.h), as words on the device, of a station's own frame. First the
+ * ranges, an atlas of SPL_MAP_RANGE_APRON with two texels a word, the first in its low half:
+ *   0 not scanned   1..65534 near / range = 1 - (code - 1) / 65533   65535 nothing came back
+ * so that a larger code is farther. Then the colours, an atlas of SPL_MAP_APRON for each level, each half the one
+ * before: blocks of 4 x 4 texels, row by row, two words each as in BC1: two colours of 5, 6 and 5 bits (red in the high
+ * ones), the first in the low half; then two bits a texel, row by row from the low end: 0 the first colour, 1 the
+ * second, 2 a third of the way to it, 3 two thirds. */
+#define SPL_MAP_APRON 4
+#define SPL_MAP_RANGE_APRON 1
+#define SPL_MAP_LEVELS_MAX 5
+#define SPL_MAP_SIDE_STEP 64 /* sides of colours are multiples of it */
+#define SPL_MAP_SIDE_MAX 4096
+#define SPL_MAP_RANGE_SIDE_MAX 4096
+#define SPL_MAP_UNKNOWN 0u
+#define SPL_MAP_FARTHEST 65534u
+#define SPL_MAP_NO_RETURN 65535u
+/* frame.map_sides: colour side / SPL_MAP_SIDE_STEP 0..7, levels 8..11, side of ranges 12..31 */
+#define SPL_MAP_SIDES_LEVELS 8
+#define SPL_MAP_SIDES_RANGE 12
+
+/* Polynomials for arc functions (src/geom/polar.c says of what), each to 1e-7. */
+#define SPL_POLAR_EDGE 0.70710678f
+#define SPL_POLAR_CAP {0.636619771f, 0.212206994f, 0.0848667829f, 0.036603746f, 0.0147453893f, 0.0113055684f}
+#define SPL_POLAR_BAND                                                                                                 \
+    {0.636619824f, 0.106093225f, 0.0480611773f, 0.0248145942f, 0.0383738481f, -0.0342798067f, 0.0637454089f}
+#define SPL_POLAR_TURN                                                                                                 \
+    {0.636619697f, -0.21219691f, 0.127113627f, -0.0891477141f, 0.0628271488f, -0.037452184f, 0.0151391483f,            \
+     -0.00290285373f}
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */
@@ -213,6 +242,10 @@ struct spl_frame_params {
     SPL_U32 fill_from, fill_to;           /* words of its planes */
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 fill_keep;                    /* 1: samples are visible in any case */
+    SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
+    SPL_F32 map_near;                     /* range of code 1 */
+    SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
+    SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };
 
 #ifndef SPL_GLSL
@@ -220,7 +253,7 @@ _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
 _Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
-_Static_assert(sizeof(struct spl_frame_params) == 196, "spl_frame_params is 196 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 256, "spl_frame_params is 256 bytes on both sides");
 #endif
 
 #endif
