@@ -22,9 +22,6 @@ int spl_view_list_add_image(struct spl_view_list *list, const char *path, const 
                             const char *folder, const struct spl_photograph_options *photographs,
                             struct spl_error *err);
 
-/* Removes all views but the first `count`. */
-void spl_view_list_cut(struct spl_view_list *list, size_t count);
-
 /* Where image file `name` of the model in `folder` lies, as views.h says; the caller frees it. NULL: SPL_E_NOMEM. */
 char *spl_view_list_find(const char *folder, const char *name, const struct spl_photograph_options *photographs,
                          struct spl_error *err);

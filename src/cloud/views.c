@@ -238,6 +238,25 @@ int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_
     return spl_view_list_load_photographs(list, path, NULL, err);
 }
 
+int spl_view_list_append(struct spl_view_list *list, struct spl_view_list *more, struct spl_error *err)
+{
+    uint32_t panoramas = 0;
+    if (more->count > SPL_VIEW_LIST_MAX - list->count)
+        return spl_fail_field(err, SPL_E_LIMIT, "views", "more than %d views", SPL_VIEW_LIST_MAX);
+    if (spl_array_reserve(list->views, list->capacity, list->count + more->count, err))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < list->count; i++)
+        panoramas = list->views[i].panorama > panoramas ? list->views[i].panorama : panoramas;
+    for (size_t i = 0; i < more->count; i++) {
+        struct spl_named_view *view = &list->views[list->count++];
+        *view = more->views[i];
+        view->panorama += view->panorama ? panoramas : 0;
+    }
+    more->count = 0;
+    spl_view_list_finish(more);
+    return SPL_OK;
+}
+
 void spl_view_list_cut(struct spl_view_list *list, size_t count)
 {
     for (; list->count > count; list->count--) {

@@ -93,6 +93,16 @@ int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
 int spl_panoramas_load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *options,
                        struct spl_error *err);
 
+/* Removes all views but the first `count`. */
+void spl_view_list_cut(struct spl_view_list *list, size_t count);
+
+/* Whether a scan's file has images that are views: an E57 whose images2D have poses. Any thread; blocks for reading. */
+bool spl_panoramas_are_inside(const char *path);
+
+/* Moves the views of `more`, which is left empty, to the end of `list`; their panoramas are numbered on. SPL_E_LIMIT,
+ * SPL_E_NOMEM; both lists as they were then. */
+int spl_view_list_append(struct spl_view_list *list, struct spl_view_list *more, struct spl_error *err);
+
 /* An inner photograph as a file of its own, which the caller closes: the image as it was stored. Any thread; blocks. */
 int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct spl_error *err);
 

@@ -222,6 +222,20 @@ int spl_view_list_load_e57(struct spl_view_list *list, const char *path,
     return rc;
 }
 
+static void pass_over(void *context, const struct spl_error *why)
+{
+    (void)context, (void)why;
+}
+
+bool spl_panoramas_are_inside(const char *path)
+{
+    struct spl_view_list list = {0};
+    const struct spl_photograph_options all = {.refuse = pass_over};
+    bool are = spl_view_list_is_e57(path) && !spl_view_list_load_e57(&list, path, &all, NULL) && list.count;
+    spl_view_list_finish(&list);
+    return are;
+}
+
 /* Copies a blob's bytes to a file in memory. */
 static int copy_blob(struct spl_e57_pages *pages, const struct spl_inner_photograph *inner, FILE *file,
                      struct spl_error *err)
