@@ -15,7 +15,7 @@
 #include "dataset/dataset.h"
 #include "dataset/atoms.h"
 #include "dataset/dictionary.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 #include "dataset/texture.h"
 #include "geom/tangent.h"
 #include "sparse/atom.h"
@@ -337,7 +337,7 @@ static int code_chunk(void *context, uint64_t chunk, struct spl_chunk_code *code
     return SPL_OK;
 }
 
-static void test_retexture(void **state)
+static void test_rewrite(void **state)
 {
     (void)state;
     struct spl_dataset *from = some_dataset(), *to, *plain;
@@ -348,19 +348,19 @@ static void test_retexture(void **state)
     struct spl_dictionary dictionary = make_dictionary(300, 16, 1);
     struct coding coding = {.from = from, .dictionary = &dictionary, .fail_at = 3};
     json_t *about = json_pack("{s:i}", "photographs", 3);
-    struct spl_retexture what = {.from = from,
+    struct spl_rewrite what = {.from = from,
                                  .colors = (const uint8_t(*)[3])colors,
                                  .dictionary = &dictionary,
                                  .code_chunk = code_chunk,
                                  .context = &coding,
                                  .textures = about};
     struct spl_error err = {0};
-    assert_int_equal(spl_dataset_retexture(&what, path, &err), SPL_E_CANCELLED);
+    assert_int_equal(spl_dataset_rewrite(&what, path, &err), SPL_E_CANCELLED);
     assert_string_equal(err.message, "enough");
     assert_int_equal(access(path, F_OK), -1);
 
     coding = (struct coding){.from = from, .dictionary = &dictionary, .fail_at = UINT32_MAX};
-    assert_int_equal(spl_dataset_retexture(&what, path, NULL), SPL_OK);
+    assert_int_equal(spl_dataset_rewrite(&what, path, NULL), SPL_OK);
     const struct spl_dataset_info *info = spl_dataset_get_info(from);
     uint64_t chunk_count;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(from, &chunk_count);
@@ -400,8 +400,13 @@ static void test_retexture(void **state)
         if (!verify)
             spl_dataset_close(to);
     }
-    /* And back: textures dropped, colours kept. */
-    assert_int_equal(spl_dataset_retexture(&(struct spl_retexture){.from = to}, path, NULL), SPL_OK);
+    /* What nobody says anew stays, to the byte; and back: textures dropped, colours kept. */
+    assert_int_equal(spl_dataset_rewrite(&(struct spl_rewrite){.from = to}, path, NULL), SPL_OK);
+    assert_int_equal(spl_dataset_open(path, true, &plain, NULL), SPL_OK);
+    assert_true(spl_dataset_get_info(plain)->version == spl_dataset_get_info(to)->version);
+    spl_dataset_close(plain);
+    const struct spl_rewrite bare = {.from = to, .dictionary = &(struct spl_dictionary){.count = 0}};
+    assert_int_equal(spl_dataset_rewrite(&bare, path, NULL), SPL_OK);
     assert_int_equal(spl_dataset_open(path, true, &plain, NULL), SPL_OK);
     same_splats(to, plain, false);
     info = spl_dataset_get_info(plain);
@@ -584,7 +589,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_codes),        cmocka_unit_test(test_judge),     cmocka_unit_test(test_atoms),
         cmocka_unit_test(test_forged_atoms), cmocka_unit_test(test_expand),    cmocka_unit_test(test_tangent),
-        cmocka_unit_test(test_retexture),    cmocka_unit_test(test_bad_files),
+        cmocka_unit_test(test_rewrite),    cmocka_unit_test(test_bad_files),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
