@@ -67,6 +67,8 @@ struct spl_dataset_info {
     uint32_t stream_count; /* attributes beyond these, up to SPL_STREAMS_MAX */
     struct spl_stream_info streams[SPL_STREAMS_MAX];
     char unit[SPL_STREAM_TEXT_MAX]; /* of coordinates: "m", "ft", "us-ft", "unknown" */
+    uint32_t maps;                  /* stations with a panorama's map of colours and ranges */
+    uint64_t map_texels, map_bytes; /* of all: texels of the colours' finest level; bytes, among page_bytes */
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are

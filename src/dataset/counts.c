@@ -33,6 +33,7 @@ void spl_counts_add_tables(struct spl_counts *counts, const struct spl_tables *t
         counts->stream_bits[s] += bits;
         header_bits += 32 * words - bits + 8ull * SPL_STREAM_CHUNK_BYTES * tables->chunk_count;
     }
+    header_bits += tables->stations ? 8ull * sizeof *tables->stations * tables->chunk_count : 0;
     counts->bits[SPL_ATTRIBUTE_CHUNK] += header_bits;
     for (uint32_t n = 0; n < tables->node_count; n++) {
         const struct spl_node *node = &tables->nodes[n];

@@ -1,5 +1,5 @@
 /* Opening a packed dataset from wherever its bytes come (source.h): what describes it is read into memory and checked
- * from the outside in (sections.c, meta.c, structure.c, textures.c) before anyone else sees it. After that nothing
+ * from the outside in (sections.c, meta.c, structure.c, maps.c, textures.c) before anyone else sees it. After that nothing
  * changes, so every accessor runs on any thread. What is trusted without a look is only the pages' codes, and any code
  * decodes to finite numbers.
  *
@@ -162,6 +162,7 @@ static void destroy(struct spl_dataset *dataset)
     free(dataset->whole.nodes);
     free(dataset->whole.chunks);
     free(dataset->whole.textures);
+    free(dataset->whole.stations);
     for (uint32_t s = 0; s < SPL_STREAMS_MAX; s++) {
         free(dataset->whole.base[s]);
         free(dataset->whole.width[s]);

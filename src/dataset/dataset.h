@@ -10,6 +10,7 @@
 #include <jansson.h>
 
 #include "dataset/format.h"
+#include "dataset/map.h"
 #include "dataset/source.h"
 #include "dataset/streams.h"
 #include "dataset/tables.h"
@@ -79,6 +80,18 @@ size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t
  * dictionary and chunks, so that every code read decodes. SPL_E_CORRUPT. Any thread; blocks on disk. */
 int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err);
 
+/* Maps of stations; see map.h. A row of each, *count = info.maps of them; NULL without. */
+const struct spl_map_row *spl_dataset_get_maps(const struct spl_dataset *dataset, uint32_t *count);
+
+/* Bytes of the map of station `index` (< info.maps): those of its spl_map_words(). */
+size_t spl_dataset_get_map_bytes(const struct spl_dataset *dataset, uint32_t index);
+
+/* Reads it to `out`, as read_page. */
+int spl_dataset_read_map(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err);
+
+/* By chunk, of a dataset that keeps all its tables; NULL without maps. */
+const struct spl_chunk_stations *spl_dataset_get_chunk_stations(const struct spl_dataset *dataset);
+
 /* Adds every splat to histogram[number of its atoms], 0..SPL_ATOMS_MAX. As read_textures. */
 int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogram, struct spl_error *err);
 
@@ -111,7 +124,8 @@ uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_
  *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
  *   bool (optional, true)}, "counts" {…} (the writer's, see counts.h),
  *   "streams" [{"name": string, "type": string, "unit": string, of type "steps" too "first": whole number,
- *   "steps_a_unit": real}] (optional; the writer's),
+ *   "steps_a_unit": real}] (optional; the writer's), "pruned" {"of": int} (optional: leaf splats before nodes were
+ *   dropped), "maps" {…} (optional, free),
  *   "unit" "m" | "ft" | "us-ft" | … | "unknown" (optional; geom/unit.h), "crs" string or null (optional), "up"
  *   {"vector": [3], "from": string} (optional, of no meaning to a reader), "sources" [string], "pack"
  * {...} (optional, free: settings, statistics), "stations"

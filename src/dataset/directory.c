@@ -22,7 +22,7 @@ static const char *judge_row(const struct spl_dataset *dataset, const struct spl
         return "has no nodes or no chunks";
     uint64_t nodes = next->first_node - row->first_node, chunks = next->first_chunk - row->first_chunk;
     if (nodes > bytes / SPL_NODE_BYTES || chunks > bytes / SPL_CHUNK_BYTES ||
-        bytes != spl_head_bytes(nodes, chunks, dataset->info.stream_count, dataset->textures))
+        bytes != spl_head_bytes(nodes, chunks, dataset->info.stream_count, dataset->textures, dataset->maps))
         return "has another number of nodes or chunks than its head has room for";
     uint64_t ids = next->first_id - row->first_id, children = next->first_child - row->first_child;
     if (ids < chunks || ids > chunks * SPL_CHUNK_SPLATS) /* which a row that falls has by far */

@@ -37,6 +37,9 @@ struct spl_file_header { /* at offset 0 */
 /* Textures; a file has all of these kinds or none. */
 #define SPL_SECTION_ATOMS SPL_FOURCC('A', 'T', 'O', 'M')    /* struct spl_atoms_header, cosine coefficients */
 #define SPL_SECTION_TEXTURES SPL_FOURCC('T', 'E', 'X', 'P') /* codes of a page's chunks; `index` is the page's */
+/* Maps of stations; the same. map.h has what they hold. */
+#define SPL_SECTION_STATIONS SPL_FOURCC('P', 'A', 'N', 'O') /* struct spl_map_row[stations] */
+#define SPL_SECTION_MAP SPL_FOURCC('P', 'M', 'A', 'P')      /* words of a map; `index` is its row's */
 
 struct spl_section {
     uint32_t type;
@@ -49,8 +52,9 @@ struct spl_section {
  * behind the last page's closes it. A page has those from its row's on to the next one's.
  *
  * HEAD has, back to back: the first SPL_NODE_BYTES of each struct spl_node of the page; the first SPL_CHUNK_BYTES of
- * each struct spl_chunk; with textures a uint32_t of each chunk (SPL_CHUNK_TEXTURE_*, 0 = none); of each optional
- * attribute a uint32_t of each chunk, its base; of each attribute a uint8_t of each chunk, its width. */
+ * each struct spl_chunk; with textures a uint32_t of each chunk (SPL_CHUNK_TEXTURE_*, 0 = none); with maps of stations
+ * a struct spl_chunk_stations of each chunk; of each optional attribute a uint32_t of each chunk, its base; of each
+ * attribute a uint8_t of each chunk, its width. */
 struct spl_page_row {
     uint64_t first_node, first_chunk;
     uint64_t first_id;    /* of splats and vertices of lines */

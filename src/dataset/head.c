@@ -5,10 +5,11 @@
 
 #include "dataset/streams.h"
 
-uint64_t spl_head_bytes(uint64_t nodes, uint64_t chunks, uint32_t streams, bool textured)
+uint64_t spl_head_bytes(uint64_t nodes, uint64_t chunks, uint32_t streams, bool textured, bool mapped)
 {
-    return nodes * SPL_NODE_BYTES +
-           chunks * (SPL_CHUNK_BYTES + (textured ? sizeof(uint32_t) : 0) + streams * SPL_STREAM_CHUNK_BYTES);
+    uint64_t of_chunk = SPL_CHUNK_BYTES + (textured ? sizeof(uint32_t) : 0) +
+                        (mapped ? sizeof(struct spl_chunk_stations) : 0) + streams * SPL_STREAM_CHUNK_BYTES;
+    return nodes * SPL_NODE_BYTES + chunks * of_chunk;
 }
 
 static char *put(char *to, const void *from, size_t bytes)
@@ -29,6 +30,8 @@ void spl_head_write(const struct spl_tables *tables, char *bytes)
     }
     if (tables->textures)
         bytes = put(bytes, tables->textures, words);
+    if (tables->stations)
+        bytes = put(bytes, tables->stations, tables->chunk_count * sizeof *tables->stations);
     for (uint32_t s = 0; s < tables->stream_count; s++)
         bytes = put(bytes, tables->base[s], words);
     for (uint32_t s = 0; s < tables->stream_count; s++)

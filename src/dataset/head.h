@@ -5,7 +5,7 @@
 #include "dataset/tables.h"
 
 /* Bytes of a head with so many nodes and chunks, each fewer than 2^40. */
-uint64_t spl_head_bytes(uint64_t nodes, uint64_t chunks, uint32_t streams, bool textured);
+uint64_t spl_head_bytes(uint64_t nodes, uint64_t chunks, uint32_t streams, bool textured, bool mapped);
 
 /* Writes as many bytes as spl_head_bytes() says of `tables`. */
 void spl_head_write(const struct spl_tables *tables, char *bytes);

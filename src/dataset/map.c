@@ -55,6 +55,22 @@ const char *spl_map_judge(const struct spl_map_row *row)
     return spl_map_words(row) * sizeof(uint32_t) > SPL_MAP_BYTES_MAX ? "is larger than 96 MiB" : NULL;
 }
 
+const char *spl_chunk_stations_judge(const struct spl_chunk_stations *stations, uint32_t maps)
+{
+    uint16_t rows[SPL_CHUNK_STATIONS];
+    for (int s = 0; s < SPL_CHUNK_STATIONS; s++) {
+        rows[s] = stations->seen_by[s] & (s ? UINT16_MAX : SPL_STATION_ROW);
+        if (rows[s] > maps)
+            return "names a station that PANO does not have";
+        if (s && rows[s] && !rows[s - 1])
+            return "names a station behind the end of its list";
+        for (int other = 0; other < s && rows[s]; other++)
+            if (rows[other] == rows[s])
+                return "names a station twice";
+    }
+    return !rows[0] && stations->seen_by[0] ? "is trimmed by no station" : NULL;
+}
+
 uint16_t spl_map_code_of_range(const struct spl_map_row *row, double range)
 {
     if (isnan(range))

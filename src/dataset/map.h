@@ -9,8 +9,6 @@
 
 #include "dataset/format.h"
 
-#define SPL_SECTION_STATIONS SPL_FOURCC('P', 'A', 'N', 'O') /* struct spl_map_row[stations] */
-#define SPL_SECTION_MAP SPL_FOURCC('P', 'M', 'A', 'P')      /* words of a map; `index` is its row's */
 #define SPL_MAP_BYTES_MAX (96u << 20)
 #define SPL_MAPS_MAX 16384u /* stations of a dataset */
 
@@ -35,6 +33,7 @@ _Static_assert(sizeof(struct spl_map_row) == 128, "on disk");
 struct spl_chunk_stations {
     uint16_t seen_by[SPL_CHUNK_STATIONS];
 };
+_Static_assert(sizeof(struct spl_chunk_stations) == 8, "on disk");
 
 /* Words of the ranges; of level `level` of the colours; where that level begins; of all. The row's sides and levels
  * must be within their bounds. */
@@ -45,6 +44,9 @@ size_t spl_map_words(const struct spl_map_row *row);
 
 /* What is wrong with a row; NULL where its map can be read. */
 const char *spl_map_judge(const struct spl_map_row *row);
+
+/* What is wrong with the stations of a chunk in a file of `maps` rows; NULL = nothing. */
+const char *spl_chunk_stations_judge(const struct spl_chunk_stations *stations, uint32_t maps);
 
 /* Ranges: to codes (the nearest, 1..SPL_MAP_FARTHEST; INFINITY SPL_MAP_NO_RETURN; NaN SPL_MAP_UNKNOWN) and back. */
 uint16_t spl_map_code_of_range(const struct spl_map_row *row, double range);

@@ -1,5 +1,5 @@
 /* An open dataset from the inside, and the stages of opening one. Only the files that open one, lookup.c, attributes.c,
- * tables.c and textures.c include this. Each stage trusts what the ones before it have checked. */
+ * maps.c, tables.c and textures.c include this. Each stage trusts what the ones before it have checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
 
@@ -20,9 +20,11 @@ enum spl_section_kind {
     SPL_KIND_META,
     SPL_KIND_DIRECTORY,
     SPL_KIND_ATOMS,
+    SPL_KIND_STATIONS,
     SPL_KIND_PAGES,
     SPL_KIND_HEADS,
     SPL_KIND_TEXTURES,
+    SPL_KIND_MAPS,
     SPL_KIND_COUNT
 };
 
@@ -44,6 +46,8 @@ struct spl_dataset {
     const struct spl_section **found_all; /* what found[].at points into */
     /* The same once more, as what they are; NULL = the file has none. */
     const struct spl_section **pages, **textures; /* by page */
+    const struct spl_section **maps;              /* by station: info.maps of them */
+    const struct spl_map_row *map_rows;           /* the same */
     const struct spl_page_row *rows;              /* by page, and the one that closes them */
 
     struct spl_counts counts;   /* as META says */
@@ -54,6 +58,7 @@ struct spl_dataset {
         struct spl_node *nodes;
         struct spl_chunk *chunks;
         uint32_t *textures, *base[SPL_STREAMS_MAX];
+        struct spl_chunk_stations *stations;
         uint8_t *width[SPL_STREAMS_MAX];
     } whole;
 
@@ -111,6 +116,9 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
 
 /* ATOM in itself; fills `dictionary` and info. Without it it does nothing. */
 int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err);
+
+/* PANO, each row with the length of its PMAP; fills `map_rows` and info. Without it it does nothing. */
+int spl_dataset_check_stations(struct spl_dataset *dataset, struct spl_error *err);
 
 /* Reads the heads that are kept, of a verified dataset all of them; against META where all were read. */
 int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err);

@@ -20,38 +20,45 @@ enum { table_alignment = 8 };
 /* A kind of section: a row to add, not code. */
 static const struct kind {
     uint32_t type;
-    enum { ONCE, BY_PAGE } number; /* in a file, or one for each page, in their order */
-    bool required;
+    enum { ONCE, BY_PAGE, BY_STATION } number;         /* in a file, or one for each of these, in their order */
+    enum { REQUIRED, TEXTURES, MAPS, GROUPS } group; /* of the others a file has all kinds of a group or none */
     bool kept;     /* in memory, from open to close */
     bool resident; /* on the device, where it is drawn from */
-    bool texture;  /* a file has all of these kinds or none */
     bool by_reader; /* its checksum is looked at by who reads it, not while sections are listed */
     uint32_t alignment, item_bytes;
     uint64_t bytes_min, bytes_max;
     const char *wrong_size;
     int (*check)(struct spl_dataset *dataset, struct spl_error *err); // may be NULL: nothing more than the checksum
 } kinds[SPL_KIND_COUNT] = {
-    [SPL_KIND_META] = {SPL_SECTION_META, .required = true, .kept = true, .alignment = 64, .item_bytes = 1,
+    [SPL_KIND_META] = {SPL_SECTION_META, .kept = true, .alignment = 64, .item_bytes = 1,
                        .bytes_max = SPL_META_BYTES_MAX, .wrong_size = "is larger than 8 MiB",
                        .check = spl_dataset_check_meta},
-    [SPL_KIND_DIRECTORY] = {SPL_SECTION_DIRECTORY, .required = true, .kept = true, .alignment = 64,
+    [SPL_KIND_DIRECTORY] = {SPL_SECTION_DIRECTORY, .kept = true, .alignment = 64,
                             .item_bytes = sizeof(struct spl_page_row), .bytes_max = UINT64_MAX,
                             .wrong_size = "is not a whole number of rows", .check = spl_dataset_check_directory},
-    [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .kept = true, .texture = true, .alignment = 64, .item_bytes = 1,
+    [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .group = TEXTURES, .kept = true, .alignment = 64, .item_bytes = 1,
                         .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = UINT64_MAX,
                         .wrong_size = "is shorter than its header", .check = spl_dataset_check_dictionary},
-    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .required = true, .resident = true,
+    [SPL_KIND_STATIONS] = {SPL_SECTION_STATIONS, .group = MAPS, .kept = true, .alignment = 64,
+                           .item_bytes = sizeof(struct spl_map_row), .bytes_min = sizeof(struct spl_map_row),
+                           .bytes_max = SPL_MAPS_MAX * sizeof(struct spl_map_row),
+                           .wrong_size = "is not a whole number of rows, 1 to 16384",
+                           .check = spl_dataset_check_stations},
+    [SPL_KIND_PAGES] = {SPL_SECTION_PAGE, .number = BY_PAGE, .resident = true,
                         .alignment = SPL_FILE_ALIGNMENT, .item_bytes = sizeof(uint32_t),
                         .bytes_min = SPL_PAGE_TAIL_WORDS * sizeof(uint32_t), .bytes_max = SPL_PAGE_BYTES_MAX,
                         .wrong_size = "has a size that no page can have"},
-    [SPL_KIND_HEADS] = {SPL_SECTION_HEAD, .number = BY_PAGE, .required = true, .by_reader = true, .alignment = 64,
+    [SPL_KIND_HEADS] = {SPL_SECTION_HEAD, .number = BY_PAGE, .by_reader = true, .alignment = 64,
                         .item_bytes = 1, .bytes_min = SPL_NODE_BYTES + SPL_CHUNK_BYTES,
                         .bytes_max = SPL_HEAD_BYTES_MAX, .wrong_size = "has a size that no head can have",
                         .check = spl_dataset_check_heads},
-    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .number = BY_PAGE, .resident = true, .texture = true, .alignment = 64,
+    [SPL_KIND_TEXTURES] = {SPL_SECTION_TEXTURES, .group = TEXTURES, .number = BY_PAGE, .resident = true, .alignment = 64,
                            .item_bytes = sizeof(uint32_t), .bytes_min = SPL_TEXTURE_TAIL_WORDS * sizeof(uint32_t),
                            .bytes_max = SPL_PAGE_BYTES_MAX, .wrong_size = "has a size that no page can have",
                            .check = spl_dataset_check_textures},
+    [SPL_KIND_MAPS] = {SPL_SECTION_MAP, .group = MAPS, .number = BY_STATION, .resident = true, .alignment = 64,
+                       .item_bytes = sizeof(uint32_t), .bytes_min = sizeof(uint32_t), .bytes_max = SPL_MAP_BYTES_MAX,
+                       .wrong_size = "has a size that no map can have"},
 };
 
 /* NULL for a type that a later version has added. */
@@ -196,22 +203,33 @@ static void *copy_section(const struct spl_dataset *dataset, const struct spl_se
     return copy;
 }
 
+/* How many sections of a kind a file has that has any of its group. */
+static uint64_t number_of(const struct spl_dataset *dataset, const struct kind *kind)
+{
+    const struct spl_section_list *stations = &dataset->found[SPL_KIND_STATIONS];
+    if (kind->number == BY_STATION)
+        return stations->count ? stations->at[0]->bytes / sizeof(struct spl_map_row) : 0;
+    return kind->number == BY_PAGE ? dataset->info.pages : 1;
+}
+
 /* A file that lists a kind has as many as it should, and none of the kinds that it needs is missing. */
 static int check_numbers(const struct spl_dataset *dataset, struct spl_error *err)
 {
-    static const char *const some = "lists some of ATOM and a TEXP for each page, but not all";
-    bool textures = false;
+    static const char *const some[GROUPS] = {
+        [TEXTURES] = "lists some of ATOM and a TEXP for each page, but not all",
+        [MAPS] = "lists some of PANO and a PMAP for each of its rows, but not all"};
+    bool has[GROUPS] = {false};
     for (int k = 0; k < SPL_KIND_COUNT; k++)
-        textures |= kinds[k].texture && dataset->found[k].count;
+        has[kinds[k].group] |= dataset->found[k].count > 0;
     for (int k = 0; k < SPL_KIND_COUNT; k++) {
-        uint32_t count = dataset->found[k].count;
+        uint64_t count = dataset->found[k].count, number = number_of(dataset, &kinds[k]);
         char what[48], letters[5];
         letters_of(kinds[k].type, letters);
         snprintf(what, sizeof what, "lists no section %s%s", letters, count ? " of each page" : "");
-        if (kinds[k].required && (kinds[k].number == BY_PAGE ? count != dataset->info.pages || !count : !count))
+        if (kinds[k].group == REQUIRED && (count != number || !count))
             return corrupt(dataset, err, "section table", what);
-        if (kinds[k].texture && count != (!textures ? 0 : kinds[k].number == BY_PAGE ? dataset->info.pages : 1))
-            return corrupt(dataset, err, "section table", some);
+        if (kinds[k].group != REQUIRED && count != (has[kinds[k].group] ? number : 0))
+            return corrupt(dataset, err, "section table", some[kinds[k].group]);
     }
     return SPL_OK;
 }
@@ -276,6 +294,7 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
     }
     dataset->pages = dataset->found[SPL_KIND_PAGES].at;
     dataset->textures = dataset->found[SPL_KIND_TEXTURES].count ? dataset->found[SPL_KIND_TEXTURES].at : NULL;
+    dataset->maps = dataset->found[SPL_KIND_MAPS].count ? dataset->found[SPL_KIND_MAPS].at : NULL;
     return SPL_OK;
 }
 

@@ -85,6 +85,8 @@ static int judge_chunks(const struct spl_dataset *dataset, struct spl_tables *ta
         chunk->first_id = id;
         const struct spl_chunk_codec *codec = spl_chunk_get_codec(spl_chunk_kind(chunk));
         const char *what = codec ? codec->judge(chunk) : "is of a kind that this version does not know";
+        if (!what && tables->stations)
+            what = spl_chunk_stations_judge(&tables->stations[c], dataset->info.maps);
         if (what)
             return wrong(dataset, err, tables->page, "chunk", tables->first_chunk + c, what);
         uint32_t words = codec->words(chunk) + spl_tables_get_stream_words(tables, tables->stream_count, c);

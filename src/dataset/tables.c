@@ -31,7 +31,8 @@ static struct spl_tables describe(const struct spl_dataset *dataset, uint32_t pa
 static uint64_t table_bytes(const struct spl_dataset *dataset, uint64_t nodes, uint64_t chunks)
 {
     uint64_t of_chunk = sizeof(struct spl_chunk) + SPL_STREAM_CHUNK_BYTES * dataset->info.stream_count +
-                        (dataset->textures ? sizeof(uint32_t) : 0);
+                        (dataset->textures ? sizeof(uint32_t) : 0) +
+                        (dataset->maps ? sizeof(struct spl_chunk_stations) : 0);
     return sizeof(struct spl_tables) + nodes * sizeof(struct spl_node) + chunks * of_chunk;
 }
 
@@ -54,13 +55,15 @@ uint64_t spl_dataset_get_tables_limit(const struct spl_dataset *dataset)
 }
 
 /* The arrays behind each other in one block, those of items of 8, 4 and 1 byte in turn. */
-static void lay_out(struct spl_tables *tables, bool textured, void *memory)
+static void lay_out(struct spl_tables *tables, bool textured, bool mapped, void *memory)
 {
     tables->nodes = memory;
     tables->chunks = (struct spl_chunk *)(tables->nodes + tables->node_count);
     uint32_t *words = (uint32_t *)(tables->chunks + tables->chunk_count);
     tables->textures = textured ? words : NULL;
     words += textured ? tables->chunk_count : 0;
+    tables->stations = mapped ? (struct spl_chunk_stations *)(void *)words : NULL;
+    words += mapped ? tables->chunk_count * sizeof *tables->stations / sizeof *words : 0;
     for (uint32_t s = 0; s < tables->stream_count; s++, words += tables->chunk_count)
         tables->base[s] = words;
     uint8_t *widths = (uint8_t *)words;
@@ -104,6 +107,8 @@ static int take_all(struct reader *reader, struct spl_tables *tables, struct spl
     }
     if (!rc && tables->textures)
         rc = take(reader, tables->textures, words, err);
+    if (!rc && tables->stations)
+        rc = take(reader, tables->stations, tables->chunk_count * sizeof *tables->stations, err);
     for (uint32_t s = 0; s < tables->stream_count && !rc; s++)
         rc = take(reader, tables->base[s], words, err);
     for (uint32_t s = 0; s < tables->stream_count && !rc; s++)
@@ -139,7 +144,7 @@ int spl_dataset_read_tables(const struct spl_dataset *dataset, uint32_t page, vo
     struct spl_tables *tables = block;
     spl_assert(page < dataset->info.pages);
     *tables = describe(dataset, page);
-    lay_out(tables, dataset->textures, tables + 1);
+    lay_out(tables, dataset->textures, dataset->maps, tables + 1);
     return read_head(dataset, tables, err);
 }
 
@@ -174,6 +179,8 @@ static int allocate_whole(struct spl_dataset *dataset, struct spl_error *err)
     bool refused = !dataset->tables || !dataset->whole.nodes || !dataset->whole.chunks;
     if (!refused && dataset->textures)
         refused = !(dataset->whole.textures = spl_alloc_raw(info->chunks, sizeof *dataset->whole.textures, err));
+    if (!refused && dataset->maps)
+        refused = !(dataset->whole.stations = spl_alloc_raw(info->chunks, sizeof *dataset->whole.stations, err));
     for (uint32_t s = 0; s < all.stream_count && !refused; s++) {
         dataset->streams[s].base = dataset->whole.base[s] = spl_alloc_raw(info->chunks, sizeof(uint32_t), err);
         dataset->streams[s].width = dataset->whole.width[s] = spl_alloc_raw(info->chunks, 1, err);
@@ -187,6 +194,7 @@ static int allocate_whole(struct spl_dataset *dataset, struct spl_error *err)
         tables->nodes = dataset->whole.nodes + tables->first_node;
         tables->chunks = dataset->whole.chunks + tables->first_chunk;
         tables->textures = dataset->textures ? dataset->whole.textures + tables->first_chunk : NULL;
+        tables->stations = dataset->maps ? dataset->whole.stations + tables->first_chunk : NULL;
         for (uint32_t s = 0; s < all.stream_count; s++) {
             tables->base[s] = dataset->whole.base[s] + tables->first_chunk;
             tables->width[s] = dataset->whole.width[s] + tables->first_chunk;

@@ -10,6 +10,7 @@
 #include <splatd/dataset.h>
 
 #include "dataset/format.h"
+#include "dataset/map.h"
 #include "dataset/streams.h"
 
 /* What the tables of a dataset may take before they are read by page: 10^8 splats and more. */
@@ -21,6 +22,7 @@ struct spl_tables { /* written by who reads them, and by nobody afterwards */
     struct spl_node *nodes;
     struct spl_chunk *chunks;
     uint32_t *textures;              // by chunk; NULL = the dataset has none
+    struct spl_chunk_stations *stations; // by chunk; NULL = the dataset has no maps
     uint32_t *base[SPL_STREAMS_MAX]; /* by chunk, of stream_count of them */
     uint8_t *width[SPL_STREAMS_MAX];
 };

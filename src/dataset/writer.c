@@ -33,6 +33,9 @@ struct spl_dataset_writer {
     const struct spl_dictionary *dictionary; /* NULL = no textures */
     const struct spl_stream *streams;        /* of all chunks */
     uint32_t stream_count;
+    const struct spl_map_row *maps;          /* NULL = none */
+    const struct spl_chunk_stations *stations;
+    uint32_t map_count, maps_added;
     size_t page_nodes, page_chunks; /* of the page being filled */
     struct spl_section *sections;
     size_t section_count, section_capacity;
@@ -85,8 +88,11 @@ static int flush_words(struct spl_dataset_writer *writer, uint32_t type, struct 
     return add_section(writer, type, writer->page_count, words->at, bytes, err);
 }
 
+/* Writes the page being filled, where there is one. */
 static int flush_page(struct spl_dataset_writer *writer, struct spl_error *err)
 {
+    if (!writer->page_nodes)
+        return SPL_OK;
     int rc = flush_words(writer, SPL_SECTION_PAGE, &writer->page, err);
     if (!rc && writer->dictionary)
         rc = flush_words(writer, SPL_SECTION_TEXTURES, &writer->textures, err);
@@ -176,9 +182,10 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
         page_bytes(larger, SPL_TEXTURE_TAIL_WORDS) > SPL_PAGE_BYTES_MAX)
         return spl_fail(err, SPL_E_LIMIT, "%s: a node of %zu bytes is larger than a page can be (%u)",
                         writer->file.path, larger * sizeof(uint32_t), SPL_PAGE_BYTES_MAX);
+    spl_assert(!writer->maps_added);
     if (writer->page_nodes &&
-        (spl_head_bytes(writer->page_nodes + 1, writer->page_chunks + chunk_count, SPL_STREAMS_MAX, true) >
-             SPL_HEAD_BYTES_MAX ||
+        (spl_head_bytes(writer->page_nodes + 1, writer->page_chunks + chunk_count, SPL_STREAMS_MAX, true,
+                        writer->maps) > SPL_HEAD_BYTES_MAX ||
          page_bytes(to->used + word_count, SPL_PAGE_TAIL_WORDS) > writer->page_limit ||
          page_bytes(writer->textures.used + textures->word_count, SPL_TEXTURE_TAIL_WORDS) > writer->page_limit)) {
         int rc = flush_page(writer, err);
@@ -206,6 +213,34 @@ int spl_dataset_writer_add_node(struct spl_dataset_writer *writer, const uint32_
     spl_assert(!writer->dictionary);
     return spl_dataset_writer_add_textured_node(writer, words, word_count, chunks, chunk_count,
                                                 &(struct spl_node_textures){0}, page, err);
+}
+
+int spl_dataset_writer_set_maps(struct spl_dataset_writer *writer, const struct spl_map_row *rows, uint32_t count,
+                                const struct spl_chunk_stations *stations, struct spl_error *err)
+{
+    spl_assert(!writer->page_count && !writer->page_nodes && count);
+    if (count > SPL_MAPS_MAX)
+        return spl_fail(err, SPL_E_LIMIT, "%s: maps of %u stations, and a file has those of %u at most",
+                        writer->file.path, count, SPL_MAPS_MAX);
+    for (uint32_t i = 0; i < count; i++) {
+        const char *what = spl_map_judge(&rows[i]);
+        if (what)
+            return spl_fail(err, SPL_E_LIMIT, "%s: the map of station %u %s", writer->file.path, i, what);
+    }
+    writer->maps = rows;
+    writer->map_count = count;
+    writer->stations = stations;
+    return SPL_OK;
+}
+
+int spl_dataset_writer_add_map(struct spl_dataset_writer *writer, const uint32_t *words, struct spl_error *err)
+{
+    spl_assert(writer->maps_added < writer->map_count);
+    int rc = flush_page(writer, err);
+    if (rc)
+        return rc;
+    uint32_t index = writer->maps_added++;
+    return add_section(writer, SPL_SECTION_MAP, index, words, spl_map_words(&writer->maps[index]) * sizeof *words, err);
 }
 
 void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams, uint32_t count)
@@ -280,6 +315,7 @@ static int cut_into_pages(struct spl_dataset_writer *writer, const struct spl_no
                                       .nodes = (struct spl_node *)nodes + n,
                                       .chunks = (struct spl_chunk *)chunks + row.first_chunk};
         tables->textures = writer->dictionary ? writer->chunk_textures.at + row.first_chunk : NULL;
+        tables->stations = writer->maps ? (struct spl_chunk_stations *)writer->stations + row.first_chunk : NULL;
         for (uint32_t s = 0; s < writer->stream_count; s++) {
             tables->base[s] = (uint32_t *)writer->streams[s].base + row.first_chunk;
             tables->width[s] = (uint8_t *)writer->streams[s].width + row.first_chunk;
@@ -300,12 +336,14 @@ static int cut_into_pages(struct spl_dataset_writer *writer, const struct spl_no
     out->rows[writer->page_count] = row;
     spl_assert(n == node_count && row.first_chunk == chunk_count); /* pages rise */
     spl_assert(!writer->dictionary || writer->chunk_textures.used == chunk_count);
+    spl_assert(writer->maps_added == writer->map_count);
     return SPL_OK;
 }
 
 static int write_head(struct spl_dataset_writer *writer, const struct spl_tables *tables, struct spl_error *err)
 {
-    size_t size = spl_head_bytes(tables->node_count, tables->chunk_count, tables->stream_count, tables->textures);
+    size_t size = spl_head_bytes(tables->node_count, tables->chunk_count, tables->stream_count, tables->textures,
+                                 tables->stations);
     char *bytes = spl_alloc_raw(size, 1, err);
     if (!bytes)
         return SPL_E_NOMEM;
@@ -322,6 +360,8 @@ static int write_rest(struct spl_dataset_writer *writer, const struct described 
     if (!rc)
         rc = add_section(writer, SPL_SECTION_DIRECTORY, 0, what->rows, (writer->page_count + 1ull) * sizeof *what->rows,
                          err);
+    if (!rc && writer->maps)
+        rc = add_section(writer, SPL_SECTION_STATIONS, 0, writer->maps, writer->map_count * sizeof *writer->maps, err);
     for (uint32_t page = 0; page < writer->page_count && !rc; page++)
         rc = write_head(writer, &what->pages[page], err);
     if (!rc && writer->dictionary)

@@ -4,6 +4,7 @@
 #define SPL_DATASET_WRITER_H
 
 #include "dataset/format.h"
+#include "dataset/map.h"
 #include "dataset/streams.h"
 
 #include <jansson.h>
@@ -42,6 +43,15 @@ int spl_dataset_writer_add_textured_node(struct spl_dataset_writer *writer, cons
                                          struct spl_chunk *chunks, size_t chunk_count,
                                          const struct spl_node_textures *textures, uint32_t *page,
                                          struct spl_error *err);
+
+/* Makes it a file with maps of stations, before the first node: `count` (> 0) rows, and by chunk of the dataset the
+ * stations that see it, which are there when finish is called; both are borrowed until then. SPL_E_LIMIT where a row,
+ * or the number of them, is none that a file can have. */
+int spl_dataset_writer_set_maps(struct spl_dataset_writer *writer, const struct spl_map_row *rows, uint32_t count,
+                                const struct spl_chunk_stations *stations, struct spl_error *err);
+
+/* Appends the next row's map, of its spl_map_words(): of each row, behind the last node. */
+int spl_dataset_writer_add_map(struct spl_dataset_writer *writer, const uint32_t *words, struct spl_error *err);
 
 /* Makes it a file with optional attributes, before finish: `streams` (borrowed until then, up to SPL_STREAMS_MAX) say
  * of each what it is, and have base and width of every chunk of the dataset. Each chunk's words end with its codes,

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "dataset/dataset.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 #include "sparse/atom.h"
 #include "support/make_dataset.h"
 
@@ -123,9 +123,9 @@ void make_textured_file(const struct spl_dataset *from, const struct spl_diction
                         uint32_t seed, const char *path)
 {
     struct making making = {from, dictionary, planes, seed, 0};
-    struct spl_retexture what = {.from = from, .dictionary = dictionary, .code_chunk = code_chunk, .context = &making};
+    struct spl_rewrite what = {.from = from, .dictionary = dictionary, .code_chunk = code_chunk, .context = &making};
     struct spl_error err = {0};
-    must(spl_dataset_retexture(&what, path, &err), &err);
+    must(spl_dataset_rewrite(&what, path, &err), &err);
 }
 
 struct spl_dataset *make_textured(const struct spl_dataset *from, const struct spl_dictionary *dictionary,

@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "dataset/dataset.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 
 static void must(int rc, const struct spl_error *err)
 {
@@ -55,7 +55,7 @@ void make_tree_file(const char *path, size_t count, size_t page_bytes)
     options.output = packed;
     must(spl_pack(&options, NULL, &err), &err);
     must(spl_dataset_open_whole(packed, false, &dataset, &err), &err);
-    must(spl_dataset_retexture(&(struct spl_retexture){.from = dataset, .page_bytes = page_bytes}, path, &err), &err);
+    must(spl_dataset_rewrite(&(struct spl_rewrite){.from = dataset, .page_bytes = page_bytes}, path, &err), &err);
     spl_dataset_close(dataset);
     unlink(scan);
     unlink(packed);

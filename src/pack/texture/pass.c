@@ -13,7 +13,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 #include "pack/texture/pass_parts.h"
 #include "pack/texture/photographs.h"
 #include "pack/texture/presets.h"
@@ -220,9 +220,9 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing colours");
         goto done;
     }
-    const struct spl_retexture plain = {
+    const struct spl_rewrite plain = {
         .from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color, .color_source = pass.color_source};
-    rc = options->textures == SPL_TEXTURES_NONE ? spl_dataset_retexture(&plain, output, err)
+    rc = options->textures == SPL_TEXTURES_NONE ? spl_dataset_rewrite(&plain, output, err)
                                                 : spl_photo_pass_write_textured(&pass, dataset, output, err);
     report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
 done:

@@ -1,6 +1,6 @@
 /* Textures of the splats that chose a photograph. Each photograph is read again, for those that chose it; their
  * textures lie in an unlinked file (textures.h) until a dictionary is trained on them and they are coded; then the
- * container is written anew with other colours and with codes (retexture.h). */
+ * container is written anew with other colours and with codes (rewrite.h). */
 #include "pack/texture/pass_parts.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 #include "pack/texture/presets.h"
 
 enum { splats_compared = 4000 };
@@ -154,14 +154,14 @@ int spl_photo_pass_write_textured(struct spl_photo_pass *pass, const struct spl_
         goto done;
     }
     struct spl_coded_chunks chunks = {&coded, &pass->splats};
-    const struct spl_retexture what = {.from = dataset,
+    const struct spl_rewrite what = {.from = dataset,
                                        .colors = (const uint8_t(*)[3])pass->chosen.color,
                                        .dictionary = &coded.dictionary,
                                        .code_chunk = spl_coded_get,
                                        .context = &chunks,
                                        .color_source = pass->color_source,
                                        .textures = description};
-    rc = spl_dataset_retexture(&what, output, err);
+    rc = spl_dataset_rewrite(&what, output, err);
 done:
     json_decref(description);
     spl_coded_finish(&coded);

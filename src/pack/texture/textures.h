@@ -58,7 +58,7 @@ void spl_coded_finish(struct spl_coded *coded);
 int spl_textures_keep(const struct spl_textures *textures, const char *path, const struct spl_texture_origin *origin,
                       struct spl_error *err);
 
-/* For spl_dataset_retexture(); the context is a struct spl_coded_chunks. */
+/* For spl_dataset_rewrite(); the context is a struct spl_coded_chunks. */
 struct spl_coded_chunks {
     const struct spl_coded *coded;
     const struct spl_splats *splats;

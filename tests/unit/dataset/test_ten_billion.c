@@ -69,7 +69,7 @@ static char *make_head(uint32_t page, size_t *bytes)
     tables.chunks = file.chunks;
     for (uint32_t n = 0; n < tables.node_count; n++)
         nodes[n] = node_at(file.rows[page].first_node + n);
-    *bytes = spl_head_bytes(tables.node_count, tables.chunk_count, 0, false);
+    *bytes = spl_head_bytes(tables.node_count, tables.chunk_count, 0, false, false);
     char *head = malloc(*bytes);
     spl_head_write(&tables, head);
     return head;
@@ -140,7 +140,7 @@ static int make_file(void **state)
     add(SPL_SECTION_DIRECTORY, 0, (file.pages + 1) * sizeof *file.rows, file.rows, &offset);
     for (uint32_t p = 0; p < file.pages; p++) {
         uint64_t nodes = file.rows[p + 1].first_node - file.rows[p].first_node;
-        add(SPL_SECTION_HEAD, p, spl_head_bytes(nodes, nodes * node_chunks, 0, false), NULL, &offset);
+        add(SPL_SECTION_HEAD, p, spl_head_bytes(nodes, nodes * node_chunks, 0, false, false), NULL, &offset);
     }
     spl_parallel_for(0, file.pages, 16, hash_heads, NULL);
     offset = (offset + 63) / 64 * 64;

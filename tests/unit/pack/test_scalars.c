@@ -16,7 +16,7 @@
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
-#include "dataset/retexture.h"
+#include "dataset/rewrite.h"
 #include "pack/scalars.h"
 
 static char folder[] = "/tmp/splatd-scalars-XXXXXX";
@@ -289,8 +289,8 @@ static void a_dataset_has_what_scans_brought(void **state)
     assert_false(spl_dataset_find_value(dataset, 5, 0, &ignored) || spl_dataset_find_value(dataset, -1, 0, &ignored));
     check_packed(dataset);
     /* photographs change the colours alone */
-    struct spl_retexture retexture = {.from = dataset};
-    assert_int_equal(spl_dataset_retexture(&retexture, path_of("again.spld"), &err), 0);
+    struct spl_rewrite rewrite = {.from = dataset};
+    assert_int_equal(spl_dataset_rewrite(&rewrite, path_of("again.spld"), &err), 0);
     spl_dataset_close(dataset);
     assert_int_equal(spl_dataset_open_whole(path_of("again.spld"), true, &dataset, &err), 0);
     check_packed(dataset);

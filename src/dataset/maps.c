@@ -1,0 +1,60 @@
+/* The maps of a dataset: what opening checks of them, and reading one. A row that passes says how long its map is; the
+ * words themselves are not looked at, as no code of theirs can lead a kernel out of them. Opening on the opener's
+ * thread, the rest on any. */
+#include "dataset/map.h"
+
+#include <xxhash.h>
+
+#include "dataset/open.h"
+
+int spl_dataset_check_stations(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    uint64_t bytes;
+    const struct spl_map_row *rows = spl_dataset_get_copy(dataset, SPL_KIND_STATIONS, 0, &bytes);
+    const uint32_t count = (uint32_t)(bytes / sizeof *rows); // as many as there are maps
+    for (uint32_t i = 0; i < count; i++) {
+        const char *what = spl_map_judge(&rows[i]);
+        if (!what && dataset->maps[i]->bytes != spl_map_words(&rows[i]) * sizeof(uint32_t))
+            what = "has a PMAP of another length than its sides say";
+        if (what)
+            return spl_fail(err, SPL_E_CORRUPT, "%s: section PANO: station %u %s; pack the dataset again",
+                            dataset->name, i, what);
+        info->map_texels += 6ull * rows[i].side * rows[i].side;
+        info->map_bytes += dataset->maps[i]->bytes;
+    }
+    info->maps = count;
+    dataset->map_rows = rows;
+    return SPL_OK;
+}
+
+const struct spl_map_row *spl_dataset_get_maps(const struct spl_dataset *dataset, uint32_t *count)
+{
+    *count = dataset->info.maps;
+    return dataset->map_rows;
+}
+
+size_t spl_dataset_get_map_bytes(const struct spl_dataset *dataset, uint32_t index)
+{
+    spl_assert(index < dataset->info.maps);
+    return dataset->maps[index]->bytes;
+}
+
+int spl_dataset_read_map(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err)
+{
+    spl_assert(index < dataset->info.maps);
+    const struct spl_section *map = dataset->maps[index];
+    int rc = spl_dataset_read(dataset, map->offset, out, map->bytes, err);
+    if (!rc && dataset->verified && XXH3_64bits(out, map->bytes) != map->hash)
+        rc = spl_fail(err, SPL_E_CORRUPT,
+                      "%s: the map of station %u was overwritten while in use; put the dataset back under another name "
+                      "and rename it",
+                      spl_dataset_get_name(dataset), index);
+    return rc;
+}
+
+const struct spl_chunk_stations *spl_dataset_get_chunk_stations(const struct spl_dataset *dataset)
+{
+    spl_assert(dataset->whole.nodes);
+    return dataset->whole.stations;
+}
