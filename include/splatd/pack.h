@@ -81,6 +81,11 @@ struct spl_map_options {
     /* Each picture that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
     void (*refused)(void *context, const struct spl_error *why);
     void *context;
+    const char *export_to; /* a new or empty folder for the maps as PNG (api/photographs.md); NULL = none */
+    const char *edits;     /* such a folder, whose colours are taken after they were edited; NULL = none */
+    /* Where `panoramas` is NULL: those that the scans bring along, an E57 file's own and the folder panoramas beside a
+     * scan; maps are made only where there are any, and what is wrong with them is warned of, not refused. */
+    bool find;
 };
 
 static inline void spl_map_options_init(struct spl_map_options *options)

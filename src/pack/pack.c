@@ -54,6 +54,7 @@ struct pack {
 struct passes {
     const struct spl_pack_options *options;
     struct spl_stage *stage;
+    struct spl_map_options with; /* of maps, where the scans bring pictures along */
     struct spl_view_list photographs, pictures;
     struct spl_photo_report photos;
     struct spl_map_report maps;
@@ -392,34 +393,66 @@ static int run_passes(struct passes *p, const char *part, struct spl_error *err)
     return rc;
 }
 
-static int pack_passes(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
-                       struct spl_pack_report *report, struct spl_error *err)
+static void warn_of_picture(void *context, const struct spl_error *why)
 {
-    struct passes p = {.options = options, .stage = stage};
+    const struct spl_pack_options *options = context;
+    if (options->warn)
+        options->warn(options->progress_context, why->message);
+}
+
+/* Options of maps and their pictures become those that the scans bring along, or none. Nobody asked for these, so what
+ * is wrong with them fails nothing. */
+static int find_pictures(struct passes *p, struct spl_pack_options *options, struct spl_error *err)
+{
+    struct spl_map_sources found;
+    struct spl_error why = {0};
+    int rc = spl_map_sources_find(options->inputs, options->input_count, &found, &why);
+    p->with = *options->maps;
+    if (!p->with.refused) {
+        p->with.refused = warn_of_picture;
+        p->with.context = options;
+    }
+    if (!rc && !found.count && (p->with.export_to || p->with.edits))
+        rc = spl_fail_field(&why, SPL_E_USAGE, "panoramas",
+                            "these scans bring no panoramas along, so there are no maps to be edited: name --panoramas "
+                            "PATH, or scan");
+    if (!rc && found.count)
+        rc = spl_maps_load(&p->with, &found, &p->pictures, &p->maps, &why);
+    options->maps = p->pictures.count ? &p->with : NULL;
+    spl_map_sources_finish(&found);
+    if (rc && rc != SPL_E_NOMEM && rc != SPL_E_USAGE) {
+        warn_of_picture(options, &why);
+        return SPL_OK;
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
+static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_pack_report *report,
+                       struct spl_error *err)
+{
+    const struct spl_pack_options *options = p->options;
     struct spl_dataset *dataset = NULL;
     char *part = NULL;
     int rc = SPL_OK;
-    if (options->photos && !(rc = spl_photos_load(options->photos, &p.photographs, &p.photos, err)))
-        rc = check_kept(options, &p.photographs, err);
-    if (!rc && options->maps)
-        rc = spl_maps_load(options->maps, &p.pictures, &p.maps, err);
+    if (options->photos && !(rc = spl_photos_load(options->photos, &p->photographs, &p->photos, err)))
+        rc = check_kept(options, &p->photographs, err);
+    if (!rc && options->maps && !p->pictures.count)
+        rc = spl_maps_load(options->maps, &(struct spl_map_sources){0}, &p->pictures, &p->maps, err);
     if (!rc && asprintf(&part, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
         part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
     if (!rc)
-        rc = pack_scan(options, inputs, part, &p, stage, report, err);
+        rc = pack_scan(options, inputs, part, p, p->stage, report, err);
     if (!rc)
-        rc = run_passes(&p, part, err);
+        rc = run_passes(p, part, err);
     if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
         memcpy(report->attribute_bits, spl_dataset_get_info(dataset)->attribute_bits, sizeof report->attribute_bits);
-        report->photos = p.photos;
-        report->maps = p.maps;
-        report->seconds += p.photos.seconds + p.maps.seconds;
+        report->photos = p->photos;
+        report->maps = p->maps;
+        report->seconds += p->photos.seconds + p->maps.seconds;
     }
     spl_dataset_close(dataset);
-    spl_view_list_finish(&p.photographs);
-    spl_view_list_finish(&p.pictures);
     free(part);
     return rc;
 }
@@ -429,7 +462,7 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
-    if (options->points_only && options->maps)
+    if (options->points_only && options->maps && !options->maps->find)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
     struct spl_stage stage = {.callback = options->progress,
@@ -444,8 +477,16 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
         return rc;
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
-    rc = options->photos || options->maps ? pack_passes(&found, &inputs, &stage, report, err)
-                                          : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
+    struct passes p = {.options = &found, .stage = &stage};
+    if (found.maps && found.maps->find && options->points_only)
+        found.maps = NULL;
+    if (found.maps && found.maps->find && !found.maps->panoramas)
+        rc = find_pictures(&p, &found, err);
+    if (!rc)
+        rc = found.photos || found.maps ? pack_passes(&p, &inputs, report, err)
+                                        : pack_scan(&found, &inputs, found.output, NULL, &stage, report, err);
+    spl_view_list_finish(&p.photographs);
+    spl_view_list_finish(&p.pictures);
     spl_inputs_finish(&inputs);
     return rc;
 }
