@@ -8,15 +8,14 @@
 #include "base/parallel.h"
 #include "geom/polar.h"
 #include "pack/maps/sight.h"
+#include "pack/median.h"
 
 struct gathering {
     struct spl_hits *hits;
     const struct spl_splats *splats;
     const struct spl_stations *stations;
     uint32_t station;
-    const struct spl_sight *sight;    // NULL: the station's own splats alone
-    const struct spl_stream *noise;   // may be NULL
-    uint32_t noise_index;
+    const struct spl_sight *sight; // NULL: the station's own splats alone
     size_t *first; /* by chunk: of its hits; while counting, how many of the chunk before */
     bool counting;
 };
@@ -34,11 +33,7 @@ static void gather(void *context, size_t begin, size_t end, unsigned worker)
         for (uint32_t i = 0; asked && !any && i < chunk->count; i++)
             any = of[i] == g->station;
         uint32_t count = asked && any ? spl_splats_get(splats, c, list) : 0;
-        size_t bytes, at = g->counting ? 0 : g->first[c];
-        const uint32_t *words = spl_dataset_get_page(splats->dataset, splats->nodes[splats->node_of[c]].page, &bytes);
-        if (g->noise)
-            words += chunk->geometry_word + spl_chunk_words(chunk) +
-                     spl_dataset_get_stream_words(splats->dataset, g->noise_index, c);
+        size_t at = g->counting ? 0 : g->first[c];
         for (uint32_t i = 0; i < count; i++) {
             double cosine, range, own[3];
             if (g->sight ? !spl_sight_sees(g->sight, &list[i], &cosine, &range) : of[i] != g->station)
@@ -54,9 +49,6 @@ static void gather(void *context, size_t begin, size_t end, unsigned worker)
                     hit->direction[k] = (float)(own[k] / range);
                     hit->color[k] = list[i].splat.color[k];
                 }
-                if (g->noise)
-                    hit->noise = (float)spl_stream_decode(
-                        g->noise, (struct spl_stream_code){g->noise->base[c], g->noise->width[c]}, words, i);
             }
             at++;
         }
@@ -71,13 +63,7 @@ int spl_hits_init(struct spl_hits *hits, const struct spl_splats *splats, const 
     struct gathering g = {
         .hits = hits, .splats = splats, .stations = stations, .station = station, .counting = true};
     struct spl_sight sight = {0};
-    uint32_t streams;
-    int noise = spl_dataset_find_stream(splats->dataset, "uncertainty");
     *hits = (struct spl_hits){0};
-    if (noise >= 0) {
-        g.noise = spl_dataset_get_streams(splats->dataset, &streams) + noise;
-        g.noise_index = (uint32_t)noise;
-    }
     int rc = (g.first = spl_alloc(splats->chunk_count + (size_t)1, sizeof *g.first, err)) ? SPL_OK : SPL_E_NOMEM;
     if (!rc && !stations->scanned) {
         rc = spl_sight_init(&sight, &stations->list[station], splats, threads, err);
@@ -136,4 +122,55 @@ void spl_hits_place(struct spl_hits *hits, uint32_t side, uint32_t apron, unsign
 {
     struct placing p = {hits, side, apron};
     spl_parallel_for(threads, hits->count, 4096, place, &p);
+}
+
+struct comparison {
+    const struct spl_splats *splats;
+    const struct spl_stations *stations;
+    float *off; /* by chunk: of a splat from its neighbour's disc; NaN = none to compare */
+};
+
+static void compare(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct comparison *c = context;
+    struct spl_world_splat list[SPL_CHUNK_SPLATS];
+    (void)worker;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t chunk = (uint32_t)i, nearest = 0;
+        const uint16_t *of = c->stations->of + c->splats->chunks[chunk].first_id;
+        double least = INFINITY, off = 0;
+        c->off[i] = NAN;
+        if (!spl_splats_is_leaf(c->splats, chunk) || !spl_splats_is_discs(c->splats, chunk))
+            continue;
+        uint32_t count = spl_splats_get(c->splats, chunk, list);
+        for (uint32_t k = 1; k < count; k++) {
+            double square = 0;
+            for (int a = 0; a < 3; a++)
+                square += (list[k].position[a] - list[0].position[a]) * (list[k].position[a] - list[0].position[a]);
+            if (of[k] != of[0] || square >= least || square > 4 * (double)list[0].splat.radius * (double)list[0].splat.radius)
+                continue;
+            least = square;
+            nearest = k;
+        }
+        for (int a = 0; a < 3; a++)
+            off += (list[nearest].position[a] - list[0].position[a]) * (double)list[0].splat.normal[a];
+        if (nearest)
+            c->off[i] = (float)fabs(off);
+    }
+}
+
+int spl_hits_find_noise(const struct spl_splats *splats, const struct spl_stations *stations, unsigned threads,
+                        double *sigma, struct spl_error *err)
+{
+    struct comparison c = {splats, stations, spl_alloc_raw(splats->chunk_count, sizeof *c.off, err)};
+    size_t count = 0;
+    if (!c.off)
+        return SPL_E_NOMEM;
+    spl_parallel_for(threads, splats->chunk_count, 16, compare, &c);
+    for (uint32_t i = 0; i < splats->chunk_count; i++)
+        if (!isnan(c.off[i]))
+            c.off[count++] = c.off[i];
+    *sigma = count ? (double)spl_median(c.off, count) * 1.4826 / M_SQRT2 : 0;
+    free(c.off);
+    return SPL_OK;
 }

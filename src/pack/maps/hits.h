@@ -7,7 +7,6 @@
 struct spl_hit {
     float direction[3]; /* unit, the station's frame */
     float range, radius;
-    float noise;        /* how far the surface may lie off, as the stream "uncertainty" says */
     uint8_t color[3];
 };
 
@@ -25,5 +24,10 @@ void spl_hits_finish(struct spl_hits *hits);
 
 /* Finds the texel of each hit in an atlas (geom/polar.h). Parallel. */
 void spl_hits_place(struct spl_hits *hits, uint32_t side, uint32_t apron, unsigned threads);
+
+/* How far splats of one scan lie off each other's discs: sigma of half of them, by the nearest two of each chunk of
+ * leaves. Parallel; blocks. */
+int spl_hits_find_noise(const struct spl_splats *splats, const struct spl_stations *stations, unsigned threads,
+                        double *sigma, struct spl_error *err);
 
 #endif

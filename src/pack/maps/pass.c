@@ -11,6 +11,7 @@
 #include "dataset/rewrite.h"
 #include "pack/maps/colors.h"
 #include "pack/maps/maps.h"
+#include "pack/maps/pictures.h"
 #include "pack/maps/sees.h"
 #include "pack/texture/photo_image.h"
 
@@ -24,6 +25,7 @@ struct pass {
     struct spl_map_report *report;
     struct spl_splats splats;
     struct spl_stations stations;
+    double slack;             /* of all rows */
     uint32_t count;           /* of maps: */
     uint32_t *station_of;     /* by row */
     uint16_t *row_of;         /* by station: row + 1; 0 = it has no map */
@@ -63,7 +65,7 @@ static int make_ranges(struct pass *p, uint32_t station, struct spl_hits *hits, 
         row.side = (ranges.side + SPL_MAP_SIDE_STEP - 1) / SPL_MAP_SIDE_STEP * SPL_MAP_SIDE_STEP;
     row.range_side = ranges.side;
     row.near = (float)ranges.near;
-    row.slack = (float)ranges.slack;
+    row.slack = (float)p->slack;
     while (row.side > SPL_MAP_SIDE_STEP && spl_map_words(&row) * sizeof(uint32_t) > SPL_MAP_BYTES_MAX)
         row.side -= SPL_MAP_SIDE_STEP;
     const char *fault = spl_map_judge(&row);
@@ -93,7 +95,8 @@ static int make_all_ranges(struct pass *p, struct spl_error *err)
     p->row_of = spl_alloc(count, sizeof *p->row_of, err);
     if (!p->rows || !p->codes || !p->station_of || !p->row_of)
         return SPL_E_NOMEM;
-    int rc = SPL_OK;
+    int rc = spl_hits_find_noise(&p->splats, &p->stations, p->stage->threads, &p->slack, err);
+    p->slack *= 3;
     spl_stage_begin(p->stage, "ranges of stations", NULL, count);
     for (uint32_t s = 0; s < count && !rc; s++) {
         struct spl_hits hits;
@@ -231,11 +234,28 @@ void spl_maps_plan(struct spl_stage *stage, uint32_t pictures, uint64_t points)
     spl_stage_plan(stage, "maps", 0.5 * pictures + 0.5e-6 * (double)points, 0);
 }
 
+struct loading {
+    const struct spl_map_options *options;
+    struct spl_map_report *report;
+};
+
+static void refuse_picture(void *context, const struct spl_error *why)
+{
+    struct loading *loading = context;
+    loading->report->refused++;
+    loading->options->refused(loading->options->context, why);
+}
+
 int spl_maps_load(const struct spl_map_options *options, struct spl_view_list *list, struct spl_map_report *report,
                   struct spl_error *err)
 {
-    const struct spl_photograph_options how = {.images = options->images};
-    int rc = options->panoramas ? spl_view_list_load_photographs(list, options->panoramas, &how, err) : SPL_OK;
+    struct loading loading = {options, report};
+    const struct spl_map_picture_options how = {.paths = &options->panoramas,
+                                                .count = options->panoramas != NULL,
+                                                .images = options->images,
+                                                .refuse = options->refused ? refuse_picture : NULL,
+                                                .context = &loading};
+    int rc = options->panoramas ? spl_map_pictures_load(&how, list, err) : SPL_OK;
     report->pictures = (uint32_t)list->count;
     return rc;
 }

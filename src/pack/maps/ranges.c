@@ -253,32 +253,18 @@ static void judge_open(float *texels, uint32_t side)
         }
 }
 
-/* The range that one hit of 200 is nearer than; three times what hits of one surface are off. */
-static int find_scale(struct spl_ranges *ranges, const struct spl_hits *hits, struct spl_error *err)
+/* The range that few hits are nearer than: the median of the nearest of each of 16 parts of them. */
+static double find_near(const struct spl_hits *hits)
 {
-    enum { sample_max = 1 << 16 };
-    size_t count = hits->count < sample_max ? hits->count : sample_max;
-    float *values = spl_alloc_raw(count, sizeof *values, err);
-    if (!values)
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < count; i++)
-        values[i] = hits->list[i * hits->count / count].noise;
-    ranges->slack = count ? 3 * (double)spl_median(values, count) : 0;
-    ranges->near = INFINITY;
-    for (size_t part = 0; part < 16 && count >= 16; part++) { /* the median of the least of 16 parts is near it */
-        float least = INFINITY;
-        for (size_t i = part; i < count; i += 16)
-            least = fminf(least, hits->list[i * hits->count / count].range);
-        values[part] = least;
+    enum { parts = 16 };
+    float nearest[parts];
+    size_t count = hits->count < parts ? hits->count : parts;
+    for (size_t part = 0; part < count; part++) {
+        nearest[part] = hits->list[part].range;
+        for (size_t i = part; i < hits->count; i += parts)
+            nearest[part] = fminf(nearest[part], hits->list[i].range);
     }
-    if (count >= 16)
-        ranges->near = (double)spl_median(values, 16);
-    for (size_t i = 0; i < count && count < 16; i++)
-        ranges->near = fmin(ranges->near, (double)hits->list[i].range);
-    if (!(ranges->near < INFINITY))
-        ranges->near = 1;
-    free(values);
-    return SPL_OK;
+    return count ? (double)spl_median(nearest, count) : 1;
 }
 
 static void crop(float *to, const float *from, uint32_t side)
@@ -319,7 +305,7 @@ int spl_ranges_init(struct spl_ranges *ranges, struct spl_hits *hits, uint32_t s
         judge_open(texels, ranges->side);
         fill_aprons(texels, ranges->side, reach);
         crop(ranges->texels, texels, ranges->side);
-        rc = find_scale(ranges, hits, err);
+        ranges->near = find_near(hits);
     }
     free(texels);
     free(discs);

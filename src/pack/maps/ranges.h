@@ -10,7 +10,7 @@
 struct spl_ranges {
     uint32_t side;
     float *texels;      // owned
-    double near, slack; /* as of struct spl_map_row */
+    double near; /* as of struct spl_map_row: one hit of some thousands is nearer */
 };
 
 /* Of `side_max` texels (>= 4) at most, fewer where the hits are too far apart for it: nine texels of ten within what was
