@@ -10,7 +10,7 @@
 
 #include "support/make_dataset.h"
 #include "support/make_knot.h"
-#include "support/make_maps.h"
+#include "support/make_look_map.h"
 #include "support/make_textures.h"
 #include "support/make_tree.h"
 
@@ -72,7 +72,7 @@ int main(int argc, char **argv)
         struct spl_dataset *plain = make_dataset_levels(splats, (size_t)(side * side), 2);
         struct spl_map_row row = make_map_row(station, map_side, map_side);
         for (int i = 2; i < argc; i++)
-            make_mapped_file(plain, &row, look, argv[i]);
+            make_look_file(plain, &row, look, argv[i]);
         spl_dataset_close(plain);
         free(splats);
         return 0;

@@ -1,86 +1,85 @@
-/* Maps for tests; see make_maps.h. Anything that goes wrong ends the test program. */
+/* See make_maps.h. */
 #include "support/make_maps.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/memory.h"
+#include "base/error.h"
 #include "dataset/rewrite.h"
-#include "geom/polar.h"
 
-struct spl_map_row make_map_row(const double position[3], uint32_t side, uint32_t range_side)
+static uint32_t hash(uint32_t a, uint32_t b)
 {
-    struct spl_map_row row = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
-                              .position = {position[0], position[1], position[2]},
-                              .side = side,
-                              .levels = SPL_MAP_LEVELS_MAX,
-                              .range_side = range_side,
-                              .near = 0.1f,
-                              .slack = 0.01f};
-    spl_assert(!spl_map_judge(&row));
-    return row;
+    uint32_t h = a * 0x9e3779b1u ^ (b + 0x7f4a7c15u) * 0x85ebca6bu;
+    h ^= h >> 15;
+    h *= 0xc2b2ae35u;
+    return h ^ h >> 16;
 }
 
-static void make_ranges(const struct spl_map_row *row, make_look *look, uint32_t *words)
+struct make_maps make_maps(const struct spl_dataset *dataset, uint32_t count, uint32_t seed)
 {
-    uint32_t width = spl_polar_width(row->range_side, SPL_MAP_RANGE_APRON);
-    for (uint32_t y = 0; y < spl_polar_height(row->range_side, SPL_MAP_RANGE_APRON); y++)
-        for (uint32_t x = 0; x < width; x++) {
-            double direction[3], range;
-            uint8_t color[3];
-            spl_polar_direction(row->range_side, SPL_MAP_RANGE_APRON, (double[]){x + 0.5, y + 0.5}, direction);
-            look(direction, color, &range);
-            spl_map_set_code(words, (size_t)y * width + x, spl_map_code_of_range(row, range));
-        }
+    struct make_maps maps = {.count = count};
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    spl_assert(count && count <= make_maps_most);
+    for (uint32_t i = 0; i < count; i++) {
+        struct spl_map_row *row = &maps.rows[i];
+        double angle = 0.7 * i;
+        *row = (struct spl_map_row){.rotation = {cos(angle), -sin(angle), 0, sin(angle), cos(angle), 0, 0, 0, 1},
+                                    .side = SPL_MAP_SIDE_STEP * (1 + i % 3),
+                                    .levels = 1 + i % SPL_MAP_LEVELS_MAX,
+                                    .range_side = 1 + 31 * i,
+                                    .near = 0.5f + (float)i,
+                                    .slack = 0.01f * (float)i};
+        for (int a = 0; a < 3; a++)
+            row->position[a] = info->bounds_min[a] +
+                               hash(seed, 10 * i + (uint32_t)a) / 4294967296.0 * (info->bounds_max[a] - info->bounds_min[a]);
+        spl_assert(!spl_map_judge(row));
+        maps.words[i] = malloc(spl_map_words(row) * sizeof *maps.words[i]);
+        for (size_t w = 0; w < spl_map_words(row); w++)
+            maps.words[i][w] = hash(seed + i, (uint32_t)w);
+    }
+    maps.stations = malloc(info->chunks * sizeof *maps.stations);
+    for (uint64_t c = 0; c < info->chunks; c++) {
+        uint32_t h = hash(seed + 99, (uint32_t)c), seen = h % (count < SPL_CHUNK_STATIONS ? count + 1 : 5);
+        maps.stations[c] = (struct spl_chunk_stations){.seen_by = {0}};
+        for (uint32_t s = 0; s < seen; s++)
+            maps.stations[c].seen_by[s] = (uint16_t)(1 + (h / 8 + s) % count);
+        maps.stations[c].seen_by[0] |= seen && h >> 31 ? SPL_STATION_TRIMS : 0;
+        spl_assert(!spl_chunk_stations_judge(&maps.stations[c], count));
+    }
+    return maps;
 }
 
-static void make_colors(uint32_t side, make_look *look, uint32_t *block)
+void free_maps(struct make_maps *maps)
 {
-    uint32_t width = spl_polar_width(side, SPL_MAP_APRON), height = spl_polar_height(side, SPL_MAP_APRON);
-    for (uint32_t y = 0; y < height; y += 4)
-        for (uint32_t x = 0; x < width; x += 4, block += 2) {
-            double direction[3], range;
-            uint8_t color[3];
-            spl_polar_direction(side, SPL_MAP_APRON, (double[]){x + 2, y + 2}, direction);
-            look(direction, color, &range);
-            uint32_t packed = (uint32_t)(color[0] >> 3) << 11 | (uint32_t)(color[1] >> 2) << 5 | color[2] >> 3;
-            block[0] = packed << 16 | packed;
-        }
+    for (uint32_t i = 0; i < maps->count; i++)
+        free(maps->words[i]);
+    free(maps->stations);
+    *maps = (struct make_maps){.count = 0};
 }
 
-uint32_t *make_map(const struct spl_map_row *row, make_look *look)
+int make_maps_get(void *context, uint32_t index, const uint32_t **words, struct spl_error *err)
 {
-    uint32_t *words = spl_alloc(spl_map_words(row), sizeof *words, NULL);
-    spl_assert(words);
-    make_ranges(row, look, words);
-    for (uint32_t level = 0; level < row->levels; level++)
-        make_colors(row->side >> level, look, words + spl_map_level_word(row, level));
-    return words;
-}
-
-static int get_map(void *context, uint32_t index, const uint32_t **words, struct spl_error *err)
-{
-    (void)index, (void)err;
-    *words = context;
+    struct make_maps *maps = context;
+    (void)err;
+    spl_assert(index == maps->asked++);
+    *words = maps->words[index];
     return SPL_OK;
 }
 
-void make_mapped_file(const struct spl_dataset *from, const struct spl_map_row *row, make_look *look, const char *path)
+void make_mapped_file(const struct spl_dataset *from, struct make_maps *maps, const char *path)
 {
-    uint64_t chunks;
+    const struct spl_rewrite what = {.from = from,
+                                     .context = maps,
+                                     .maps = maps->rows,
+                                     .map_count = maps->count,
+                                     .stations = maps->stations,
+                                     .get_map = make_maps_get,
+                                     .page_bytes = maps->page_bytes};
     struct spl_error err = {0};
-    (void)spl_dataset_get_chunks(from, &chunks);
-    struct spl_chunk_stations *stations = spl_alloc(chunks, sizeof *stations, NULL);
-    uint32_t *words = make_map(row, look);
-    spl_assert(stations);
-    for (uint64_t c = 0; c < chunks; c++)
-        stations[c].seen_by[0] = 1 | SPL_STATION_TRIMS;
-    struct spl_rewrite what = {
-        .from = from, .maps = row, .map_count = 1, .stations = stations, .get_map = get_map, .context = words};
-    if (spl_dataset_rewrite(&what, path, &err)) {
-        fprintf(stderr, "make_maps: %s\n", err.message);
-        abort();
-    }
-    free(stations);
-    free(words);
+    maps->asked = 0;
+    if (!spl_dataset_rewrite(&what, path, &err))
+        return;
+    fprintf(stderr, "make_maps: %s\n", err.message);
+    abort();
 }

@@ -1,24 +1,28 @@
-/* Maps without panoramas: of one station, from a function of direction, on any dataset. */
+/* Maps of stations for tests: rows, words and stations of chunks that are right in form and mean nothing. Anything that
+ * goes wrong ends the test program. */
 #ifndef TEST_SUPPORT_MAKE_MAPS_H
 #define TEST_SUPPORT_MAKE_MAPS_H
 
-#include <stdint.h>
+#include "dataset/dataset.h"
 
-#include <splatd/dataset.h>
+enum { make_maps_most = 8 };
 
-#include "dataset/map.h"
+struct make_maps {
+    struct spl_map_row rows[make_maps_most];
+    uint32_t *words[make_maps_most], count;
+    struct spl_chunk_stations *stations; /* by chunk of the dataset */
+    uint32_t asked;                      /* maps that were asked for */
+    size_t page_bytes;                   /* of the file that is made; 0 = the writer's */
+};
 
-/* What the station sees in a direction of its own frame, of any length above 0: a colour, and a range, INFINITY where
- * nothing comes back, NAN where it did not look. */
-typedef void make_look(const double direction[3], uint8_t color[3], double *range);
+/* `count` (up to make_maps_most) stations over the dataset, which keeps all tables, with maps of different sides. */
+struct make_maps make_maps(const struct spl_dataset *dataset, uint32_t count, uint32_t seed);
+void free_maps(struct make_maps *maps);
 
-/* An upright station with all levels that its side has. */
-struct spl_map_row make_map_row(const double position[3], uint32_t side, uint32_t range_side);
+/* For struct spl_rewrite; the context is the struct make_maps. Maps must be asked for in their order. */
+int make_maps_get(void *context, uint32_t index, const uint32_t **words, struct spl_error *err);
 
-/* The words of its map, spl_map_words() of them, each block of colours of one colour; the caller frees them. */
-uint32_t *make_map(const struct spl_map_row *row, make_look *look);
-
-/* Writes `from` with that map to `path`: every chunk is the station's own and trimmed by it. */
-void make_mapped_file(const struct spl_dataset *from, const struct spl_map_row *row, make_look *look, const char *path);
+/* Writes `path`: `from` with these maps. */
+void make_mapped_file(const struct spl_dataset *from, struct make_maps *maps, const char *path);
 
 #endif

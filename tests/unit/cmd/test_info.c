@@ -15,7 +15,7 @@
 
 #include "dataset/rewrite.h"
 #include "support/make_dataset.h"
-#include "support/make_maps.h"
+#include "support/make_look_map.h"
 
 static char folder[256];
 
@@ -65,7 +65,7 @@ static void test_maps(void **state)
 {
     const struct spl_dataset *plain = *state;
     struct spl_map_row row = make_map_row((double[]){1, 2, 3}, 128, 100);
-    make_mapped_file(plain, &row, look, place("mapped.spld"));
+    make_look_file(plain, &row, look, place("mapped.spld"));
     json_t *json = tell_json("mapped.spld");
     const json_t *maps = json_object_get(json, "maps"), *only = json_array_get(json_object_get(maps, "by_station"), 0);
     long long bytes = (long long)(spl_map_words(&row) * 4), texels = 6 * 128 * 128;
