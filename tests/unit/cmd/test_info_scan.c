@@ -228,7 +228,7 @@ static void test_panoramas(void **state)
 {
     char output[16384];
     (void)state;
-    assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 -o yard >/dev/null 2>&1", output, sizeof output),
+    assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
                      0);
     json_t *json = json_of("yard/courtyard.ply"), *pack = json_object_get(json, "pack");
     assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0}]"));
