@@ -54,10 +54,17 @@ struct spl_fill_params {
     uint32_t pyramid; /* levels of the pyramid that holes are filled from; 0 = from the kernel */
 };
 
+/* Maps of a dataset's stations: what each saw, as colours and ranges. Colours are looked up in them by where a sample
+ * lies, and what a splat's own station saw through is not drawn. Nothing where a dataset has none. */
+enum spl_maps { SPL_MAPS_ON, SPL_MAPS_OFF, SPL_MAPS_COUNT };
+SPL_API const char *spl_maps_name(enum spl_maps maps);
+SPL_API int spl_maps_from_name(const char *name); /* -1 for an unknown name */
+
 /* What a parameter changes. */
 enum spl_param_changes {
     SPL_CHANGES_SHAPES,   /* what is seen where */
     SPL_CHANGES_TEXTURES, /* colours alone, and those of datasets with textures */
+    SPL_CHANGES_MAPS,     /* colours and silhouettes, and those of datasets with maps of stations */
 };
 
 /* Every parameter of a method, in the order of --help:
@@ -68,6 +75,8 @@ enum spl_param_changes {
     REAL(margin, disc.margin, 0, 16, 1, SPL_CHANGES_SHAPES,                                                            \
          "depth behind the first surface that is blended, in splat radii")                                             \
     COUNT(atoms, disc.atoms, 0, 8, 8, SPL_CHANGES_TEXTURES, "of a splat's texture at most; 0 = its mean colour")       \
+    CHOICE(maps, maps, maps, SPL_MAPS_ON, SPL_CHANGES_MAPS,                                                            \
+           "colours and silhouettes from the maps of stations, where there are any")                                   \
     CHOICE(visibility, fill.visibility, visibility, SPL_VISIBILITY_ADAPTIVE, SPL_CHANGES_SHAPES,                       \
            "which points are hidden; constant: the whole kernel everywhere, slow; none: removes none")                 \
     REAL(kernel, fill.kernel, 3, 129, 0, SPL_CHANGES_SHAPES,                                                           \

@@ -32,6 +32,7 @@ struct spl_view {
     bool partial;               /* draws what is on the device now, coarser where pages are still to come; else waits
                                    for them. A dataset's first page is waited for in any case */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
+    enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

@@ -40,7 +40,8 @@
 
 enum {
     SPL_VIEW_NAME_MAX = 100,  /* bytes */
-    SPL_VIEW_LIST_MAX = 65536 /* views */
+    SPL_VIEW_LIST_MAX = 65536, /* views */
+    SPL_PANORAMA_PIXELS_MAX = 128 << 20
 };
 
 /* A photograph that lies inside a scan's file, or a panorama that the view cuts a face out of, or both. */

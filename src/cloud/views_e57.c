@@ -87,13 +87,14 @@ static struct spl_inner_photograph make_inner(const struct reading *r)
 static int check_sizes(const struct reading *r, struct spl_error *err)
 {
     const struct spl_e57_image *i = r->image;
+    double most = i->kind == SPL_E57_PINHOLE ? (double)spl_view_list_limits.pixels : SPL_PANORAMA_PIXELS_MAX;
     const double sizes[2] = {i->width, i->height}, pixels[2] = {i->pixel_width, i->pixel_height};
     if (i->coding == SPL_E57_NO_CODING)
         return spl_fail_field(err, SPL_E_INPUT, "jpegImage", "%s: image %zu ('%s') has neither jpegImage nor pngImage",
                               r->path, r->number, i->name);
     for (int k = 0; k < 2; k++) {
         if (!(sizes[k] >= 1 && sizes[k] <= spl_view_list_limits.side_px && sizes[k] == floor(sizes[k])) ||
-            i->width * i->height > (double)spl_view_list_limits.pixels)
+            i->width * i->height > most)
             return fail(r, k ? "imageHeight" : "imageWidth", err, "pixels are no image that can be taken", sizes[k]);
         if (!(pixels[k] > 0 && isfinite(pixels[k])))
             return fail(r, k ? "pixelHeight" : "pixelWidth", err, "is no size", pixels[k]);

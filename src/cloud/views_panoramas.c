@@ -197,9 +197,9 @@ static int find_image(const struct entry *e, const char *field, const json_t *na
     if (!size[0] || !size[1])
         return spl_fail_field(err, SPL_E_INPUT, size[0] ? "height" : "width", "says no %s in pixels",
                               size[0] ? "height" : "width");
-    if ((uint64_t)size[0] * size[1] > spl_view_list_limits.pixels)
-        return spl_fail_field(err, SPL_E_LIMIT, "width", "%s has %u x %u pixels; the limit is %llu: halve it", *file,
-                              size[0], size[1], (unsigned long long)spl_view_list_limits.pixels);
+    if ((uint64_t)size[0] * size[1] > SPL_PANORAMA_PIXELS_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, "width", "%s has %u x %u pixels; the limit is %d: halve it", *file,
+                              size[0], size[1], SPL_PANORAMA_PIXELS_MAX);
     return SPL_OK;
 }
 

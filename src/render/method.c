@@ -21,6 +21,14 @@ static const struct spl_method_row *const rows[SPL_METHOD_COUNT] = {
 #undef ROW
 };
 
+static int find_name(const char *const *names, int count, const char *name)
+{
+    for (int i = 0; name && i < count; i++)
+        if (!strcmp(name, names[i]))
+            return i;
+    return -1;
+}
+
 static const char *const visibility_names[SPL_VISIBILITY_COUNT] = {
     [SPL_VISIBILITY_ADAPTIVE] = "adaptive",
     [SPL_VISIBILITY_CONSTANT] = "constant",
@@ -34,10 +42,22 @@ const char *spl_visibility_name(enum spl_visibility visibility)
 
 int spl_visibility_from_name(const char *name)
 {
-    for (int i = 0; name && i < SPL_VISIBILITY_COUNT; i++)
-        if (!strcmp(name, visibility_names[i]))
-            return i;
-    return -1;
+    return find_name(visibility_names, SPL_VISIBILITY_COUNT, name);
+}
+
+static const char *const maps_names[SPL_MAPS_COUNT] = {
+    [SPL_MAPS_ON] = "on",
+    [SPL_MAPS_OFF] = "off",
+};
+
+const char *spl_maps_name(enum spl_maps maps)
+{
+    return (unsigned)maps < SPL_MAPS_COUNT ? maps_names[maps] : "unknown";
+}
+
+int spl_maps_from_name(const char *name)
+{
+    return find_name(maps_names, SPL_MAPS_COUNT, name);
 }
 
 /* spl_PREFIX_name() of an int, for each choice. */
@@ -50,6 +70,7 @@ int spl_visibility_from_name(const char *name)
 SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
+#define CHOICE_MOST_maps (SPL_MAPS_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {
 #define REAL(id, field, low, high, value, change, text)                                                                \
     {.name = #id,                                                                                                      \
@@ -102,6 +123,13 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
                               value, param->otherwise, param->least, param->most);
     return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %g is not within %g and %g", param->name, value,
                           param->least, param->most);
+}
+
+bool spl_method_param_counts(const struct spl_method_param_info *param, const struct spl_dataset_info *dataset)
+{
+    return param->changes == SPL_CHANGES_TEXTURES ? dataset->atoms > 0
+           : param->changes == SPL_CHANGES_MAPS   ? dataset->maps > 0
+                                                  : true;
 }
 
 double spl_view_get_param(const struct spl_view *view, enum spl_method_param param)

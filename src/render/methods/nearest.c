@@ -44,7 +44,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_nearest = {
     .info = {.name = "nearest",
              .help = "oriented discs, the nearest alone, colours smoothed over the samples around",
-             .params = SPL_PARAM_BIT(margin),
+             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(maps),
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},
     .discs = true,

@@ -99,7 +99,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_splat = {
     .info = {.name = "splat",
              .help = "oriented discs, blended within a margin behind the first surface; specks closed",
-             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms),
+             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps),
              .textures = true,
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},

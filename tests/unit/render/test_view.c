@@ -75,10 +75,32 @@ static void test_what_is_no_method_is_answered(void **state)
     }
     assert_null(spl_method_param_get((enum spl_method_param)99));
     assert_string_equal(spl_visibility_name((enum spl_visibility)99), "unknown");
+    assert_string_equal(spl_maps_name((enum spl_maps)99), "unknown");
     assert_string_equal(spl_attribute_name((enum spl_attribute)99), "unknown");
     assert_int_equal(spl_method_from_name(NULL), -1);
     assert_int_equal(spl_method_param_from_name(NULL), -1);
     assert_int_equal(spl_visibility_from_name(NULL), -1);
+    assert_int_equal(spl_maps_from_name(NULL), -1);
+}
+
+/* Maps are drawn where nobody says otherwise, by a caller whose view ends before them too. */
+static void test_maps_are_on_unless_told(void **state)
+{
+    (void)state;
+    struct spl_view view;
+    spl_view_init(&view);
+    assert_int_equal(view.maps, SPL_MAPS_ON);
+    assert_true(spl_method_get_params(SPL_METHOD_SPLAT) & SPL_PARAM_BIT(maps));
+    assert_true(spl_method_get_params(SPL_METHOD_NEAREST) & SPL_PARAM_BIT(maps));
+    assert_false(spl_method_get_params(SPL_METHOD_POINTS) & SPL_PARAM_BIT(maps));
+    const struct spl_method_param_info *maps = spl_method_param_get(SPL_PARAM_maps);
+    assert_int_equal(maps->changes, SPL_CHANGES_MAPS);
+    assert_int_equal(maps->choice_from_name("off"), SPL_MAPS_OFF);
+    assert_int_equal(maps->choice_from_name("of"), -1);
+    spl_view_set_param(&view, SPL_PARAM_maps, SPL_MAPS_OFF);
+    assert_int_equal(view.maps, SPL_MAPS_OFF);
+    assert_true(spl_method_param_check(maps, spl_view_get_param(&view, SPL_PARAM_maps), NULL) == SPL_OK);
+    assert_true(spl_method_param_check(maps, SPL_MAPS_COUNT, NULL) < 0);
 }
 
 int main(void)
@@ -87,6 +109,7 @@ int main(void)
         cmocka_unit_test(test_normals_need_a_surface),
         cmocka_unit_test(test_ids_have_32_bits),
         cmocka_unit_test(test_what_is_no_method_is_answered),
+        cmocka_unit_test(test_maps_are_on_unless_told),
         cmocka_unit_test(test_a_camera_is_whole_with_a_lens_and_a_pose),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
