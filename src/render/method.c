@@ -127,7 +127,9 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
 
 bool spl_method_param_counts(const struct spl_method_param_info *param, const struct spl_dataset_info *dataset)
 {
-    return param->changes != SPL_CHANGES_TEXTURES || dataset->atoms > 0;
+    return param->changes == SPL_CHANGES_TEXTURES ? dataset->atoms > 0
+           : param->changes == SPL_CHANGES_MAPS   ? dataset->maps > 0
+                                                  : true;
 }
 
 double spl_view_get_param(const struct spl_view *view, enum spl_method_param param)

@@ -70,7 +70,7 @@ int main(int argc, char **argv)
     }
     if (!strcmp(kind, "--mapped")) {
         struct spl_dataset *plain = make_dataset_levels(splats, (size_t)(side * side), 2);
-        struct spl_map_row row = make_map_row(station, map_side, map_side);
+        struct spl_map_row row = make_look_row(station, map_side, map_side);
         for (int i = 2; i < argc; i++)
             make_look_file(plain, &row, look, argv[i]);
         spl_dataset_close(plain);

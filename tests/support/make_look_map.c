@@ -8,7 +8,7 @@
 #include "dataset/rewrite.h"
 #include "geom/polar.h"
 
-struct spl_map_row make_map_row(const double position[3], uint32_t side, uint32_t range_side)
+struct spl_map_row make_look_row(const double position[3], uint32_t side, uint32_t range_side)
 {
     struct spl_map_row row = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
                               .position = {position[0], position[1], position[2]},
@@ -48,7 +48,7 @@ static void make_colors(uint32_t side, make_look *look, uint32_t *block)
         }
 }
 
-uint32_t *make_map(const struct spl_map_row *row, make_look *look)
+uint32_t *make_look_words(const struct spl_map_row *row, make_look *look)
 {
     uint32_t *words = spl_alloc(spl_map_words(row), sizeof *words, NULL);
     spl_assert(words);
@@ -71,7 +71,7 @@ void make_look_file(const struct spl_dataset *from, const struct spl_map_row *ro
     struct spl_error err = {0};
     (void)spl_dataset_get_chunks(from, &chunks);
     struct spl_chunk_stations *stations = spl_alloc(chunks, sizeof *stations, NULL);
-    uint32_t *words = make_map(row, look);
+    uint32_t *words = make_look_words(row, look);
     spl_assert(stations);
     for (uint64_t c = 0; c < chunks; c++)
         stations[c].seen_by[0] = 1 | SPL_STATION_TRIMS;

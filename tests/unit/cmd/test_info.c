@@ -64,7 +64,7 @@ static long long number(const json_t *json, const char *key)
 static void test_maps(void **state)
 {
     const struct spl_dataset *plain = *state;
-    struct spl_map_row row = make_map_row((double[]){1, 2, 3}, 128, 100);
+    struct spl_map_row row = make_look_row((double[]){1, 2, 3}, 128, 100);
     make_look_file(plain, &row, look, place("mapped.spld"));
     json_t *json = tell_json("mapped.spld");
     const json_t *maps = json_object_get(json, "maps"), *only = json_array_get(json_object_get(maps, "by_station"), 0);

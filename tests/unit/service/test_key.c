@@ -11,7 +11,7 @@
 #include "service/view/key.h"
 
 enum { renderer = 9 };
-static const struct spl_dataset_info plain = {.version = 7}, textured = {.version = 7, .atoms = 16};
+static const struct spl_dataset_info plain = {.version = 7}, textured = {.version = 7, .atoms = 16, .maps = 4};
 
 static int stay(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
                 double out[3], struct spl_error *err)
@@ -58,6 +58,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"", "eye=10,0,-0&target=0,0,0&up=0,0,2&fov=60&near=0.01&background=%23000000"},
         {"", "v=0123456789abcdef"},
         {"", "chroma=420"},
+        {"", "maps=on"},
         {"width=320", "width=320&height=180"},
         {"height=180", "{\"width\":320,\"height\":180}"},
         {"width=1280", ""},
@@ -96,6 +97,9 @@ static void what_a_dataset_lacks_is_left_out(void **state)
         {"", "atoms=0"},
         {"", "{\"atoms\": 5}"},
         {"layers=color,depth", "layers=color,depth&atoms=3"},
+        {"", "maps=off"},
+        {"layer=depth", "layer=depth&maps=off"},
+        {"@x=1&y=1", "@x=1&y=1&maps=off"},
     };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
         struct spl_key a = key_of(&plain, pairs[i][0]), b = key_of(&plain, pairs[i][1]);
@@ -139,6 +143,9 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
         "layer=coverage",
         "supersample=2",
         "atoms=0",
+        "maps=off",
+        "layer=depth&maps=off", /* silhouettes, too */
+        "@x=640&y=360&maps=off",
         "supersample=0.5",
         "margin=0",
         "margin=1.5",
