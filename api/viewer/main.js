@@ -143,6 +143,7 @@ function showFrame({detail: frame}) {
   const {chosen, promised, demand} = frame;
   $("chosen").textContent = chosen
     ? `Chosen: ${chosen.method}, level ${chosen.lod}, samples a side ${chosen.supersample}` +
+      (chosen.maps ? `, maps ${chosen.maps}` : "") +
       (dataset.textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
       `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
     : "";

@@ -22,8 +22,10 @@ export const findMethod = (name) => table.methods.find((method) => method.name =
 export const findParameter = (name) => table.parameters.find((parameter) => parameter.name === name);
 
 /** Does the parameter change what `method` draws of `dataset`? */
-export const counts = ({name, textures}, method, dataset) =>
-  Boolean(findMethod(method)?.parameters.includes(name) && (dataset.textures || !textures));
+export const counts = ({name, textures, maps}, method, dataset) =>
+  Boolean(
+    findMethod(method)?.parameters.includes(name) && (dataset.textures || !textures) && (dataset.maps || !maps),
+  );
 
 /** What draws `dataset` where `method` is asked for. */
 export function offered(method = table.default, dataset) {

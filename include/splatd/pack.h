@@ -71,6 +71,33 @@ struct spl_photo_report {
     double seconds;
 };
 
+/* Colours from maps of stations: what each of them saw around itself, finer than its points. */
+struct spl_map_options {
+    size_t size;           /* spl_map_options_init() */
+    /* Panoramas and photographs on tripods, with poses: panoramas.json, a scan's E57 file, COLMAP's folder, and all
+     * that spl_photo_options has; NULL = the splats' own colours alone make the maps. */
+    const char *panoramas;
+    const char *images;    /* folder of the photographs; NULL = where `panoramas` says */
+    /* Each picture that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
+    void (*refused)(void *context, const struct spl_error *why);
+    void *context;
+};
+
+static inline void spl_map_options_init(struct spl_map_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
+struct spl_map_report {
+    uint32_t stations;         /* that have a map; 0 = no maps were made */
+    uint32_t pictures;         /* that were named; so many of them could not be used: */
+    uint32_t refused;
+    uint32_t side;             /* of the largest: texels a quarter turn */
+    uint64_t texels, bytes;    /* of all maps: texels of the finest colours; all that they take */
+    double block_psnr;         /* of the blocks, against the colours that they hold, dB */
+    double seconds;
+};
+
 struct spl_pack_options {
     size_t size;               /* spl_pack_options_init() */
     const char *const *inputs; /* scans; folders, for all scans below them; @NAME, a list with a path a line */
@@ -106,6 +133,7 @@ struct spl_pack_options {
     const char *crs;           /* likewise: "EPSG:25832", a file that holds WKT, "none"; NULL = as they say */
     /* What is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it. */
     double up[3];
+    const struct spl_map_options *maps; /* NULL = none are made */
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
@@ -127,11 +155,12 @@ struct spl_pack_report {
     double seconds;
     struct spl_photo_report photos;
     uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
+    struct spl_map_report maps;
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
- * rename: a crash leaves the old file or none). With photographs the dataset is first written beside `output`, removed
- * as soon as it is open again, and then written with their colours. Blocks; uses options->threads threads
+ * rename: a crash leaves the old file or none). With photographs or maps the dataset is first written beside `output`,
+ * removed as soon as it is open again, and then written with their colours, with maps once more. Blocks; uses options->threads threads
  * and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for each point on a wire, a pole
  * or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);

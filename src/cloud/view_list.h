@@ -26,6 +26,26 @@ int spl_view_list_add_image(struct spl_view_list *list, const char *path, const 
 char *spl_view_list_find(const char *folder, const char *name, const struct spl_photograph_options *photographs,
                          struct spl_error *err);
 
+/* The same of a path that a JSON at `path` names: beside it unless absolute, or in the images' folder. */
+char *spl_view_list_find_beside(const char *path, const char *name, const struct spl_photograph_options *photographs,
+                                struct spl_error *err);
+
+/* spl_view_list_add() of a photograph that is, or is cut out of, `inner`, which is copied; NULL: of none. */
+int spl_view_list_add_inner(struct spl_view_list *list, const char *path, const char *name,
+                            const struct spl_camera *camera, const char *photograph,
+                            const struct spl_inner_photograph *inner, struct spl_error *err);
+
+/* A panorama's faces, as views NAME-front and so on; those that would show nothing of it are left out. `rotation` (to
+ * the world, row-major) and `position` are the panorama's. */
+struct spl_face_options {
+    const char *path, *name, *photograph;
+    const double *rotation, *position;
+    const struct spl_inner_photograph *inner; /* its panorama's rotation is the face's, and set here */
+    uint32_t panorama;                        /* as of struct spl_named_view */
+    bool photographs;
+};
+int spl_view_list_add_faces(struct spl_view_list *list, const struct spl_face_options *options, struct spl_error *err);
+
 /* What becomes of the fault `why` of one view: 0 when the caller of the list goes on without it, else rc. */
 int spl_view_list_refuse(const struct spl_photograph_options *photographs, int rc, const struct spl_error *why,
                          struct spl_error *err);
@@ -51,6 +71,10 @@ int spl_view_list_read_transforms(struct spl_view_list *list, const char *path, 
                                   const struct spl_photograph_options *photographs, struct spl_error *err);
 int spl_view_list_read_open3d(struct spl_view_list *list, const char *path, const json_t *document,
                               const struct spl_photograph_options *photographs, struct spl_error *err);
+
+/* views_panoramas.c */
+int spl_view_list_read_panoramas(struct spl_view_list *list, const char *path, const json_t *document,
+                                 const struct spl_photograph_options *photographs, struct spl_error *err);
 
 /* views_e57.c */
 bool spl_view_list_is_e57(const char *path);

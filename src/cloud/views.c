@@ -165,6 +165,15 @@ static int load_text_model(struct spl_view_list *list, const char *path,
     return spl_view_list_load_colmap(list, path, photographs, err);
 }
 
+static int load_panoramas(struct spl_view_list *list, const char *folder,
+                          const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    char *path = spl_view_list_print(err, "%s/panoramas.json", folder);
+    int rc = path ? spl_view_list_load_json(list, path, photographs, err) : SPL_E_NOMEM;
+    free(path);
+    return rc;
+}
+
 static int load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *photographs,
                 struct spl_error *err)
 {
@@ -172,6 +181,8 @@ static int load(struct spl_view_list *list, const char *path, const struct spl_p
     if (stat(path, &status) || !S_ISDIR(status.st_mode))
         return spl_view_list_is_e57(path) ? spl_view_list_load_e57(list, path, photographs, err)
                                           : spl_view_list_load_json(list, path, photographs, err);
+    if (has(path, "panoramas.json"))
+        return load_panoramas(list, path, photographs, err);
     if (has(path, "cameras.bin"))
         return spl_view_list_load_colmap_bin(list, path, photographs, err);
     if (has(path, "camera-intrinsics.txt"))
@@ -197,20 +208,70 @@ int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
     return rc;
 }
 
+int spl_panoramas_load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *options,
+                       struct spl_error *err)
+{
+    char *below = spl_view_list_print(err, "%s/panoramas", path);
+    struct stat status;
+    *list = (struct spl_view_list){0};
+    if (!below)
+        return SPL_E_NOMEM;
+    bool folder = !stat(path, &status) && S_ISDIR(status.st_mode);
+    static const char *const models[] = {"panoramas.json", "cameras.bin", "cameras.txt", "camera-intrinsics.txt",
+                                         "sparse/0/cameras.bin", "sparse/0/cameras.txt"};
+    bool known = !folder;
+    for (size_t i = 0; i < sizeof models / sizeof *models; i++)
+        known |= has(path, models[i]);
+    int rc = has(below, "panoramas.json") && !has(path, "panoramas.json")
+                 ? spl_view_list_load_photographs(list, below, options, err)
+             : known ? spl_view_list_load_photographs(list, path, options, err)
+                     : spl_fail(err, SPL_E_NOT_FOUND,
+                                "%s: holds no panoramas.json and no COLMAP model; images need poses "
+                                "(api/photographs.md)",
+                                path);
+    free(below);
+    return rc;
+}
+
 int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_error *err)
 {
     return spl_view_list_load_photographs(list, path, NULL, err);
+}
+
+int spl_view_list_append(struct spl_view_list *list, struct spl_view_list *more, struct spl_error *err)
+{
+    uint32_t panoramas = 0;
+    if (more->count > SPL_VIEW_LIST_MAX - list->count)
+        return spl_fail_field(err, SPL_E_LIMIT, "views", "more than %d views", SPL_VIEW_LIST_MAX);
+    if (spl_array_reserve(list->views, list->capacity, list->count + more->count, err))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < list->count; i++)
+        panoramas = list->views[i].panorama > panoramas ? list->views[i].panorama : panoramas;
+    for (size_t i = 0; i < more->count; i++) {
+        struct spl_named_view *view = &list->views[list->count++];
+        *view = more->views[i];
+        view->panorama += view->panorama ? panoramas : 0;
+    }
+    more->count = 0;
+    spl_view_list_finish(more);
+    return SPL_OK;
+}
+
+void spl_view_list_cut(struct spl_view_list *list, size_t count)
+{
+    for (; list->count > count; list->count--) {
+        const struct spl_named_view *last = &list->views[list->count - 1];
+        free(last->name);
+        free(last->photograph);
+        spl_inner_photograph_destroy(last->inner);
+    }
 }
 
 void spl_view_list_finish(struct spl_view_list *list)
 {
     if (!list)
         return;
-    for (size_t i = 0; i < list->count; i++) {
-        free(list->views[i].name);
-        free(list->views[i].photograph);
-        spl_inner_photograph_destroy(list->views[i].inner);
-    }
+    spl_view_list_cut(list, 0);
     free(list->views);
     *list = (struct spl_view_list){0};
 }

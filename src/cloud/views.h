@@ -22,6 +22,9 @@
  * E57: the images of the scans' file that have a pose: pinholes as they are, spherical and cylindrical ones as faces of
  * 90 degrees (views_e57.c).
  *
+ * Panoramas: a JSON of "panoramas", or a folder with panoramas.json, as `splatd synth --panoramas` writes it
+ * (api/photographs.md): equirectangular images as faces of 90 degrees, and cubes of six images (views_panoramas.c).
+ *
  * A view is drawn as a pinhole: those with distortion are taken when it is 0. Photographs keep their lens. */
 #ifndef SPL_CLOUD_VIEWS_H
 #define SPL_CLOUD_VIEWS_H
@@ -37,13 +40,14 @@
 
 enum {
     SPL_VIEW_NAME_MAX = 100,  /* bytes */
-    SPL_VIEW_LIST_MAX = 65536 /* views */
+    SPL_VIEW_LIST_MAX = 65536, /* views */
+    SPL_PANORAMA_PIXELS_MAX = 128 << 20
 };
 
-/* A photograph that lies inside a scan's file, whole or as a panorama that the view cuts a face out of. */
+/* A photograph that lies inside a scan's file, or a panorama that the view cuts a face out of, or both. */
 struct spl_inner_photograph {
     char *path;         /* of the file */
-    uint64_t at, bytes; /* of its section in the file, and of the image */
+    uint64_t at, bytes; /* of its section in an E57 file, and of the image; 0: the file is the image */
     bool is_panorama;
     uint32_t width, height; /* of the image, pixels */
     struct spl_panorama panorama;
@@ -55,6 +59,7 @@ struct spl_named_view {
     struct spl_distortion distortion;   /* NONE but for photographs */
     char *photograph;                   /* path, of an inner one for messages alone; may be NULL */
     struct spl_inner_photograph *inner; /* may be NULL: the photograph is a file */
+    uint32_t panorama;                  /* which one of its list it is a face of, from 1; 0: of none */
 };
 
 struct spl_view_list {
@@ -70,7 +75,8 @@ int spl_view_list_load(struct spl_view_list *list, const char *path, struct spl_
 
 struct spl_photograph_options {
     const char *images; /* folder that NAME, or its last part, is looked for in instead; may be NULL */
-    /* The size of an image file, for poses that come without; may be NULL: those are refused. */
+    /* The size of an image file, for poses that come without, whose lack is refused where this is NULL, and of every
+     * panorama; may fail for what is no photograph. */
     int (*get_size)(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err);
     /* Called for each photograph whose pose or lens is at fault, which is then left out; NULL: the first one fails. */
     void (*refuse)(void *context, const struct spl_error *why);
@@ -81,6 +87,22 @@ struct spl_photograph_options {
  * SIMPLE_PINHOLE to FULL_OPENCV, SIMPLE_RADIAL_FISHEYE and RADIAL_FISHEYE are taken. */
 int spl_view_list_load_photographs(struct spl_view_list *list, const char *path,
                                    const struct spl_photograph_options *options, struct spl_error *err);
+
+/* What colours of a whole surrounding come from: panoramas, or photographs on tripods. As
+ * spl_view_list_load_photographs(), and a folder whose folder `panoramas` has a panoramas.json will do: what `splatd
+ * synth -o` was given. */
+int spl_panoramas_load(struct spl_view_list *list, const char *path, const struct spl_photograph_options *options,
+                       struct spl_error *err);
+
+/* Removes all views but the first `count`. */
+void spl_view_list_cut(struct spl_view_list *list, size_t count);
+
+/* Whether a scan's file has images that are views: an E57 whose images2D have poses. Any thread; blocks for reading. */
+bool spl_panoramas_are_inside(const char *path);
+
+/* Moves the views of `more`, which is left empty, to the end of `list`; their panoramas are numbered on. SPL_E_LIMIT,
+ * SPL_E_NOMEM; both lists as they were then. */
+int spl_view_list_append(struct spl_view_list *list, struct spl_view_list *more, struct spl_error *err);
 
 /* An inner photograph as a file of its own, which the caller closes: the image as it was stored. Any thread; blocks. */
 int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct spl_error *err);

@@ -3,6 +3,7 @@
  *
  * Names are the images', with their number in the file, since most writers call all of them the same; of what no file
  * name can carry '_' remains. A spherical or cylindrical image without a pose has that of its scan. Any thread. */
+#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,7 +17,7 @@
 #include "geom/quaternion.h"
 #include "geom/size.h"
 
-enum { name_bytes = 60, section_header = 16, block = 1 << 16, probes = 16, face_side_max = 8192, face_side_min = 16 };
+enum { name_bytes = 60, section_header = 16, block = 1 << 16 };
 
 struct reading {
     struct spl_view_list *list;
@@ -37,90 +38,63 @@ bool spl_view_list_is_e57(const char *path)
     return is;
 }
 
-void spl_inner_photograph_destroy(struct spl_inner_photograph *inner)
-{
-    if (inner)
-        free(inner->path);
-    free(inner);
-}
-
 static int fail(const struct reading *r, const char *field, struct spl_error *err, const char *what, double value)
 {
     return spl_fail_field(err, SPL_E_INPUT, field, "%s: image %zu ('%s'): %s: %g %s", r->path, r->number,
                           r->image->name, field, value, what);
 }
 
-/* Camera to world of an image, by its pose and the axes of its face (NULL: its own). */
-static int make_matrix(const struct reading *r, const struct spl_e57_pose *pose, const double face[9], double m[16],
-                       struct spl_error *err)
+/* The pose's rotation, row-major. */
+static int find_turn(const struct reading *r, const struct spl_e57_pose *pose, double turn[9], struct spl_error *err)
 {
     const double *q = pose->rotation;
-    double turn[9], length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(length > 1e-6 && length < 1e6))
         return fail(r, "rotation", err, "is the length of its quaternion, which is no rotation", length);
     spl_quaternion_to_matrix(q, turn);
-    memset(m, 0, 16 * sizeof *m);
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++)
-            for (int k = 0; k < 3; k++)
-                m[4 * i + j] += turn[3 * i + k] * (face ? face[3 * k + j] : k == j);
-        m[4 * i + 3] = pose->translation[i];
-    }
-    m[15] = 1;
     return SPL_OK;
 }
 
-static int add(const struct reading *r, const struct spl_camera *camera, const char *face,
-               const struct spl_panorama *panorama, struct spl_error *err)
+/* NAME-N, of what a file name can carry; the caller frees it. */
+static char *make_name(const struct reading *r, struct spl_error *err)
 {
-    const struct spl_e57_image *image = r->image;
     char name[name_bytes + 1];
-    struct spl_inner_photograph *inner = NULL;
-    size_t length = strlen(image->name);
-    while (length > name_bytes || (length && (image->name[length] & 0xc0) == 0x80))
+    size_t length = strlen(r->image->name);
+    while (length > name_bytes || (length && (r->image->name[length] & 0xc0) == 0x80))
         length--; /* whole characters */
-    memcpy(name, image->name, length);
+    memcpy(name, r->image->name, length);
     name[length] = 0;
     for (char *c = name; *c; c++)
         *c = *c == '/' || (c == name && *c == '.') ? '_' : *c;
-    char *whole = spl_view_list_print(err, "%s-%zu%s%s", *name ? name : "image", r->number, *face ? "-" : "", face);
-    char *shown = spl_view_list_print(err, "%s: image %zu ('%s')", r->path, r->number, image->name);
-    int rc = whole && shown ? spl_camera_check(camera, err) : SPL_E_NOMEM;
-    if (!rc)
-        rc = spl_view_list_add(r->list, r->path, whole, camera, r->photographs ? shown : NULL, err);
-    if (!rc && r->photographs) {
-        inner = spl_alloc(1, sizeof *inner, err);
-        char *path = spl_view_list_print(err, "%s", r->path);
-        r->list->views[r->list->count - 1].inner = inner;
-        if (!inner || !path) {
-            free(path);
-            rc = SPL_E_NOMEM;
-        } else {
-            *inner = (struct spl_inner_photograph){.path = path,
-                                                   .at = image->at,
-                                                   .bytes = image->bytes,
-                                                   .is_panorama = panorama != NULL,
-                                                   .width = (uint32_t)image->width,
-                                                   .height = (uint32_t)image->height};
-            if (panorama)
-                inner->panorama = *panorama;
-        }
-    }
-    free(whole);
-    free(shown);
-    return rc;
+    return spl_view_list_print(err, "%s-%zu", *name ? name : "image", r->number);
+}
+
+static char *describe(const struct reading *r, struct spl_error *err)
+{
+    return spl_view_list_print(err, "%s: image %zu ('%s')", r->path, r->number, r->image->name);
+}
+
+static struct spl_inner_photograph make_inner(const struct reading *r)
+{
+    const struct spl_e57_image *image = r->image;
+    return (struct spl_inner_photograph){.path = (char *)r->path, // borrowed: what is added is a copy
+                                         .at = image->at,
+                                         .bytes = image->bytes,
+                                         .width = (uint32_t)image->width,
+                                         .height = (uint32_t)image->height};
 }
 
 static int check_sizes(const struct reading *r, struct spl_error *err)
 {
     const struct spl_e57_image *i = r->image;
+    double most = i->kind == SPL_E57_PINHOLE ? (double)spl_view_list_limits.pixels : SPL_PANORAMA_PIXELS_MAX;
     const double sizes[2] = {i->width, i->height}, pixels[2] = {i->pixel_width, i->pixel_height};
     if (i->coding == SPL_E57_NO_CODING)
         return spl_fail_field(err, SPL_E_INPUT, "jpegImage", "%s: image %zu ('%s') has neither jpegImage nor pngImage",
                               r->path, r->number, i->name);
     for (int k = 0; k < 2; k++) {
         if (!(sizes[k] >= 1 && sizes[k] <= spl_view_list_limits.side_px && sizes[k] == floor(sizes[k])) ||
-            i->width * i->height > (double)spl_view_list_limits.pixels)
+            i->width * i->height > most)
             return fail(r, k ? "imageHeight" : "imageWidth", err, "pixels are no image that can be taken", sizes[k]);
         if (!(pixels[k] > 0 && isfinite(pixels[k])))
             return fail(r, k ? "pixelHeight" : "pixelWidth", err, "is no size", pixels[k]);
@@ -132,9 +106,10 @@ static int add_pinhole(const struct reading *r, struct spl_error *err)
 {
     const struct spl_e57_image *i = r->image;
     struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    const struct spl_inner_photograph inner = make_inner(r);
     struct spl_error why = {0};
-    double m[16];
-    int rc = make_matrix(r, &i->pose, NULL, m, err);
+    double turn[9], m[16] = {[15] = 1};
+    int rc = find_turn(r, &i->pose, turn, err);
     if (rc)
         return rc;
     if (!i->pose.given)
@@ -142,6 +117,10 @@ static int add_pinhole(const struct reading *r, struct spl_error *err)
                               i->name);
     if (!(i->focal_length > 0 && isfinite(i->focal_length)))
         return fail(r, "focalLength", err, "is no focal length", i->focal_length);
+    for (int k = 0; k < 3; k++) {
+        memcpy(&m[4 * k], &turn[3 * k], 3 * sizeof *m);
+        m[4 * k + 3] = i->pose.translation[k];
+    }
     camera.width = (uint32_t)i->width;
     camera.height = (uint32_t)i->height;
     camera.fx = i->focal_length / i->pixel_width;
@@ -150,7 +129,13 @@ static int add_pinhole(const struct reading *r, struct spl_error *err)
     camera.cy = i->principal[1];
     if ((rc = spl_camera_set_matrix(&camera, m, SPL_AXES_OPENGL, &why)) || (rc = spl_camera_check(&camera, &why)))
         return spl_fail_field(err, rc, why.field, "%s: image %zu ('%s'): %s", r->path, r->number, i->name, why.message);
-    return add(r, &camera, "", NULL, err);
+    char *name = make_name(r, err), *shown = describe(r, err);
+    rc = name && shown ? spl_view_list_add_inner(r->list, r->path, name, &camera, r->photographs ? shown : NULL,
+                                                 r->photographs ? &inner : NULL, err)
+                       : SPL_E_NOMEM;
+    free(name);
+    free(shown);
+    return rc;
 }
 
 /* The pose of a panorama: its own, else that of the scan that it belongs to; NULL: neither. */
@@ -161,18 +146,6 @@ static const struct spl_e57_pose *find_pose(const struct reading *r)
         if (!strcmp(d->scans[i].guid, r->image->scan_guid))
             return &d->scans[i].pose;
     return r->image->pose.given ? &r->image->pose : NULL;
-}
-
-static bool shows_something(const struct spl_panorama *panorama, const struct spl_camera *face)
-{
-    double place[2];
-    for (int y = 0; y <= probes; y++)
-        for (int x = 0; x <= probes; x++)
-            if (spl_panorama_place(panorama, face,
-                                   (double[2]){(double)face->width * x / probes, (double)face->height * y / probes},
-                                   place))
-                return true;
-    return false;
 }
 
 static int add_faces(const struct reading *r, struct spl_error *err)
@@ -197,29 +170,29 @@ static int add_faces(const struct reading *r, struct spl_error *err)
     }
     if (i->width > 2 * M_PI * panorama.across + 1)
         return fail(r, "pixelWidth", err, "times its width is more than once around", i->pixel_width);
-    double side = fmin(fmax(round(2 * panorama.across), face_side_min), face_side_max);
-    for (unsigned face = 0; face < SPL_PANORAMA_FACES; face++) {
-        struct spl_camera camera = {.fx = side / 2,
-                                    .fy = side / 2,
-                                    .cx = side / 2,
-                                    .cy = side / 2,
-                                    .width = (uint32_t)side,
-                                    .height = (uint32_t)side,
-                                    .near = SPL_CAMERA_NEAR_DEFAULT,
-                                    .far = INFINITY};
-        struct spl_error why = {0};
-        double m[16];
-        const char *name = spl_panorama_face(face, panorama.rotation);
-        int rc = make_matrix(r, pose, panorama.rotation, m, err);
-        if (rc)
-            return rc;
-        if ((rc = spl_camera_set_matrix(&camera, m, SPL_AXES_OPENCV, &why)))
-            return spl_fail_field(err, rc, why.field, "%s: image %zu ('%s'): %s", r->path, r->number, i->name,
-                                  why.message);
-        if (shows_something(&panorama, &camera) && (rc = add(r, &camera, name, &panorama, err)))
-            return rc;
-    }
-    return SPL_OK;
+    double turn[9];
+    struct spl_inner_photograph inner = make_inner(r);
+    struct spl_error why = {0};
+    int rc = find_turn(r, pose, turn, err);
+    if (rc)
+        return rc;
+    inner.is_panorama = true;
+    inner.panorama = panorama;
+    char *name = make_name(r, err), *shown = describe(r, err);
+    const struct spl_face_options faces = {.path = r->path,
+                                           .name = name,
+                                           .photograph = shown,
+                                           .rotation = turn,
+                                           .position = pose->translation,
+                                           .inner = &inner,
+                                           .panorama = (uint32_t)r->number,
+                                           .photographs = r->photographs};
+    rc = name && shown ? spl_view_list_add_faces(r->list, &faces, &why) : SPL_E_NOMEM;
+    if (why.code)
+        spl_fail_field(err, rc, why.field, "%s", why.message);
+    free(name);
+    free(shown);
+    return rc;
 }
 
 int spl_view_list_load_e57(struct spl_view_list *list, const char *path,
@@ -248,6 +221,20 @@ int spl_view_list_load_e57(struct spl_view_list *list, const char *path,
     spl_e57_pages_finish(&pages);
     spl_source_close(&source);
     return rc;
+}
+
+static void pass_over(void *context, const struct spl_error *why)
+{
+    (void)context, (void)why;
+}
+
+bool spl_panoramas_are_inside(const char *path)
+{
+    struct spl_view_list list = {0};
+    const struct spl_photograph_options all = {.refuse = pass_over};
+    bool are = spl_view_list_is_e57(path) && !spl_view_list_load_e57(&list, path, &all, NULL) && list.count;
+    spl_view_list_finish(&list);
+    return are;
 }
 
 /* Copies a blob's bytes to a file in memory. */
@@ -283,6 +270,10 @@ int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct s
     const struct spl_inner_photograph *inner = view->inner;
     struct spl_source source;
     struct spl_e57_pages pages = {0};
+    if (!inner->at)
+        return (*file = fopen(inner->path, "rbe")) ? SPL_OK
+               : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", inner->path)
+                                 : spl_fail_errno(err, errno, "%s: cannot be opened", inner->path);
     int rc = spl_source_open(&source, inner->path, err);
     if (rc)
         return rc;

@@ -19,6 +19,14 @@ static int folder_length(const char *path)
     return slash ? (int)(slash + 1 - path) : 0;
 }
 
+char *spl_view_list_find_beside(const char *path, const char *name, const struct spl_photograph_options *photographs,
+                                struct spl_error *err)
+{
+    if (photographs && photographs->images)
+        return spl_view_list_find("", name, photographs, err);
+    return spl_view_list_print(err, "%.*s%s", *name == '/' ? 0 : folder_length(path), path, name);
+}
+
 static int add_own(struct spl_view_list *list, const char *path, json_t *view,
                    const struct spl_photograph_options *photographs, struct spl_error *err)
 {
@@ -41,14 +49,9 @@ static int add_own(struct spl_view_list *list, const char *path, json_t *view,
     if (photographs && !text)
         return spl_fail_field(err, SPL_E_INPUT, "photograph", "%s: view %zu ('%.100s') has no photograph", path,
                               list->count + 1, json_string_value(name));
-    if (text && (text[0] != '/' || (photographs && photographs->images))) {
-        full = photographs && photographs->images ? spl_view_list_find("", text, photographs, err)
-                                                  : spl_view_list_print(err, "%.*s%s", folder_length(path), path, text);
-        if (!full)
-            return SPL_E_NOMEM;
-        text = full;
-    }
-    rc = spl_view_list_add(list, path, json_string_value(name), &camera, text, err);
+    if (text && !(full = spl_view_list_find_beside(path, text, photographs, err)))
+        return SPL_E_NOMEM;
+    rc = spl_view_list_add(list, path, json_string_value(name), &camera, full, err);
     free(full);
     return rc;
 }
@@ -104,6 +107,11 @@ static int read_own(struct spl_view_list *list, const char *path, const json_t *
     return rc;
 }
 
+static bool is_image(const char *text, size_t length)
+{
+    return length > 8 && (!memcmp(text, "\xff\xd8\xff", 3) || !memcmp(text, "\x89PNG\r\n\x1a\n", 8));
+}
+
 int spl_view_list_load_json(struct spl_view_list *list, const char *path,
                             const struct spl_photograph_options *photographs, struct spl_error *err)
 {
@@ -112,6 +120,10 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
     json_t *document = NULL;
     json_error_t where;
     int rc = read_all(path, &text, &length, err);
+    if (!rc && is_image(text, length))
+        rc = spl_fail(err, SPL_E_INPUT,
+                      "%s: is an image, which says no pose: name a list of images with their poses (api/photographs.md)",
+                      path);
     if (rc)
         goto done;
     document = json_loadb(text, length, JSON_REJECT_DUPLICATES, &where);
@@ -120,6 +132,8 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
                       where.text);
     else if (json_object_get(document, "frames"))
         rc = spl_view_list_read_transforms(list, path, document, photographs, err);
+    else if (json_object_get(document, "panoramas"))
+        rc = spl_view_list_read_panoramas(list, path, document, photographs, err);
     else if (json_object_get(document, "parameters"))
         rc = spl_view_list_read_open3d(list, path, document, photographs, err);
     else

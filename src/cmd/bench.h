@@ -27,7 +27,9 @@ struct spl_cmd_bench_sweep {
     const double *lods, *supersamples;
     const uint32_t *atoms; /* only for datasets with textures and methods that draw them */
     size_t method_count, lod_count, supersample_count, atom_count;
-    bool atoms_listed; /* asked for, not the default */
+    bool atoms_listed;          /* asked for, not the default */
+    enum spl_setting_maps maps; /* only for datasets with maps and methods that take them; NO_MAPS = on and off */
+    bool maps_asked;
 };
 
 struct spl_cmd_bench_arguments {

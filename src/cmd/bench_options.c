@@ -69,6 +69,18 @@ static int take_atoms(struct spl_cmd_bench_arguments *a, const char *text, struc
     return status;
 }
 
+static int take_maps(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_sweep *sweep = &((struct spl_cmd_bench_arguments *)arguments)->sweep;
+    sweep->maps_asked = true;
+    for (int maps = SPL_SETTING_NO_MAPS; maps < SPL_SETTING_MAPS_COUNT; maps++)
+        if (!strcmp(text, maps ? spl_setting_maps_name((enum spl_setting_maps)maps) : "both")) {
+            sweep->maps = (enum spl_setting_maps)maps;
+            return SPL_OK;
+        }
+    return spl_fail(err, SPL_E_USAGE, "%s takes on, off or both, not '%s'", option, text);
+}
+
 /* What a list is given anew replaces what stood there before. */
 static int take_devices(void *arguments, const char *option, char *text, struct spl_error *err)
 {
@@ -147,6 +159,8 @@ static const struct spl_cmd_option options[] = {
     {"method", "LIST", "of" SPL_METHODS(METHOD_NAME) ", joined by commas", .otherwise = "the first; all with -o",
      .take = take_methods},
     {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
+    {"maps", "on|off|both", "colours from stations' maps, where the dataset has them", .otherwise = "on; both with -o",
+     .take = take_maps},
     {"memory-limit", "MIB", "device memory, or 2G and such; less than the dataset needs measures paging",
      SPL_CMD_MIB(struct spl_cmd_bench_arguments, bench.memory_limit, 1, 1u << 24)},
     {"json", NULL, "everything, quartiles too, as one JSON object", SPL_CMD_FLAG(struct spl_cmd_bench_arguments, json)},
@@ -281,11 +295,18 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
          a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
         status = spl_fail(err, SPL_E_USAGE,
                           "--supersample, --atoms, --reference, --photographs, --peers and --profile go with -o OUT");
+    if (!status && !a->sweep.output && a->sweep.maps_asked && !a->sweep.maps)
+        status = spl_fail(err, SPL_E_USAGE, "--maps both is for the comparison with -o OUT; here it is on or off");
+    a->bench.maps = a->sweep.maps;
     a->sweep.dataset_path = argv[optind];
     a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {
-        status = spl_dataset_open_whole(argv[i], false, &a->datasets[a->bench.dataset_count], err);
+        struct spl_dataset **dataset = &a->datasets[a->bench.dataset_count];
+        status = spl_dataset_open_whole(argv[i], false, dataset, err);
         a->bench.dataset_count += !status;
+        if (!status && a->sweep.maps_asked && !spl_dataset_get_info(*dataset)->maps)
+            status = spl_fail(err, SPL_E_USAGE, "--maps is about stations' maps, and dataset '%s' has none",
+                              spl_dataset_get_info(*dataset)->id);
     }
     return status;
 }

@@ -106,15 +106,35 @@ static int add_setting(struct spl_setting *settings, size_t *count, const struct
     return SPL_OK;
 }
 
-/* Every combination; where textures make no difference there is one without a cap of atoms. */
+/* The settings that are `s` but for maps and atoms: with maps, which textures give way to, then without. */
+static int add_colors(const struct spl_cmd_bench_sweep *o, const struct spl_dataset_info *info, struct spl_setting s,
+                      struct spl_setting *settings, size_t *count, struct spl_error *err)
+{
+    bool mapped = info->maps && spl_setting_has_maps(s.method);
+    bool textured = info->atoms && spl_method_has_textures(s.method);
+    int rc = SPL_OK;
+    s.atoms = SPL_TEXTURE_ATOMS;
+    s.maps = SPL_SETTING_MAPS_ON;
+    if (mapped && o->maps != SPL_SETTING_MAPS_OFF)
+        rc = add_setting(settings, count, &s, err);
+    if (mapped && o->maps == SPL_SETTING_MAPS_ON)
+        return rc;
+    s.maps = mapped ? SPL_SETTING_MAPS_OFF : SPL_SETTING_NO_MAPS;
+    for (size_t i = 0; !rc && i < (textured ? o->atom_count : 1); i++) {
+        s.atoms = textured ? o->atoms[i] : SPL_TEXTURE_ATOMS;
+        rc = add_setting(settings, count, &s, err);
+    }
+    return rc;
+}
+
+/* Every combination; where maps or textures make no difference there is one. */
 static int make_settings(const struct spl_cmd_bench_sweep *o, const struct spl_dataset_info *info,
                          struct spl_setting **out, size_t *count, struct spl_error *err)
 {
-    static const uint32_t all = SPL_TEXTURE_ATOMS;
     *count = 0;
     if (o->atoms_listed && !info->atoms)
         return spl_fail(err, SPL_E_USAGE, "--atoms is about textures, and dataset '%s' has none", info->id);
-    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count * o->atom_count, sizeof **out, err);
+    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count * (o->atom_count + 1), sizeof **out, err);
     if (!*out)
         return SPL_E_NOMEM;
     int rc = SPL_OK;
@@ -122,11 +142,7 @@ static int make_settings(const struct spl_cmd_bench_sweep *o, const struct spl_d
         struct spl_setting s = {.method = o->methods[i / o->supersample_count / o->lod_count],
                                 .lod = o->lods[i / o->supersample_count % o->lod_count],
                                 .supersample = o->supersamples[i % o->supersample_count]};
-        bool textured = info->atoms && spl_method_has_textures(s.method);
-        for (size_t j = 0; !rc && j < (textured ? o->atom_count : 1); j++) {
-            s.atoms = textured ? o->atoms[j] : all;
-            rc = add_setting(*out, count, &s, err);
-        }
+        rc = add_colors(o, info, s, *out, count, err);
     }
     return rc;
 }

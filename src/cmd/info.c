@@ -86,6 +86,24 @@ static void print_atoms(const struct spl_info_report *report)
     }
 }
 
+/* "4 stations of 1024 texels a side, …" */
+static void print_maps(const struct spl_info_report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    uint32_t count, least = UINT32_MAX, most = 0;
+    const struct spl_map_row *row = spl_dataset_get_maps(report->dataset, &count);
+    char a[32], b[32], c[32];
+    for (uint32_t i = 0; i < count; i++) {
+        least = row[i].side < least ? row[i].side : least;
+        most = row[i].side > most ? row[i].side : most;
+    }
+    printf("  maps          %s station%s of side %u", spl_cmd_group(count, a), count == 1 ? "" : "s", least);
+    if (most > least)
+        printf(" to %u", most);
+    printf(", %s texels, %s bytes (%.3f a texel)\n", spl_cmd_group(info->map_texels, b),
+           spl_cmd_group(info->map_bytes, c), (double)info->map_bytes / (double)info->map_texels);
+}
+
 /* Photographs first: they have taken the place of the others, of which only the sum that is left is known. */
 static void print_colors(const json_t *colors, uint64_t kept)
 {
@@ -160,7 +178,10 @@ static void print_table(const struct spl_info_report *report)
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
+    const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");
     printf("  points        %s read, %s kept\n", spl_cmd_group(info->points, a), spl_cmd_group(info->leaf_splats, b));
+    if (pruned)
+        printf("  pruned        of %s points\n", spl_cmd_group((uint64_t)json_integer_value(pruned), a));
     if (whole)
         printf("  a part of     %s points of the sources\n", spl_cmd_group((uint64_t)json_integer_value(whole), a));
     printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", spl_cmd_group(info->splats, a),
@@ -173,6 +194,8 @@ static void print_table(const struct spl_info_report *report)
         print_stream(&stream[s]);
     printf("\n");
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
+    if (info->maps)
+        print_maps(report);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
     printf("  linear        %s points on wires, poles and cables (%.2f %%)\n", spl_cmd_group(report->linear, a),
            100.0 * (double)report->linear / (double)info->leaf_splats);

@@ -132,6 +132,25 @@ static json_t *textures_to_json(const struct spl_info_report *report)
                      "dictionary_bytes", (json_int_t)info->dictionary_bytes, "splats_by_atoms", counts);
 }
 
+/* The same of maps. */
+static json_t *maps_to_json(const struct spl_info_report *report)
+{
+    const struct spl_dataset_info *info = report->info;
+    const struct spl_map_row *rows = spl_dataset_get_maps(report->dataset, &(uint32_t){0});
+    json_t *list = info->maps ? json_array() : json_null();
+    if (!info->maps)
+        return list;
+    for (uint32_t i = 0; i < info->maps; i++)
+        json_array_append_new(list, json_pack("{s:o, s:i, s:i, s:i, s:I}", "position", vector(rows[i].position), "side",
+                                              (int)rows[i].side, "levels", (int)rows[i].levels, "range_side",
+                                              (int)rows[i].range_side, "bytes",
+                                              (json_int_t)spl_dataset_get_map_bytes(report->dataset, i)));
+    return json_pack("{s:i, s:I, s:I, s:f, s:o, s:O?}", "stations", (int)info->maps, "texels",
+                     (json_int_t)info->map_texels, "bytes", (json_int_t)info->map_bytes, "bytes_per_texel",
+                     (double)info->map_bytes / (double)info->map_texels, "by_station", list, "made",
+                     json_object_get(spl_dataset_get_meta(report->dataset), "maps"));
+}
+
 /* Bytes with the chunks' headers. */
 static json_t *kinds_to_json(const struct spl_info_report *report)
 {
@@ -172,7 +191,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -183,10 +202,11 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
         "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
         kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
-        textures_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
+        textures_to_json(report), "maps", maps_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
         json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
-        json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "up",
+        json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "pruned",
+        json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
         json_object_get(spl_dataset_get_meta(report->dataset), "up"));
 }

@@ -19,6 +19,7 @@
 #include "cloud/crs.h"
 #include "cloud/rows.h"
 #include "cmd/cmd.h"
+#include "cmd/info_panoramas.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "geom/unit.h"
@@ -70,8 +71,7 @@ static void say_progress(void *context, const struct spl_progress *progress)
     spl_cmd_progress(&((struct session *)context)->progress, progress);
 }
 
-/* Text of a file's: what is no UTF-8 is shown. */
-static json_t *text_json(const char *text)
+json_t *spl_info_text(const char *text)
 {
     char shown[4096];
     json_t *json = json_string(text);
@@ -113,7 +113,7 @@ static json_t *list_attributes(const struct spl_cloud_info *info, const struct s
 
 static void collect(void *context, const char *text)
 {
-    json_array_append_new(context, text_json(text));
+    json_array_append_new(context, spl_info_text(text));
 }
 
 static uint64_t count_points(const struct spl_scan *scan)
@@ -138,12 +138,14 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     spl_system_find(&system, &some, &said, &refused);
     spl_system_finish(&system);
     spl_scans_compare(&some, collect, warnings);
+    /* of thousands of tiles beside one folder of panoramas it is read once */
+    json_t *panoramas = count == scans->count ? spl_info_list_panoramas(list, count, warnings) : json_array();
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));
-    return json_pack("{s:o, s:I, s:I, s:o}", "refused", refused.code ? text_json(refused.message) : json_null(),
+    return json_pack("{s:o, s:I, s:I, s:o, s:o}", "refused", refused.code ? spl_info_text(refused.message) : json_null(),
                      "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
-                     (json_int_t)estimate.dataset_bytes, "warnings", warnings);
+                     (json_int_t)estimate.dataset_bytes, "panoramas", panoramas, "warnings", warnings);
 }
 
 static json_t *list_images(const struct spl_cloud_info *info)
@@ -152,7 +154,7 @@ static json_t *list_images(const struct spl_cloud_info *info)
     for (uint32_t i = 0; i < info->image_count; i++) {
         const struct spl_cloud_image *image = &info->images[i];
         json_array_append_new(all,
-                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", text_json(image->name), "kind",
+                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", spl_info_text(image->name), "kind",
                                         image->kind, "coding", image->coding, "width", image->width, "height",
                                         image->height, "bytes", (json_int_t)image->bytes, "posed", (int)image->posed));
     }
@@ -170,9 +172,9 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
     for (int k = 0; k < 3; k++)
         if (options->read && scan->points_from[k])
             json_object_set_new(colors, from[k], json_integer((json_int_t)scan->points_from[k]));
-    json_object_set_new(json, "scan", text_json(scan->path));
+    json_object_set_new(json, "scan", spl_info_text(scan->path));
     json_object_set_new(json, "format", json_string(info->format));
-    json_object_set_new(json, "version", info->version[0] ? text_json(info->version) : json_null());
+    json_object_set_new(json, "version", info->version[0] ? spl_info_text(info->version) : json_null());
     json_object_set_new(json, "ending_of", info->named ? json_string(info->named) : json_null());
     json_object_set_new(json, "file_bytes", json_integer((json_int_t)info->file_bytes));
     json_object_set_new(json, "read", json_boolean(options->read));
@@ -180,14 +182,14 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
     json_object_set_new(json, "points_skipped",
                         options->read ? json_integer((json_int_t)info->points_skipped) : json_null());
     json_object_set_new(json, "attributes", list_attributes(info, scan));
-    json_object_set_new(json, "fields", info->fields[0] ? text_json(info->fields) : json_null());
+    json_object_set_new(json, "fields", info->fields[0] ? spl_info_text(info->fields) : json_null());
     json_object_set_new(json, "color_from", options->read ? colors : json_pack("[s]", from[scan->colors.from]));
     json_object_set_new(json, "stations",
                         options->read || info->station_count ? json_integer((json_int_t)info->station_count)
                                                              : json_null());
     json_object_set_new(json, "images", list_images(info));
-    json_object_set_new(json, "crs", crs ? text_json(crs) : json_null());
-    json_object_set_new(json, "crs_name", info->coordinates.name[0] ? text_json(info->coordinates.name) : json_null());
+    json_object_set_new(json, "crs", crs ? spl_info_text(crs) : json_null());
+    json_object_set_new(json, "crs_name", info->coordinates.name[0] ? spl_info_text(info->coordinates.name) : json_null());
     json_object_set_new(
         json, "unit",
         json_string(info->coordinates.angles ? "degree" : spl_unit_print(info->coordinates.unit_m, unit)));
@@ -242,6 +244,7 @@ static void print_pack(const json_t *pack)
     printf("  as a dataset  about %.1f MB; packing takes about %.0f MB of memory\n",
            json_number_value(json_object_get(pack, "dataset_bytes")) / 1e6,
            json_number_value(json_object_get(pack, "memory_bytes")) / 1e6);
+    spl_info_print_panoramas(json_object_get(pack, "panoramas"));
     json_array_foreach(warnings, i, warning) print_text(i ? "" : "warnings", json_string_value(warning));
 }
 

@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include <jansson.h>
+
 struct spl_info_scan_options {
     bool json;
     bool read;           /* all points, not the header alone */
@@ -14,6 +16,9 @@ struct spl_info_scan_options {
 /* Whether `path` is an argument of this kind: a folder, a list, a file that neither begins nor is called as a dataset.
  */
 bool spl_info_is_scan(const char *path);
+
+/* Text of a file's; what is no UTF-8 is shown. */
+json_t *spl_info_text(const char *text);
 
 /* Each scan, and, where there are several, all together. What cannot be read is said, and the others are still told of.
  * Returns the exit code. */

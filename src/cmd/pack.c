@@ -96,6 +96,12 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
                 r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);
     if (r->photos.texture_size)
         print_textures(&r->photos, r->attribute_bits, splats);
+    if (r->maps.stations)
+        fprintf(stderr,
+                "maps of %u stations from %u pictures (%u could not be used), up to %u texels a quarter turn: %.1f MB, "
+                "%.2f bytes a texel, blocks at %.1f dB\n",
+                r->maps.stations, r->maps.pictures, r->maps.refused, r->maps.side, (double)r->maps.bytes / 1e6,
+                (double)r->maps.bytes / (double)r->maps.texels, r->maps.block_psnr);
     fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
 }
 
@@ -166,6 +172,8 @@ static void finish_left_out(struct left_out *left_out, bool say)
 struct arguments {
     struct spl_pack_options pack;
     struct spl_photo_options photos;
+    struct spl_map_options maps;
+    bool wants_maps;
     int textures;        /* enum spl_texture_coding; -1 = not given */
     const char *quality; // may be NULL
     bool keep_going, skip_broken;
@@ -188,6 +196,16 @@ static int take_quality(void *arguments, const char *option, char *text, struct 
         return spl_fail_field(err, SPL_E_USAGE, "texture-quality",
                               "%s takes draft, normal, best or decibels from 20 to 60, not '%.32s'", option, text);
     return spl_cmd_parse_real(option, text, 20, 60, &a->photos.texture_quality, err);
+}
+
+static int take_panoramas(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    (void)option;
+    (void)err;
+    a->wants_maps = true;
+    a->maps.panoramas = strcmp(text, "scan") ? text : NULL;
+    return SPL_OK;
 }
 
 static int take_up(void *arguments, const char *option, char *text, struct spl_error *err)
@@ -257,6 +275,9 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_FLAG(struct arguments, keep_going)},
     {"keep-textures", "FILE", "as they are before coding too, for 'splatd bench --textures FILE'",
      SPL_CMD_TEXT(struct arguments, photos.keep_textures)},
+    {"panoramas", "PATH",
+     "maps of stations, whose colours come from panoramas: a panorama's JSON or its folder, an E57 file, photographs on "
+     "tripods with poses as of --cameras; 'scan': from the scan's own colours", .take = take_panoramas},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
@@ -349,6 +370,7 @@ int spl_cmd_pack(int argc, char **argv)
                  .warn = say_warning,
                  .progress_context = &listener},
         .photos = {.size = sizeof a.photos, .trained = say_trained, .context = &listener},
+        .maps = {.size = sizeof a.maps},
         .textures = -1,
     };
     struct spl_pack_report report = {0};
@@ -364,6 +386,9 @@ int spl_cmd_pack(int argc, char **argv)
     a.photos.refused = a.keep_going ? name_refused : NULL;
     a.photos.textures = a.textures < 0 ? SPL_TEXTURES_ADAPTIVE : (enum spl_texture_coding)a.textures;
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
+    a.maps.refused = a.keep_going ? name_refused : NULL;
+    a.maps.context = &listener;
+    a.pack.maps = a.wants_maps ? &a.maps : NULL;
     catch_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);

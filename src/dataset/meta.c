@@ -157,6 +157,17 @@ static int check_sources(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Optional: how many leaf splats there were before nodes were dropped. */
+static int check_pruned(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const json_t *pruned = json_object_get(dataset->meta, "pruned"), *of = json_object_get(pruned, "of");
+    const struct spl_dataset_info *info = &dataset->info;
+    if (pruned && (!json_is_integer(of) || json_integer_value(of) < (json_int_t)info->leaf_splats ||
+                   json_integer_value(of) > (json_int_t)info->points))
+        return wrong(dataset, err, "pruned.of", of, "a whole number from \"leaf_splats\" to \"points\"");
+    return SPL_OK;
+}
+
 enum { crs_bytes_max = 64 << 10 };
 
 /* Optional: what coordinates are in, and where on earth. */
@@ -245,6 +256,8 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = wrong(dataset, err, "leaf_splats", json_object_get(dataset->meta, "leaf_splats"), "at most \"points\"");
     if (!rc)
         rc = get_count(dataset, "levels", UINT8_MAX + 1, "a whole number from 1 to 256", &levels, err);
+    if (!rc)
+        rc = check_pruned(dataset, err);
     if (!rc)
         rc = get_bounds(dataset, err);
     if (!rc)

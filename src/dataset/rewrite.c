@@ -11,6 +11,9 @@
 #include "dataset/texture.h"
 #include "dataset/writer.h"
 
+/* Radii of the new leaves are counted by the first 15 bits of their floats, which rise with them. */
+enum { radius_shift = 16, radius_bins = 1 << (31 - radius_shift) };
+
 struct pass {
     const struct spl_rewrite *what;
     struct spl_dataset_writer *writer;
@@ -26,6 +29,8 @@ struct pass {
     uint32_t page_index;            /* UINT32_MAX = none yet */
     uint32_t *words, *texture_words, *chunk_texture; /* of the node's chunks */
     uint32_t *map;
+    uint64_t *radii, leaf_splats; /* of the new leaves: radius_bins, and their sum; where nodes may be dropped */
+    uint32_t levels;
 };
 
 static int grow(uint32_t **block, size_t bytes, struct spl_error *err)
@@ -94,6 +99,20 @@ static int get_code(struct pass *p, uint64_t index, uint32_t splats, struct spl_
     return SPL_OK;
 }
 
+/* A leaf's splats, whose words are still the node's. */
+static void count_leaf(struct pass *p, const struct spl_chunk *chunks, uint32_t chunk_count)
+{
+    for (uint32_t c = 0; c < chunk_count; c++)
+        for (uint32_t i = 0; i < chunks[c].count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS; i++) {
+            struct spl_splat splat;
+            uint32_t bits;
+            spl_chunk_decode(&chunks[c], p->words, i, &splat);
+            memcpy(&bits, &splat.radius, sizeof bits); // > 0
+            p->radii[bits >> radius_shift]++;
+            p->leaf_splats++;
+        }
+}
+
 static int write_node(struct pass *p, const struct spl_node *old, bool leaf, struct spl_error *err)
 {
     struct spl_node *node = &p->nodes[p->node_count];
@@ -120,6 +139,9 @@ static int write_node(struct pass *p, const struct spl_node *old, bool leaf, str
         p->chunk_texture[i] = count ? (uint32_t)textures.word_count | code.planes << SPL_CHUNK_TEXTURE_PLANES : 0;
         textures.word_count += count;
     }
+    if (!rc && p->what->leaf && !node->child_count)
+        count_leaf(p, chunks, node->chunk_count);
+    p->levels = node->depth + 1u > p->levels ? node->depth + 1u : p->levels;
     if (!rc)
         rc = spl_dataset_writer_add_textured_node(p->writer, p->words, used, chunks, node->chunk_count, &textures,
                                                   &node->page, err);
@@ -162,63 +184,30 @@ static int write_maps(struct pass *p, struct spl_error *err)
     return rc;
 }
 
-struct leaf_radius {
-    float mean;
-    uint32_t splats;
-};
-
-static int compare_radii(const void *a, const void *b)
+/* The median of what was counted, to half a bin: 0.4 %. */
+static double median_radius(const struct pass *p)
 {
-    float x = ((const struct leaf_radius *)a)->mean, y = ((const struct leaf_radius *)b)->mean;
-    return (x > y) - (x < y);
-}
-
-/* How many splats the new leaves have, and the median of their radii, a chunk's taken as its mean; levels. */
-static int describe_leaves(const struct pass *p, uint64_t *splats, double *radius, uint32_t *levels,
-                           struct spl_error *err)
-{
-    struct leaf_radius *radii = spl_alloc_raw(p->chunk_count, sizeof *radii, err);
-    size_t count = 0;
-    *splats = *levels = 0;
-    for (uint64_t n = 0; n < p->node_count && radii; n++) {
-        const struct spl_node *node = &p->nodes[n];
-        *levels = node->depth + 1u > *levels ? node->depth + 1u : *levels;
-        for (uint32_t c = 0; c < node->chunk_count && !node->child_count; c++) {
-            const struct spl_chunk *chunk = &p->chunks[node->first_chunk + c];
-            if (spl_chunk_kind(chunk) != SPL_CHUNK_DISCS)
-                continue;
-            radii[count++] = (struct leaf_radius){chunk->radius_mean, chunk->count};
-            *splats += chunk->count;
-        }
-    }
-    if (!radii)
-        return SPL_E_NOMEM;
-    qsort(radii, count, sizeof *radii, compare_radii);
     uint64_t before = 0;
-    for (size_t i = 0; i < count && 2 * before < *splats; before += radii[i++].splats)
-        *radius = radii[i].mean;
-    free(radii);
-    return *splats ? SPL_OK
-                   : spl_fail(err, SPL_E_INPUT, "%s: no splat would be left of it: what stays has lines alone",
-                              spl_dataset_get_info(p->what->from)->id);
+    uint32_t bin = 0;
+    while (2 * (before += p->radii[bin]) < p->leaf_splats)
+        bin++;
+    uint32_t bits = bin << radius_shift | 1u << radius_shift >> 1;
+    float radius;
+    memcpy(&radius, &bits, sizeof radius);
+    return (double)radius;
 }
 
 /* META of a file that has lost nodes. */
 static int describe_pruned(const struct pass *p, json_t *meta, struct spl_error *err)
 {
-    uint64_t splats;
-    uint32_t levels;
-    double radius = 0;
-    int rc = describe_leaves(p, &splats, &radius, &levels, err);
-    if (rc)
-        return rc;
-    bool failed = json_object_set_new(meta, "leaf_splats", json_integer((json_int_t)splats)) ||
-                  json_object_set_new(meta, "levels", json_integer(levels)) ||
-                  json_object_set_new(meta, "splat_radius", json_real(radius));
-    if (!json_object_get(meta, "pruned")) // of a dataset that was pruned before, it says more
-        failed |= json_object_set_new(meta, "pruned",
-                                      json_pack("{s:I}", "of",
-                                                (json_int_t)spl_dataset_get_info(p->what->from)->leaf_splats)) != 0;
+    const struct spl_dataset_info *old = spl_dataset_get_info(p->what->from);
+    if (!p->leaf_splats)
+        return spl_fail(err, SPL_E_INPUT, "%s: no splat would be left of it, but lines alone", old->id);
+    bool failed = json_object_set_new(meta, "leaf_splats", json_integer((json_int_t)p->leaf_splats)) ||
+                  json_object_set_new(meta, "levels", json_integer(p->levels)) ||
+                  json_object_set_new(meta, "splat_radius", json_real(median_radius(p)));
+    if (!json_object_get(meta, "pruned")) // of a dataset that was pruned before, it says of how many in all
+        failed |= json_object_set_new(meta, "pruned", json_pack("{s:I}", "of", (json_int_t)old->leaf_splats)) != 0;
     json_object_del(meta, "bits");
     return failed ? spl_fail(err, SPL_E_NOMEM, "out of memory for the description of the dataset") : SPL_OK;
 }
@@ -267,7 +256,8 @@ static int allocate(struct pass *p, struct spl_error *err)
                   !(p->stations = spl_alloc_raw(p->what->maps ? chunk_count : 1, sizeof *p->stations, err)) ||
                   !(p->words = spl_alloc_raw(node_words, sizeof *p->words, err)) ||
                   !(p->texture_words = spl_alloc_raw(texture_words, sizeof *p->texture_words, err)) ||
-                  !(p->chunk_texture = spl_alloc_raw(most, sizeof *p->chunk_texture, err));
+                  !(p->chunk_texture = spl_alloc_raw(most, sizeof *p->chunk_texture, err)) ||
+                  !(p->radii = spl_alloc(radius_bins, sizeof *p->radii, err));
     for (uint32_t s = 0; s < p->stream_count && !failed; s++) {
         failed = !(p->base[s] = spl_alloc_raw(chunk_count, sizeof *p->base[s], err)) ||
                  !(p->width[s] = spl_alloc_raw(chunk_count, 1, err));
@@ -343,5 +333,6 @@ int spl_dataset_rewrite(const struct spl_rewrite *rewrite, const char *path, str
     free(p.texture_words);
     free(p.chunk_texture);
     free(p.map);
+    free(p.radii);
     return rc;
 }

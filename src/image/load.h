@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 
-enum { SPL_IMAGE_PIXELS_MAX = 64 << 20 };
+enum { SPL_IMAGE_PIXELS_MAX = 128 << 20 }; /* a panorama of 16384 x 8192 */
 
 /* Reads `path` as `layer`; what the file is, its first bytes say, not its name.
  *   PNG   color, any PNG, as RGBA8 (16 bit channels lose their lower byte); depth and range, 16 bit grey, 0 = nothing,

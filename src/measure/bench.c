@@ -10,6 +10,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "measure/calibrator.h"
+#include "shared.h"
 
 struct sample {
     double frame, calibrator;
@@ -81,8 +82,9 @@ static int render(struct bench *b, size_t row, uint32_t frame, struct sample *sa
     const struct spl_bench_options *o = b->options;
     struct spl_view view;
     spl_view_init(&view);
-    view.method = b->report->rows[row].method;
-    view.lod = b->report->rows[row].lod;
+    spl_setting_apply(&(struct spl_setting){b->report->rows[row].method, b->report->rows[row].lod, 1,
+                                            SPL_TEXTURE_ATOMS, o->maps},
+                      &view);
     double share = (double)frame / (o->frames - 1);
     int status = spl_path_get_camera(&b->paths[row_dataset(o, row)], share, o->width, o->height, &view.camera, err);
     if (status)

@@ -6,6 +6,7 @@
 #include <splatd/render.h>
 
 #include "measure/path.h"
+#include "measure/profile.h"
 #include "measure/summary.h"
 
 struct spl_bench_options {
@@ -17,6 +18,7 @@ struct spl_bench_options {
     size_t method_count;
     const double *lods;
     size_t lod_count;
+    enum spl_setting_maps maps;          /* of datasets with maps; NO_MAPS = as views have it */
     uint32_t width, height;
     uint32_t frames;                     /* places on the path, at least 2 */
     const struct spl_path *path;         /* NULL = each dataset's own orbit */

@@ -30,7 +30,7 @@ static size_t add_guesses(struct spl_candidate *candidates, bool (*usable)(const
         const struct spl_method_guess *guess = spl_method_row((enum spl_method)method)->guesses;
         for (int i = 0; i < SPL_METHOD_GUESSES_MAX && guess[i].lod > 0; i++) {
             struct spl_setting setting = {(enum spl_method)method, guess[i].lod, guess[i].supersample,
-                                          SPL_TEXTURE_ATOMS};
+                                          SPL_TEXTURE_ATOMS, SPL_SETTING_NO_MAPS};
             if (!usable || usable(&setting))
                 candidates[count++] = (struct spl_candidate){.setting = setting,
                                                              .fixed_ms = guess[i].fixed_ms,
@@ -84,8 +84,10 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
     planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
     if (!planner->count)
         planner->count = add_guesses(planner->candidates, usable);
-    for (size_t i = 0; i < planner->count; i++)
+    for (size_t i = 0; i < planner->count; i++) {
         planner->atoms |= planner->candidates[i].setting.atoms != SPL_TEXTURE_ATOMS;
+        planner->maps |= planner->candidates[i].setting.maps != SPL_SETTING_NO_MAPS;
+    }
     return 0;
 }
 
@@ -103,12 +105,15 @@ double spl_planner_estimate(const struct spl_planner *planner, size_t index, uin
     return (c->fixed_ms + c->ms_per_mpx * mpx) * exp(planner->shared + c->learned + planner->layer[layer]);
 }
 
-/* What is compared where candidates do not differ in atoms: any number is drawn in the candidate's time. */
+/* What is compared where candidates do not differ in atoms or maps: whatever is asked for is drawn in the candidate's
+ * time. */
 static struct spl_setting get_setting(const struct spl_planner *planner, const struct spl_setting *setting)
 {
     struct spl_setting out = *setting;
     if (!planner->atoms)
         out.atoms = SPL_TEXTURE_ATOMS;
+    if (!planner->maps)
+        out.maps = SPL_SETTING_NO_MAPS;
     return out;
 }
 
@@ -119,6 +124,7 @@ static bool matches(const struct spl_setting *setting, const struct spl_demand *
     kept.lod = demand->keep_lod ? kept.lod : setting->lod;
     kept.supersample = demand->keep_supersample ? kept.supersample : setting->supersample;
     kept.atoms = demand->keep_atoms ? kept.atoms : setting->atoms;
+    kept.maps = demand->keep_maps ? kept.maps : setting->maps;
     return spl_setting_equal(setting, &kept);
 }
 
@@ -129,16 +135,32 @@ static bool is_affordable(const struct spl_setting *setting, const struct spl_de
     return !demand->samples_max || side * side * demand->width * demand->height <= (double)demand->samples_max;
 }
 
-/* The demand with atoms that were measured: the next more than those kept, else the most; so its time is no promise
- * too much. The same where no method with textures matches. */
+/* Was anything measured with maps, or without, as they are kept? */
+static bool has_measured_maps(const struct spl_planner *planner, const struct spl_demand *demand)
+{
+    struct spl_demand any = *demand;
+    any.keep_atoms = false;
+    for (size_t i = 0; i < planner->count; i++) {
+        const struct spl_setting *s = &planner->candidates[i].setting;
+        if (spl_setting_has_maps(s->method) && matches(s, &any))
+            return true;
+    }
+    return false;
+}
+
+/* The demand with maps and atoms that were measured: with maps or without, if only one of them was; of atoms the next
+ * more than those kept, else the most; so its time is no promise too much. The same where no method with textures
+ * matches. */
 static struct spl_demand get_measured(const struct spl_planner *planner, const struct spl_demand *demand)
 {
-    struct spl_demand out = *demand, any = *demand;
+    struct spl_demand out = *demand, any;
     bool found = false;
+    out.keep_maps = demand->keep_maps && has_measured_maps(planner, demand);
+    any = out;
     any.keep_atoms = false;
     for (size_t i = 0; demand->keep_atoms && i < planner->count; i++) {
         const struct spl_setting *s = &planner->candidates[i].setting;
-        if (!spl_method_has_textures(s->method) || !matches(s, &any))
+        if (!spl_method_has_textures(s->method) || s->maps == SPL_SETTING_MAPS_ON || !matches(s, &any))
             continue;
         bool enough = s->atoms >= demand->kept.atoms, had = found && out.kept.atoms >= demand->kept.atoms;
         if (!found || (enough && (!had || s->atoms < out.kept.atoms)) || (!enough && !had && s->atoms > out.kept.atoms))
@@ -148,10 +170,13 @@ static struct spl_demand get_measured(const struct spl_planner *planner, const s
     return out;
 }
 
-/* Is the accuracy that was measured that of other atoms than are asked for? */
+/* Is the accuracy that was measured that of other atoms or maps than are asked for? */
 static bool is_unmeasured(const struct spl_setting *setting, const struct spl_demand *demand)
 {
-    return demand->keep_atoms && demand->kept.atoms != setting->atoms && spl_method_has_textures(setting->method);
+    struct spl_setting kept = *setting;
+    kept.atoms = demand->keep_atoms ? demand->kept.atoms : setting->atoms;
+    kept.maps = demand->keep_maps ? demand->kept.maps : setting->maps;
+    return !spl_setting_equal(setting, &kept);
 }
 
 static double rank(double psnr)
@@ -238,6 +263,8 @@ int spl_planner_choose(const struct spl_planner *planner, const struct spl_deman
                                   .meets = best.in_time && best.accurate};
     if (demand->keep_atoms)
         choice->setting.atoms = demand->kept.atoms;
+    if (demand->keep_maps)
+        choice->setting.maps = demand->kept.maps;
     return 0;
 }
 

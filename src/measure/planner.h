@@ -21,7 +21,7 @@ struct spl_demand {
     uint32_t width, height;
     uint64_t samples_max; /* that a setting may need for it; 0 = any */
     enum spl_layer layer;
-    bool keep_method, keep_lod, keep_supersample, keep_atoms; /* only settings that equal `kept` in these */
+    bool keep_method, keep_lod, keep_supersample, keep_atoms, keep_maps; /* only settings that equal `kept` in these */
     struct spl_setting kept;
 };
 
@@ -41,7 +41,7 @@ struct spl_planner {
         double learned;     /* ln of this setting's own factor */
     } * candidates;
     size_t count;
-    bool atoms; /* candidates differ in them; else every number of atoms is a candidate's setting */
+    bool atoms, maps; /* candidates name them; else every number of atoms, or maps on and off, is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
     uint64_t frames;                               /* learned from */
 };
@@ -64,7 +64,7 @@ void spl_planner_finish(struct spl_planner *planner);
  * what is learned may bring them to the front; one that needs more samples than samples_max is none. SPL_E_INPUT names
  * the kept parameter that no setting has. Atoms that nobody measured are kept: they are drawn in place of the next
  * more, or the most, that were measured, whose time they are taken to need, and nothing is promised of their accuracy;
- * methods without textures have any number of them. */
+ * methods without textures have any number of them. The same of maps. */
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
                        struct spl_error *err);
 

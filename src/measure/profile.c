@@ -13,10 +13,32 @@
 
 #include "base/memory.h"
 
+const char *spl_setting_maps_name(enum spl_setting_maps maps)
+{
+    return maps == SPL_SETTING_MAPS_ON ? "on" : maps == SPL_SETTING_MAPS_OFF ? "off" : "";
+}
+
+bool spl_setting_has_maps(enum spl_method method)
+{
+    const struct spl_method_info *info = spl_method_get(method);
+    return info && info->params & SPL_PARAM_BIT(maps);
+}
+
+void spl_setting_apply(const struct spl_setting *setting, struct spl_view *view)
+{
+    view->method = setting->method;
+    view->lod = setting->lod;
+    view->supersample = setting->supersample;
+    view->disc.atoms = setting->atoms;
+    if (setting->maps)
+        view->maps = setting->maps == SPL_SETTING_MAPS_ON ? SPL_MAPS_ON : SPL_MAPS_OFF;
+}
+
 bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b)
 {
+    bool textured = spl_method_has_textures(a->method) && a->maps != SPL_SETTING_MAPS_ON;
     return a->method == b->method && a->lod == b->lod && a->supersample == b->supersample &&
-           (a->atoms == b->atoms || !spl_method_has_textures(a->method));
+           (a->maps == b->maps || !spl_setting_has_maps(a->method)) && (a->atoms == b->atoms || !textured);
 }
 
 char *spl_profile_path(const char *dataset_path, struct spl_error *err)

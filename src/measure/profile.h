@@ -16,15 +16,34 @@
 
 enum { SPL_PROFILE_VERSION = 1, SPL_PROFILE_POINTS_MAX = 1024 };
 
+/* Are colours taken from the stations' maps? */
+enum spl_setting_maps {
+    SPL_SETTING_NO_MAPS, /* the dataset has none, the method draws none, or nobody asked */
+    SPL_SETTING_MAPS_ON,
+    SPL_SETTING_MAPS_OFF,
+    SPL_SETTING_MAPS_COUNT
+};
+
 /* What a request can choose. Part of requests, profiles and charts; grows with the methods' options. */
 struct spl_setting {
     enum spl_method method;
     double lod;         /* pixels, as spl_view.lod */
     double supersample; /* samples per pixel side; below 1: rendered at that share of the size and enlarged */
-    uint32_t atoms;     /* as spl_view.atoms; SPL_TEXTURE_ATOMS where the dataset or the method has no textures */
+    uint32_t atoms;     /* as spl_view.atoms; SPL_TEXTURE_ATOMS where the dataset or the method has no textures, or where
+                           maps are drawn in their place */
+    enum spl_setting_maps maps;
 };
 
-/* Do both draw the same? Atoms are not compared where the method draws no textures. */
+/* "on", "off", "" for none; static. */
+const char *spl_setting_maps_name(enum spl_setting_maps maps);
+
+/* Does the method take colours from maps where there are any? */
+bool spl_setting_has_maps(enum spl_method method);
+
+/* The view drawn so; maps stay as they are where the setting does not name them. */
+void spl_setting_apply(const struct spl_setting *setting, struct spl_view *view);
+
+/* Do both draw the same? Atoms and maps are not compared where the method draws none, nor atoms where maps are on. */
 bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b);
 
 /* One measured setting. Times are those of spl_renderer_render on the host's clock, readback included, encoding not;

@@ -145,6 +145,21 @@ static int read_atoms(const json_t *object, const char *name, size_t index, uint
     return 0;
 }
 
+/* Left out of profiles of datasets without maps, and of methods that take none. */
+static int read_maps(const json_t *object, const char *name, size_t index, enum spl_setting_maps *out,
+                     struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, "maps");
+    const char *text = json_string_value(json);
+    *out = SPL_SETTING_NO_MAPS;
+    for (int i = SPL_SETTING_MAPS_ON; text && i < SPL_SETTING_MAPS_COUNT; i++)
+        if (!strcmp(text, spl_setting_maps_name((enum spl_setting_maps)i)))
+            *out = (enum spl_setting_maps)i;
+    if (json && !*out)
+        return spl_fail_field(err, SPL_E_INPUT, "maps", "%s: point %zu: 'maps' must be \"on\" or \"off\"", name, index);
+    return 0;
+}
+
 static int read_point(const json_t *object, const char *name, size_t index, struct spl_profile_point *point,
                       struct spl_error *err)
 {
@@ -155,7 +170,8 @@ static int read_point(const json_t *object, const char *name, size_t index, stru
     if ((rc = read_text(object, "method", method, sizeof method, name, err)) ||
         (rc = read_number(object, "lod", false, name, index, &point->setting.lod, err)) ||
         (rc = read_number(object, "supersample", false, name, index, &point->setting.supersample, err)) ||
-        (rc = read_atoms(object, name, index, &point->setting.atoms, err)))
+        (rc = read_atoms(object, name, index, &point->setting.atoms, err)) ||
+        (rc = read_maps(object, name, index, &point->setting.maps, err)))
         return rc;
     int found = spl_method_from_name(method);
     if (found < 0)
@@ -314,6 +330,8 @@ static json_t *point_to_json(const struct spl_profile_point *point)
     json_t *json = json_pack("{s:s, s:f, s:f, s:i, s:b}", "method", spl_method_name(point->setting.method), "lod",
                              point->setting.lod, "supersample", point->setting.supersample, "atoms",
                              (int)point->setting.atoms, "front", point->front);
+    if (point->setting.maps)
+        json_object_set_new(json, "maps", json_string(spl_setting_maps_name(point->setting.maps)));
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
         double value = *number_of(&copy, n);
         json_object_set_new(json, n->name, isfinite(value) ? json_real(value) : json_null());

@@ -149,6 +149,17 @@ static json_t *plan_view(const struct spl_named_view *view)
                      reals(pinhole, 6));
 }
 
+static json_t *plan_setting(const struct spl_setting *s)
+{
+    json_t *out = json_pack("{s:s, s:f, s:f, s:i}", "method", spl_method_name(s->method), "lod", s->lod, "supersample",
+                            s->supersample, "atoms", (int)s->atoms);
+    if (out && s->maps && json_object_set_new(out, "maps", json_string(spl_setting_maps_name(s->maps)))) {
+        json_decref(out);
+        out = NULL;
+    }
+    return out;
+}
+
 json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, struct spl_error *err)
 {
     const struct spl_sweep_options *o = sweep->options;
@@ -161,10 +172,7 @@ json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, 
     for (size_t i = 0; i < o->views->count; i++)
         failed |= json_array_append_new(views, plan_view(&o->views->views[i])) != 0;
     for (size_t i = 0; i < o->setting_count; i++)
-        failed |= json_array_append_new(
-                      settings, json_pack("{s:s, s:f, s:f, s:i}", "method", spl_method_name(o->settings[i].method),
-                                          "lod", o->settings[i].lod, "supersample", o->settings[i].supersample, "atoms",
-                                          (int)o->settings[i].atoms)) != 0;
+        failed |= json_array_append_new(settings, plan_setting(&o->settings[i])) != 0;
     json_t *plan = json_pack("{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:I}", "splatd-bench",
                              1, "program", SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device",
                              "backend", sweep->device.backend, "name", sweep->device.name, "driver",

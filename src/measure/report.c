@@ -17,7 +17,9 @@ void spl_report_setting_name(const struct spl_setting *s, char name[64])
     if (s->supersample != 1)
         used += snprintf(name + used, 64 - (size_t)used, " %g×%g", s->supersample, s->supersample);
     if (s->atoms < SPL_TEXTURE_ATOMS)
-        snprintf(name + used, 64 - (size_t)used, " atoms=%u", s->atoms);
+        used += snprintf(name + used, 64 - (size_t)used, " atoms=%u", s->atoms);
+    if (s->maps)
+        snprintf(name + used, 64 - (size_t)used, " maps=%s", spl_setting_maps_name(s->maps));
 }
 
 /* Times of one setting, view and size over the repeats, through `pick`. */
@@ -325,7 +327,7 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
     fputs("method,lod,supersample,atoms,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
           "depth_rmse,depth_beyond,"
           "holes,see_through,halo,normal_mean,dense_share,dense_psnr,dense_depth_beyond,dense_holes,"
-          "dense_see_through\n",
+          "dense_see_through,maps\n",
           out);
     for (size_t s = 0; s < report->profile.count; s++) {
         const struct spl_profile_point *p = &report->profile.points[s];
@@ -342,7 +344,7 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
             d.holes,        d.see_through};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
             put(out, numbers[i]);
-        fputc('\n', out);
+        fprintf(out, ",%s\n", spl_setting_maps_name(p->setting.maps));
     }
     free(values);
     if (fclose(out)) {

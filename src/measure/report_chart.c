@@ -1,5 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * supersampling is a dash pattern, fewer atoms than all are paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them, supersampling is a dash pattern, fewer atoms than all are
+ * paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,6 +32,15 @@ static struct spl_chart_curve *add_curve(struct build *b, const char *name, unsi
     return curve;
 }
 
+/* Methods first, then those that take colours from maps, with maps. */
+static unsigned color_of(const struct spl_setting *s)
+{
+    unsigned color = s->maps == SPL_SETTING_MAPS_ON ? SPL_METHOD_COUNT : s->method;
+    for (int method = 0; s->maps == SPL_SETTING_MAPS_ON && method < (int)s->method; method++)
+        color += spl_setting_has_maps((enum spl_method)method);
+    return color;
+}
+
 /* The settings that are `s` but for their level. */
 static void add_settings(struct build *b, const struct spl_profile *profile, struct spl_setting s, unsigned dash)
 {
@@ -38,7 +48,7 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
     for (size_t i = 0; i < profile->count; i++) {
         const struct spl_profile_point *p = &profile->points[i];
         s.lod = p->setting.lod;
-        if (!spl_setting_equal(&p->setting, &s) || p->setting.atoms != s.atoms)
+        if (!spl_setting_equal(&p->setting, &s) || p->setting.atoms != s.atoms || p->setting.maps != s.maps)
             continue;
         struct spl_chart_point *out = &b->points[b->point_count++];
         *out = (struct spl_chart_point){.ms = p->ms, .psnr = p->psnr, .front = p->front, .index = (int32_t)i};
@@ -46,14 +56,30 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
         snprintf(out->detail, sizeof out->detail, "90 %% of views within %.4g ms", p->ms_q90);
     }
     char name[64];
-    int used = snprintf(name, sizeof name, "%s", spl_method_name(s.method));
+    int used = snprintf(name, sizeof name, "%s%s", spl_method_name(s.method),
+                        s.maps == SPL_SETTING_MAPS_ON ? " + panorama" : "");
     if (s.supersample != 1)
         used += snprintf(name + used, sizeof name - (size_t)used, " %g×%g", s.supersample, s.supersample);
     if (s.atoms < ALL)
         snprintf(name + used, sizeof name - (size_t)used, " atoms=%u", s.atoms);
-    struct spl_chart_curve *curve = add_curve(b, name, s.method, dash, first);
+    struct spl_chart_curve *curve = add_curve(b, name, color_of(&s), dash, first);
     if (curve)
         curve->fade = 0.7 * (ALL - s.atoms) / ALL;
+}
+
+/* A method's curves of one pass; those with maps first. */
+static void add_method(struct build *b, const struct spl_profile *profile, enum spl_method method, int pass)
+{
+    for (int maps = SPL_SETTING_MAPS_COUNT; maps-- > 0;)
+        for (unsigned i = 0; i < SUPERSAMPLES; i++)
+            for (unsigned atoms = ALL + 1; atoms-- > 0;)
+                if ((atoms == ALL ? 0 : i == 0 ? 1 : 2) == pass)
+                    add_settings(b, profile,
+                                 (struct spl_setting){.method = method,
+                                                      .supersample = supersamples[i],
+                                                      .atoms = atoms,
+                                                      .maps = (enum spl_setting_maps)maps},
+                                 i);
 }
 
 /* The legend has room for few: first each method with all atoms, then fewer atoms at one sample a pixel. */
@@ -61,20 +87,15 @@ static void add_methods(struct build *b, const struct spl_profile *profile)
 {
     for (int pass = 0; pass < 3; pass++)
         for (int method = 0; method < SPL_METHOD_COUNT; method++)
-            for (unsigned i = 0; i < SUPERSAMPLES; i++)
-                for (unsigned atoms = ALL + 1; atoms-- > 0;)
-                    if ((atoms == ALL ? 0 : i == 0 ? 1 : 2) == pass)
-                        add_settings(b, profile,
-                                     (struct spl_setting){.method = (enum spl_method)method,
-                                                          .supersample = supersamples[i],
-                                                          .atoms = atoms},
-                                     i);
+            add_method(b, profile, (enum spl_method)method, pass);
 }
 
 /* One curve for each name, in the order in which the names first appear. */
 static void add_peers(struct build *b, const struct spl_peers *peers)
 {
     unsigned color = SPL_METHOD_COUNT;
+    for (size_t i = 0; i < b->curve_count; i++)
+        color = b->curves[i].color < color ? color : b->curves[i].color + 1;
     for (size_t i = 0; peers && i < peers->count; i++) {
         const char *name = peers->rows[i].name;
         size_t first = b->point_count, j = 0;

@@ -51,10 +51,7 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
 {
     spl_view_init(out);
     out->camera = o->views->views[view].camera;
-    out->method = o->settings[setting].method;
-    out->lod = o->settings[setting].lod;
-    out->supersample = o->settings[setting].supersample;
-    out->disc.atoms = o->settings[setting].atoms;
+    spl_setting_apply(&o->settings[setting], out);
     if (size != SPL_SWEEP_FULL)
         spl_camera_resize(&out->camera, (out->camera.width + 1) / 2, (out->camera.height + 1) / 2);
 }

@@ -24,6 +24,7 @@
 #include "pack/emit.h"
 #include "pack/kept.h"
 #include "pack/linear.h"
+#include "pack/maps/maps.h"
 #include "pack/median.h"
 #include "pack/part.h"
 #include "pack/system.h"
@@ -47,6 +48,15 @@ struct pack {
     struct spl_tree tree;
     struct spl_emitted emitted;
     struct spl_dataset_writer *writer;
+};
+
+/* What there is to put onto the scan: photographs, pictures for maps. Loaded before anything is packed. */
+struct passes {
+    const struct spl_pack_options *options;
+    struct spl_stage *stage;
+    struct spl_view_list photographs, pictures;
+    struct spl_photo_report photos;
+    struct spl_map_report maps;
 };
 
 static int check_options(struct pack *p, struct spl_error *err)
@@ -196,7 +206,7 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
 }
 
 /* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
-static void plan(const struct pack *p, uint32_t photographs)
+static void plan(const struct pack *p, const struct passes *later)
 {
     static const struct {
         const char *name;
@@ -211,8 +221,11 @@ static void plan(const struct pack *p, uint32_t photographs)
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
         if (!parts[i].of_surface || !p->options->points_only)
             spl_stage_plan(p->stage, parts[i].name, parts[i].seconds * 1e-6 * (double)points, i ? 0 : points);
-    if (photographs)
-        spl_photos_plan(p->options->photos, p->stage, photographs, (uint64_t)(1.33 * (double)points), 0);
+    if (later && later->photographs.count)
+        spl_photos_plan(p->options->photos, p->stage, (uint32_t)later->photographs.count,
+                        (uint64_t)(1.33 * (double)points), 0);
+    if (p->options->maps)
+        spl_maps_plan(p->stage, later ? (uint32_t)later->pictures.count : 0, points);
 }
 
 static int join_wires(struct pack *p, struct spl_error *err)
@@ -253,7 +266,7 @@ static int gather(struct pack *p, struct spl_system_options *said, struct spl_er
 }
 
 static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *inputs, const char *output,
-                     const struct spl_view_list *photographs, struct spl_stage *stage, struct spl_pack_report *report,
+                     const struct passes *later, struct spl_stage *stage, struct spl_pack_report *report,
                      struct spl_error *err)
 {
     struct pack p = {.options = options, .stage = stage};
@@ -276,11 +289,11 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     if (!rc)
         rc = spl_system_find(&p.system, &p.scans, &said, err);
     if (!rc) {
-        plan(&p, photographs ? (uint32_t)photographs->count : 0);
+        plan(&p, later);
         rc = gather(&p, &said, err);
     }
     if (!rc)
-        settle_up(&p, photographs);
+        settle_up(&p, later && options->photos ? &later->photographs : NULL);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
@@ -352,37 +365,62 @@ static int check_kept(const struct spl_pack_options *o, const struct spl_view_li
                           kept, input ? "input" : "output");
 }
 
-/* The dataset without its name, so that nothing of it is left when the process dies. */
-static int pack_photos(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
+/* A dataset that the next pass reads, without its name, so that nothing of it is left when the process dies. */
+static int open_part(const char *path, struct spl_dataset **dataset, struct spl_error *err)
+{
+    int rc = spl_dataset_open_whole(path, false, dataset, err);
+    unlink(path);
+    return rc;
+}
+
+static int run_passes(struct passes *p, const char *part, struct spl_error *err)
+{
+    const struct spl_pack_options *o = p->options;
+    struct spl_dataset *dataset = NULL;
+    int rc = open_part(part, &dataset, err);
+    if (!rc && o->photos) {
+        rc = spl_photos_apply(o->photos, &p->photographs, dataset, o->maps ? part : o->output, p->stage, &p->photos,
+                              err);
+        spl_dataset_close(dataset);
+        dataset = NULL;
+        if (!rc && o->maps)
+            rc = open_part(part, &dataset, err);
+    }
+    if (!rc && o->maps)
+        rc = spl_maps_apply(o->maps, &p->pictures, dataset, o->output, p->stage, &p->maps, err);
+    spl_dataset_close(dataset);
+    return rc;
+}
+
+static int pack_passes(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
                        struct spl_pack_report *report, struct spl_error *err)
 {
-    struct spl_view_list photographs = {0};
-    struct spl_photo_report photos = {0};
+    struct passes p = {.options = options, .stage = stage};
     struct spl_dataset *dataset = NULL;
-    char *path = NULL;
-    int rc = spl_photos_load(options->photos, &photographs, &photos, err);
-    if (!rc)
-        rc = check_kept(options, &photographs, err);
-    if (!rc && asprintf(&path, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
-        path = NULL;
+    char *part = NULL;
+    int rc = SPL_OK;
+    if (options->photos && !(rc = spl_photos_load(options->photos, &p.photographs, &p.photos, err)))
+        rc = check_kept(options, &p.photographs, err);
+    if (!rc && options->maps)
+        rc = spl_maps_load(options->maps, &p.pictures, &p.maps, err);
+    if (!rc && asprintf(&part, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
+        part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
-    if (!rc && !(rc = pack_scan(options, inputs, path, &photographs, stage, report, err))) {
-        rc = spl_dataset_open_whole(path, false, &dataset, err);
-        unlink(path);
-    }
     if (!rc)
-        rc = spl_photos_apply(options->photos, &photographs, dataset, options->output, stage, &photos, err);
-    spl_dataset_close(dataset);
-    dataset = NULL;
+        rc = pack_scan(options, inputs, part, &p, stage, report, err);
+    if (!rc)
+        rc = run_passes(&p, part, err);
     if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
         memcpy(report->attribute_bits, spl_dataset_get_info(dataset)->attribute_bits, sizeof report->attribute_bits);
-        report->photos = photos;
-        report->seconds += photos.seconds;
+        report->photos = p.photos;
+        report->maps = p.maps;
+        report->seconds += p.photos.seconds + p.maps.seconds;
     }
     spl_dataset_close(dataset);
-    spl_view_list_finish(&photographs);
-    free(path);
+    spl_view_list_finish(&p.photographs);
+    spl_view_list_finish(&p.pictures);
+    free(part);
     return rc;
 }
 
@@ -391,6 +429,9 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
+    if (options->points_only && options->maps)
+        return spl_fail_field(err, SPL_E_USAGE, "points-only",
+                              "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
                               .threads = spl_thread_count(options->threads),
@@ -403,8 +444,8 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
         return rc;
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
-    rc = options->photos ? pack_photos(&found, &inputs, &stage, report, err)
-                         : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
+    rc = options->photos || options->maps ? pack_passes(&found, &inputs, &stage, report, err)
+                                          : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
     spl_inputs_finish(&inputs);
     return rc;
 }
@@ -413,10 +454,15 @@ int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *rep
 {
     struct spl_pack_options known = {0};
     struct spl_photo_options photos = {0};
+    struct spl_map_options maps = {0};
     int rc = spl_sized_read(options, &known, sizeof known, "spl_pack_options", err);
     if (!rc && known.photos) {
         rc = spl_sized_read(known.photos, &photos, sizeof photos, "spl_photo_options", err);
         known.photos = &photos;
+    }
+    if (!rc && known.maps) {
+        rc = spl_sized_read(known.maps, &maps, sizeof maps, "spl_map_options", err);
+        known.maps = &maps;
     }
     return rc ? rc : pack(&known, report, err);
 }

@@ -8,7 +8,7 @@
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/slot.h"
-#include "render/stations.h"
+#include "render/map_cells.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -87,7 +87,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .dataset = job->resident->dataset,
         .camera = camera,
         .lod = job->view->lod,
-        .low_pass = SPL_LOW_PASS + (maps & SPL_MAP_COLORS ? SPL_STATIONS_PAD : 0),
+        .low_pass = SPL_LOW_PASS + (maps & SPL_MAP_COLORS ? SPL_MAP_CELLS_PAD : 0),
         .discs = method->discs,
         .lines = method->lines,
         .tables = ask_tables,

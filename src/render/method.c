@@ -125,6 +125,13 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
                           param->least, param->most);
 }
 
+bool spl_method_param_counts(const struct spl_method_param_info *param, const struct spl_dataset_info *dataset)
+{
+    return param->changes == SPL_CHANGES_TEXTURES ? dataset->atoms > 0
+           : param->changes == SPL_CHANGES_MAPS   ? dataset->maps > 0
+                                                  : true;
+}
+
 double spl_view_get_param(const struct spl_view *view, enum spl_method_param param)
 {
     switch (param) {

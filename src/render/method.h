@@ -41,4 +41,7 @@ struct spl_method_row {
 
 const struct spl_method_row *spl_method_row(enum spl_method method);
 
+/* Can the parameter change anything that is drawn of the dataset? */
+bool spl_method_param_counts(const struct spl_method_param_info *param, const struct spl_dataset_info *dataset);
+
 #endif

@@ -9,7 +9,7 @@
 #include "render/children.h"
 #include "render/frustum.h"
 #include "render/occupancy.h"
-#include "render/stations.h"
+#include "render/map_cells.h"
 
 enum { stack_max = 8 * 64 };
 
@@ -24,7 +24,7 @@ struct walk {
     const struct spl_tables *tables; /* of the node being drawn */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
-    struct spl_stations stations;
+    struct spl_map_cells stations;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
 };
 
@@ -233,7 +233,7 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     w->list->splats += count;
     int trims = 0;
     if (w->stations.count)
-        trims = spl_stations_add(&w->stations, &w->tables->stations[chunk - w->tables->chunks], &box, w->list, err);
+        trims = spl_map_cells_add(&w->stations, &w->tables->stations[chunk - w->tables->chunks], &box, w->list, err);
     if (trims < 0)
         return trims;
     const struct spl_draw_origin from = {.page = page, .kind = SPL_CHUNK_DISCS, .trims = (uint16_t)trims};
@@ -400,15 +400,15 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;
-    rc = spl_stations_init(&w.stations, params, err);
+    rc = spl_map_cells_init(&w.stations, params, err);
     if (!rc)
         rc = walk_tree(&w, err);
     if (!rc)
         rc = spl_draw_list_lay_out(list, err);
     if (!rc)
-        rc = spl_stations_lay_out(&w.stations, list, err);
+        rc = spl_map_cells_lay_out(&w.stations, list, err);
     list->sample_splats = spl_occupancy_bound(&w.occupancy);
     spl_occupancy_finish(&w.occupancy);
-    spl_stations_finish(&w.stations);
+    spl_map_cells_finish(&w.stations);
     return rc;
 }

@@ -53,6 +53,7 @@ static json_t *describe_param(const struct spl_method_param_info *param)
         set(json, "default", describe_number(param, param->otherwise));
     }
     set(json, "textures", json_boolean(param->changes == SPL_CHANGES_TEXTURES));
+    set(json, "maps", json_boolean(param->changes == SPL_CHANGES_MAPS));
     return json;
 }
 

@@ -20,7 +20,7 @@ import zipfile
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "http"))
 import browser
 from browser import Browser, Page
-from harness import FAKE, REAL, TEXTURED, WALL, Daemon, run
+from harness import FAKE, MAPPED, REAL, TEXTURED, WALL, Daemon, run
 
 if not browser.BINARY:
     print("skipped: there is no chromium")
@@ -548,6 +548,29 @@ def test_atoms_are_offered_where_there_are_textures():
             assert any("atoms=0" in name for name, *_ in tab.run(VIEWS))
 
 
+def test_maps_are_offered_where_there_are_any():
+    with page() as tab:
+        assert tab.run("document.querySelector('#parameter-maps').hidden") and "maps" not in tab.run("location.hash")
+    look = FACING.replace("dataset=wall", "dataset=wall-mapped")
+    with Daemon(REAL, datasets=[WALL, MAPPED]) as other:
+        site = f"http://127.0.0.1:{other.port}"
+        with page(f"{site}/{look}") as tab:
+            assert "maps" in shown(tab) and tab.text("[for=parameter-maps]") == "Maps"
+            assert tab.run("[...document.querySelector('#parameter-maps').options].map(o => o.text)") == ["on", "off"]
+            tab.choose("#parameter-maps", "off")
+            tab.until(f"location.hash.includes('maps=off') && {REST}")
+            tab.choose("#method", "points")
+            tab.until(f"!location.hash.includes('maps') && {REST}")
+            assert "maps" not in shown(tab)
+            tab.run(f"location.hash = '{look}&budget=30s'")
+            tab.until(f"/^Chosen: .*, maps on/.test(document.querySelector('#chosen').textContent) && {REST}")
+        with page(f"{site}/{look}&maps=off") as tab:
+            assert any("maps=off" in name for name, *_ in tab.run(VIEWS)), "the address has it"
+            assert tab.run("document.querySelector('#parameter-maps').value") == "off"
+        with page(f"{site}/embed/wall-mapped{look}&maps=off") as tab:
+            assert any("maps=off" in name for name, *_ in tab.run(VIEWS))
+
+
 FILL = ("visibility", "kernel", "threshold", "pyramid")
 
 
@@ -615,7 +638,8 @@ def test_controls_are_those_of_the_table():
         assert tab.run("document.querySelector('#method').value") == table["default"]
         for method in table["methods"]:
             tab.choose("#method", method["name"])
-            names = {name for name in method["parameters"] if not parameters[name]["textures"]}  # the wall has none
+            lacks = {name for name, parameter in parameters.items() if parameter["textures"] or parameter["maps"]}  # the wall
+            names = {name for name in method["parameters"] if name not in lacks}
             assert shown(tab) == names, method["name"]
             assert tab.text("#method-help") == method["description"]
             for parameter in (parameters[name] for name in names):

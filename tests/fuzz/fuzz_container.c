@@ -3,10 +3,10 @@
  * to the last splat, from pages copied to blocks of their exact size.
  *
  * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures, 8 = tables are read by page, 16
- * = two pages), one byte n, n patches of three bytes (offset low, high; xor) into header and table, a little-endian 32
- * bit size for each section, then the sections, of those sizes (shortened or missing as the input ends; pages keep
- * their size up to 64 KiB, with zeroes): META, PDIR, each page's HEAD, each PAGE, with textures ATOM and each page's
- * TEXP. */
+ * = two pages, 32 = maps of one station, 64 = of two), one byte n, n patches of three bytes (offset low, high; xor) into header and table, a little-endian 32
+ * bit size for each section, then the sections, of those sizes (shortened or missing as the input ends; pages and maps
+ * keep their size up to 64 KiB, with zeroes): META, PDIR, each page's HEAD, each PAGE, with textures ATOM and each page's
+ * TEXP, with maps PANO and each station's PMAP. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -20,11 +20,12 @@
 #include "dataset/dataset.h"
 #include "dataset/dictionary.h"
 #include "dataset/texture.h"
+#include "geom/polar.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, flag_by_page = 8, flag_two_pages = 16 };
-enum { sections_max = 9, page_room = 1 << 16 };
+enum { flag_rehash = 1, flag_verify = 2, flag_textures = 4, flag_by_page = 8, flag_two_pages = 16, flag_maps = 96 };
+enum { sections_max = 12, page_room = 1 << 16 };
 
 struct part {
     uint32_t type, index;
@@ -46,8 +47,8 @@ static void rehash(struct head *head, size_t table_bytes)
 /* The sections of the input, in its order. */
 static int take_parts(const uint8_t *data, size_t size, unsigned flags, struct part parts[sections_max])
 {
-    static uint8_t pages[2][page_room];
-    const uint32_t page_count = flags & flag_two_pages ? 2 : 1;
+    static uint8_t pages[4][page_room]; /* and maps */
+    const uint32_t page_count = flags & flag_two_pages ? 2 : 1, map_count = (flags & flag_maps) / 32;
     int count = 0;
     parts[count++] = (struct part){.type = SPL_SECTION_META};
     parts[count++] = (struct part){.type = SPL_SECTION_DIRECTORY};
@@ -59,6 +60,10 @@ static int take_parts(const uint8_t *data, size_t size, unsigned flags, struct p
         parts[count++] = (struct part){.type = SPL_SECTION_ATOMS};
     for (uint32_t p = 0; p < page_count && flags & flag_textures; p++)
         parts[count++] = (struct part){.type = SPL_SECTION_TEXTURES, .index = p};
+    if (map_count)
+        parts[count++] = (struct part){.type = SPL_SECTION_STATIONS};
+    for (uint32_t m = 0; m < map_count && m < 2; m++)
+        parts[count++] = (struct part){.type = SPL_SECTION_MAP, .index = m};
     for (int i = 0; i < count; i++, data += size < 4 ? size : 4, size -= size < 4 ? size : 4)
         memcpy(&parts[i].size, data, size < 4 ? size : 4);
     for (int i = 0; i < count; i++) {
@@ -67,9 +72,9 @@ static int take_parts(const uint8_t *data, size_t size, unsigned flags, struct p
         parts[i].size = left;
         data += left;
         size -= left;
-        if (parts[i].type != SPL_SECTION_PAGE)
+        if (parts[i].type != SPL_SECTION_PAGE && parts[i].type != SPL_SECTION_MAP)
             continue;
-        uint8_t *page = pages[parts[i].index];
+        uint8_t *page = pages[parts[i].index + (parts[i].type == SPL_SECTION_MAP ? 2 : 0)];
         memset(page, 0, page_room);
         memcpy(page, parts[i].bytes, left < page_room ? left : page_room);
         parts[i].bytes = page;
@@ -150,6 +155,33 @@ static void decode_textures(const struct spl_dataset *dataset, const struct spl_
     free(words);
 }
 
+/* Stations of chunks are rows, and what a row says of its map lies within it. */
+static void read_maps(const struct spl_dataset *dataset, const struct spl_tables *tables)
+{
+    uint32_t count;
+    const struct spl_map_row *rows = spl_dataset_get_maps(dataset, &count);
+    spl_assert(!count == !tables->stations);
+    for (uint32_t c = 0; c < tables->chunk_count && count; c++)
+        for (int s = 0; s < SPL_CHUNK_STATIONS; s++)
+            spl_assert((tables->stations[c].seen_by[s] & SPL_STATION_ROW) <= count);
+    for (uint32_t m = 0; m < count; m++) {
+        size_t bytes = spl_dataset_get_map_bytes(dataset, m);
+        uint32_t *words = malloc(bytes);
+        float color[3];
+        spl_assert(!spl_dataset_read_map(dataset, m, words, NULL));
+        for (uint32_t level = 0; level < rows[m].levels; level++) {
+            uint32_t side = rows[m].side >> level;
+            const uint32_t *at = words + spl_map_level_word(&rows[m], level);
+            spl_map_get_color(at, side, spl_polar_width(side, SPL_MAP_APRON) - 1,
+                              spl_polar_height(side, SPL_MAP_APRON) - 1, color);
+            spl_assert(color[0] >= 0 && color[0] <= 255);
+        }
+        size_t texels = 2 * spl_map_range_words(&rows[m]);
+        spl_assert(!(spl_map_range_of_code(&rows[m], spl_map_get_code(words, texels - 1)) <= 0));
+        free(words);
+    }
+}
+
 /* Every code of every stream, and the same by the splat's id. */
 static void decode_streams(const struct spl_dataset *dataset, const struct spl_tables *tables, uint32_t index,
                            const uint32_t *page)
@@ -213,6 +245,7 @@ static void decode_page(const struct spl_dataset *dataset, const struct spl_tabl
     }
     free(page);
     decode_textures(dataset, tables);
+    read_maps(dataset, tables);
 }
 
 static void decode_all(const struct spl_dataset *dataset)

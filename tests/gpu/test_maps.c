@@ -13,7 +13,7 @@
 #include "geom/polar.h"
 #include "gpu/frames.h"
 #include "shared.h"
-#include "support/make_maps.h"
+#include "support/mapped_dataset.h"
 
 static const double spheres[3] = {1.1, 0.7, 0.9};
 
@@ -22,7 +22,7 @@ static void look_anywhere(const struct make_map *map, const double d[3], double 
 {
     double away = 0, along = 0, local[3];
     const double middle[3] = {0, 0, 0};
-    make_map_local(&map->row, middle, local);
+    mapped_local(&map->row, middle, local);
     for (int i = 0; i < 3; i++) {
         away += local[i] * local[i];
         along += local[i] * d[i];
@@ -41,7 +41,7 @@ static struct spl_dataset *random_mapped(size_t count, double radius, int levels
     struct spl_dataset *plain = make_dataset_levels(splats, count, levels);
     struct make_map maps[4];
     for (uint32_t i = 0; i < stations; i++)
-        maps[i] = (struct make_map){.row = make_map_row(places[i], 1 + i, 64 << (i % 2), 1 + i % 3, 30 + 7 * i),
+        maps[i] = (struct make_map){.row = mapped_row(places[i], 1 + i, 64 << (i % 2), 1 + i % 3, 30 + 7 * i),
                                     .look = look_anywhere};
     struct spl_dataset *dataset = make_mapped_alike(plain, maps, stations, trims);
     spl_dataset_close(plain);

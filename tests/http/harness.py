@@ -18,8 +18,8 @@ import urllib.parse
 
 import openapi
 
-REAL, FAKE, WALL, TEXTURED = (
-    os.environ[name] for name in ("SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL", "SPLATD_WALL_TEXTURED"))
+REAL, FAKE, WALL, TEXTURED, MAPPED = (os.environ[name] for name in (
+    "SPLATD_BINARY", "SPLATD_FAKE", "SPLATD_WALL", "SPLATD_WALL_TEXTURED", "SPLATD_WALL_MAPPED"))
 VIEW = "/v1/datasets/wall/view"
 
 

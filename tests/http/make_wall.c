@@ -1,17 +1,36 @@
-/* make_wall [--small | --large | --textured | --knot | --tree | --unit=UNIT] [--crs=CRS] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower
- * half; --large: 600 × 600, several MiB), two levels, in the plane x = 0. --textured gives its splats up to 8 of 16
- * atoms. --knot makes what once took long to open, --tree a ground of
- * several levels on many small pages. --unit= and --crs= are what the dataset says, nothing where they are empty. */
+/* make_wall [--small | --large | --textured | --mapped | --knot | --tree | --unit=UNIT] [--crs=CRS] NAME.spld…: a
+ * coloured wall of 40 × 40 splats (--small: its lower half; --large: 600 × 600, several MiB), two levels, in the plane
+ * x = 0. --textured gives its splats up to 8 of 16 atoms, --mapped the map of a station at (2, 0, 1) that sees it in
+ * other colours, striped, and through its splats from y = 0.5 on. --knot makes what once took long to open, --tree a
+ * ground of several levels on many small pages. --unit= and --crs= are what the dataset says, nothing where they are
+ * empty. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "support/make_dataset.h"
 #include "support/make_knot.h"
+#include "support/make_look_map.h"
 #include "support/make_textures.h"
 #include "support/make_tree.h"
 
-enum { side_usual = 40, side_large = 600 };
+enum { side_usual = 40, side_large = 600, map_side = 512 };
+
+static const double station[3] = {2, 0, 1};
+
+static void look(const double d[3], uint8_t color[3], double *range)
+{
+    double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), y = 0;
+    *range = INFINITY;
+    for (int i = 0; i < 20 && d[0] < 0; i++) { /* to where the ray meets the wall */
+        *range = (0.2 * sin(y) - station[0]) * length / d[0];
+        y = *range * d[1] / length;
+    }
+    bool odd = (int)floor(16 * fmin(fmax(y, -9), 9)) & 1;
+    memcpy(color, odd ? (uint8_t[]){240, 30, 200} : (uint8_t[]){20, 200, 30}, 3);
+    if (y > 0.5)
+        *range = INFINITY;
+}
 
 int main(int argc, char **argv)
 {
@@ -45,6 +64,15 @@ int main(int argc, char **argv)
         for (int i = 2; i < argc; i++)
             make_textured_file(plain, &dictionary, 8, 1, argv[i]);
         spl_dictionary_finish(&dictionary);
+        spl_dataset_close(plain);
+        free(splats);
+        return 0;
+    }
+    if (!strcmp(kind, "--mapped")) {
+        struct spl_dataset *plain = make_dataset_levels(splats, (size_t)(side * side), 2);
+        struct spl_map_row row = make_look_row(station, map_side, map_side);
+        for (int i = 2; i < argc; i++)
+            make_look_file(plain, &row, look, argv[i]);
         spl_dataset_close(plain);
         free(splats);
         return 0;

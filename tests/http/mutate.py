@@ -26,7 +26,7 @@ def use_build(build):
     http = build / "tests" / "http"
     for name, path in {"SOURCE_ROOT": source, "BINARY": build / "src" / "splatd", "FAKE": http / "splatd-fake",
                        "WALL": http / "wall.spld", "WALL_2": http / "wall-2.spld",
-                       "WALL_TEXTURED": http / "wall-textured.spld"}.items():
+                       "WALL_TEXTURED": http / "wall-textured.spld", "WALL_MAPPED": http / "wall-mapped.spld"}.items():
         os.environ.setdefault(f"SPLATD_{name}", str(path))
 
 

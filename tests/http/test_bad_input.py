@@ -20,7 +20,7 @@ QUERIES = [
     ("method=raytrace", "method"), ("lod=-1", "lod"), ("lod=much", "lod"), ("layer=smell", "layer"),
     ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
     ("background=rad", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"),
-    ("margin=1e9", "margin"), ("atoms=9", "atoms"), ("atoms=1.5", "atoms"), ("atoms=-1", "atoms"),
+    ("margin=1e9", "margin"), ("atoms=9", "atoms"), ("atoms=1.5", "atoms"), ("atoms=-1", "atoms"), ("maps=no", "maps"),
     ("budget=0", "budget"), ("budget=-5", "budget"), ("budget=fast", "budget"), ("budget=5m", "budget"),
     ("budget=", "budget"), ("budget=1e3", "budget"), ("budget=nan", "budget"), ("budget=601s", "budget"),
     ("budget=.", "budget"), ("budget=5%20ms", "budget"), ("budget=5&budget=6", "budget"), ("psnr=101", "psnr"),

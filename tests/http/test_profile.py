@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import xml.etree.ElementTree
 
-from harness import FAKE, REAL, TEXTURED, VIEW, WALL, Daemon, eventually, run
+from harness import FAKE, MAPPED, REAL, TEXTURED, VIEW, WALL, Daemon, eventually, run
 
 PROFILE = "/v1/datasets/wall/profile"
 DEVICE = {"backend": "fake", "name": "flat colour", "driver": "tests", "software": True}
@@ -170,6 +170,27 @@ def test_atoms_are_chosen_where_there_are_textures():
         assert d.ask("/v1/datasets/wall").json()["color"] is None  # its META does not say
         reply = ask(d, psnr=20, atoms=3)[1]
         assert "atoms" not in reply.headers["Splatd-Chosen"] and "psnr" in reply.headers["Splatd-Promised"]
+
+
+def test_maps_are_chosen_as_textures_are():
+    points = [point("splat", lod, 1, psnr, maps=maps) for lod, maps, psnr in ((4, "on", 31), (4, "off", 26), (1, "off", 30),
+                                                                              (1, "on", 34))]
+    document = profile(version(MAPPED), points=points + [point("points", 1, 1, 22)])
+    with serving(document, source=MAPPED) as (d, _):
+        for params, *wanted in [({"psnr": 29}, "4", "on"), ({"psnr": 28.5, "maps": "off", "lod": 1}, "1", "off"),
+                                ({"psnr": 32}, "1", "on"), ({"psnr": 24, "maps": "off"}, "4", "off")]:
+            _, reply = ask(d, **params)
+            chosen = fields(reply.headers["Splatd-Chosen"])
+            assert [chosen["lod"], chosen["maps"]] == wanted and reply.headers["Splatd-Demand"] == "met", (params, chosen)
+        assert "maps" not in fields(ask(d, budget="1s", method="points")[1].headers["Splatd-Chosen"])
+    document = profile(version(MAPPED))  # nothing was measured with maps
+    with serving(document, source=MAPPED) as (d, _):
+        for maps in "on", "off":
+            reply = ask(d, budget="1s", maps=maps)[1]
+            assert fields(reply.headers["Splatd-Chosen"])["maps"] == maps
+    with serving(profile(version(WALL))) as (d, _):
+        reply = ask(d, psnr=20, maps="off")[1]
+        assert "maps" not in reply.headers["Splatd-Chosen"] and "psnr" in reply.headers["Splatd-Promised"]
 
 
 def test_profiles_that_cannot_be_trusted_are_ignored():

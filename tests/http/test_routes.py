@@ -81,7 +81,7 @@ def test_methods_are_those_of_the_document():
         methods = {method["name"]: method for method in table["methods"]}
         assert methods["splat"]["textures"] and not methods["points"]["textures"]
         assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
-        assert methods["splat"]["parameters"] == ["margin", "atoms"] and methods["points"]["parameters"] == []
+        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps"] and methods["points"]["parameters"] == []
         for parameter in table["parameters"]:
             name, schema = parameter["name"], document[parameter["name"]]
             assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \
@@ -96,6 +96,7 @@ def test_methods_are_those_of_the_document():
             assert d.view(width=8, height=8, **{name: beyond}).status == 400, (name, beyond)
         assert {p["name"] for p in table["parameters"]} == {n for m in table["methods"] for n in m["parameters"]}
         assert [p["name"] for p in table["parameters"] if p["textures"]] == ["atoms"]
+        assert [p["name"] for p in table["parameters"] if p["maps"]] == ["maps"]
 
 
 def test_status_says_how_it_is():
@@ -392,7 +393,7 @@ def test_openapi_knows_every_parameter_and_route():
     params = [[cell.strip() for cell in row.replace("\\\n", " ").split(",")] for row in
               re.findall(r"^    (?:REAL|COUNT|CHOICE)\(([^\"]+?),[\s\\\\]*\"", methods, re.M)]
     assert len(params) >= 6
-    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] == "SPL_CHANGES_SHAPES" else "")) for row in params]
+    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] != "SPL_CHANGES_TEXTURES" else "")) for row in params]
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
     camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in

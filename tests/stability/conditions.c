@@ -152,11 +152,13 @@ struct drawing {
     const char *name;
     enum spl_method method;
     uint32_t atoms;
+    enum spl_maps maps;
+    double psnr; /* NAN until it is measured */
 };
 
 /* One row a drawing; of strips, to whose sides the filter looks as far as along them, `fill` in the whole form only. */
 static void measure_rows(struct conditions *c, const struct world *world, const struct spl_view *view,
-                         const struct drawing *drawings, size_t count, const struct row *name)
+                         struct drawing *drawings, size_t count, const struct row *name)
 {
     if (!conditions_wants(c, name->condition) || (name->whole && !c->suite->whole))
         return;
@@ -175,7 +177,9 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
             continue;
         views[0].method = views[1].method = drawings[i].method;
         views[0].disc.atoms = views[1].disc.atoms = drawings[i].atoms;
+        views[0].maps = views[1].maps = drawings[i].maps;
         bool measured = measure(c, world, views, truths, true, &row);
+        drawings[i].psnr = measured ? row.figures[FIGURE_PSNR] : NAN;
         if (measured && c->update)
             table_put(c->table, &row);
         if (measured)
@@ -197,15 +201,27 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
 {
     struct drawing drawings[SPL_METHOD_COUNT];
     for (int method = 0; method < SPL_METHOD_COUNT; method++)
-        drawings[method] =
-            (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method, view->disc.atoms};
+        drawings[method] = (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method,
+                                            view->disc.atoms, view->maps, NAN};
     measure_rows(c, world, view, drawings, SPL_METHOD_COUNT, &(struct row){condition, value, NULL, whole_only, {0}});
 }
 
 void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
                                  const char *condition, const char *value, bool whole_only)
 {
-    static const struct drawing drawings[] = {{"coloured", SPL_METHOD_SPLAT, 0},
-                                              {"textured", SPL_METHOD_SPLAT, SPL_TEXTURE_ATOMS}};
+    struct drawing drawings[] = {{"coloured", SPL_METHOD_SPLAT, 0, view->maps, NAN},
+                                 {"textured", SPL_METHOD_SPLAT, SPL_TEXTURE_ATOMS, view->maps, NAN}};
     measure_rows(c, world, view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
+}
+
+void conditions_measure_maps(struct conditions *c, const struct world *world, const struct spl_view *view,
+                             const char *condition, const char *value, bool whole_only, double harm)
+{
+    struct drawing drawings[] = {{"unmapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_OFF, NAN},
+                                 {"mapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_ON, NAN}};
+    measure_rows(c, world, view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
+    double gain = drawings[1].psnr - drawings[0].psnr;
+    if (!isnan(gain))
+        report_at_least(&c->suite->report, "maps-do-no-harm", &(struct place){condition, value, NULL, NULL}, gain, -harm,
+                        "dB that maps gain");
 }

@@ -24,6 +24,11 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
 void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
                                  const char *condition, const char *value, bool whole_only);
 
+/* The same, with the splats' own colours and with maps: rows "unmapped" and "mapped". Maps that lose more than `harm` dB
+ * fail "maps-do-no-harm". */
+void conditions_measure_maps(struct conditions *c, const struct world *world, const struct spl_view *view,
+                             const char *condition, const char *value, bool whole_only, double harm);
+
 /* Is this condition to be measured? `only` may be the beginning of its name. */
 bool conditions_wants(const struct conditions *c, const char *condition);
 
@@ -31,5 +36,6 @@ void conditions_of_scans(struct conditions *c);  /* density, noise, poses, echoe
 void conditions_of_views(struct conditions *c);  /* where the eye is, what it takes in, how large the image is */
 void conditions_of_shapes(struct conditions *c); /* degenerate neighbourhoods */
 void conditions_of_photographs(struct conditions *c); /* textures: what photographs show, and how they may be spoilt */
+void conditions_of_maps(struct conditions *c);        /* maps of stations: what they show, and how they may be wrong */
 
 #endif

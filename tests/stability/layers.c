@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "surveyed.h"
+
 enum { WIDTH = 160, HEIGHT = 120 };
 
 static size_t pixels_of(const struct spl_image *image)
@@ -58,7 +60,7 @@ void check_kinds(struct suite *suite, const struct world *world, const struct sp
     }
 }
 
-static void check_frame(struct suite *suite, const struct world *world, const struct spl_view *view, struct place place)
+void check_frame(struct suite *suite, const struct world *world, const struct spl_view *view, struct place place)
 {
     struct spl_frame frame, again;
     if (!world_render(suite, world, &place, view, &frame))
@@ -133,35 +135,49 @@ static double differing(const struct spl_image *a, const struct spl_image *b)
     return (double)count / (double)pixels;
 }
 
+/* One view by both. */
+static void compare_drivers(struct suite *suite, const struct world *world, const struct spl_view *view,
+                            struct place place)
+{
+    struct spl_frame first, second;
+    if (!world_render(suite, world, &place, view, &first))
+        return;
+    struct suite with_other = *suite;
+    with_other.renderer = suite->other;
+    bool rendered = world_render(&with_other, world, &place, view, &second);
+    suite->report = with_other.report;
+    for (int layer = 0; layer < SPL_LAYER_COUNT && rendered; layer++) {
+        if (layer == SPL_LAYER_ID)
+            continue; /* ties may be broken differently */
+        place.layer = spl_layer_name((enum spl_layer)layer);
+        report_at_most(&suite->report, "drivers-agree", &place,
+                       differing(&first.images[layer], &second.images[layer]), 1e-4,
+                       "share of pixels off by more than a level, 1e-5 of a depth, 0.6 degrees");
+    }
+    spl_frame_finish(&first);
+    if (rendered)
+        spl_frame_finish(&second);
+}
+
+static void compare_views(struct suite *suite, struct world *world, size_t step)
+{
+    for (size_t v = 0; v < world->scene->camera_count; v += step)
+        for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+            struct spl_view view = world_view(world, v, WIDTH, HEIGHT);
+            view.method = (enum spl_method)method;
+            struct place place = {world->name, world->scene->cameras[v].name, spl_method_name(view.method), NULL};
+            compare_drivers(suite, world, &view, place);
+        }
+    world_finish(suite, world);
+}
+
 void check_drivers(struct suite *suite)
 {
+    struct world world;
     for (size_t s = 0; s < (suite->whole ? scan_count : small_scans); s++) {
-        struct world world;
         world_init(&world, &scans[s]);
-        for (size_t v = 0; v < world.scene->camera_count; v += suite->whole ? 1 : 3)
-            for (int method = 0; method < SPL_METHOD_COUNT; method++) {
-                struct spl_view view = world_view(&world, v, WIDTH, HEIGHT);
-                view.method = (enum spl_method)method;
-                struct place place = {world.name, world.scene->cameras[v].name, spl_method_name(view.method), NULL};
-                struct spl_frame first, second;
-                if (!world_render(suite, &world, &place, &view, &first))
-                    continue;
-                struct suite with_other = *suite;
-                with_other.renderer = suite->other;
-                bool rendered = world_render(&with_other, &world, &place, &view, &second);
-                suite->report = with_other.report;
-                for (int layer = 0; layer < SPL_LAYER_COUNT && rendered; layer++) {
-                    if (layer == SPL_LAYER_ID)
-                        continue; /* ties may be broken differently */
-                    place.layer = spl_layer_name((enum spl_layer)layer);
-                    report_at_most(&suite->report, "drivers-agree", &place,
-                                   differing(&first.images[layer], &second.images[layer]), 1e-4,
-                                   "share of pixels off by more than a level, 1e-5 of a depth, 0.6 degrees");
-                }
-                spl_frame_finish(&first);
-                if (rendered)
-                    spl_frame_finish(&second);
-            }
-        world_finish(suite, &world);
+        compare_views(suite, &world, suite->whole ? 1 : 3);
     }
+    world_init_yard(&world);
+    compare_views(suite, &world, 1);
 }

@@ -5,7 +5,7 @@
  *   stability conditions [--whole]              measures what degrades and compares it with table.json, either way
  *   stability conditions [NAME] [--method METHOD] --update [--whole]   writes the table's rows anew, those of the
  *                                               conditions that begin so and of the method; read it before it is committed
- *   stability plant half-pixel|margin-0|pop     a planted fault: exits 0 only where the check meant for it catches it
+ *   stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for it catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
  * prints what passes as well. Exit code 77: no such device here. */
@@ -28,6 +28,7 @@ static const struct {
     {"half-pixel", PLANT_HALF_PIXEL, "lies-on-the-truth", check_places},
     {"margin-0", PLANT_MARGIN_0, "depth-unbiased", check_walls},
     {"pop", PLANT_POP, "no-pop", check_motion},
+    {"no-trim", PLANT_NO_TRIM, "halo-is-trimmed", check_maps},
 };
 
 static bool open_renderer(const char *backend, struct spl_renderer **renderer)
@@ -46,7 +47,7 @@ static const struct {
     void (*check)(struct suite *suite);
 } themes[] = {
     {"places", check_places}, {"walls", check_walls},   {"far-away", check_far_away}, {"levels", check_levels},
-    {"sums", check_sums},     {"motion", check_motion}, {"layers", check_layers},
+    {"sums", check_sums},     {"motion", check_motion}, {"layers", check_layers},     {"maps", check_maps},
 };
 
 static bool is_named(const char *const *names, const char *name)
@@ -109,6 +110,7 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     conditions_of_views(conditions);
     conditions_of_shapes(conditions);
     conditions_of_photographs(conditions);
+    conditions_of_maps(conditions);
     bool all = !conditions->only && !conditions->method;
     if (all && !(conditions->update && suite->whole))
         table_find_stale(conditions->table, &suite->report, suite->whole);
@@ -148,7 +150,7 @@ int main(int argc, char **argv)
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
         fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME] [--method METHOD] [--update] | plant "
-                        "half-pixel|margin-0|pop [--whole]\n");
+                        "half-pixel|margin-0|pop|no-trim [--whole]\n");
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);
     return rc;

@@ -28,6 +28,10 @@ NEAREST = [("psnr", "nearest: PSNR", 1, 1), ("holes", "holes", 100, 1), ("see_th
 BEGIN_TEXTURES, END_TEXTURES = "<!-- table.py: textures begin -->\n", "<!-- table.py: textures end -->\n"
 COLOURED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
 TEXTURED = [("psnr", "textures: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("flicker", "flicker", 1, 1)]
+BEGIN_MAPS, END_MAPS = "<!-- table.py: maps begin -->\n", "<!-- table.py: maps end -->\n"
+UNMAPPED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("halo", "halo", 100, 1),
+            ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
+MAPPED = [("psnr", "maps: PSNR", 1, 1), *UNMAPPED[1:]]
 
 
 def cell(row, figure, factor, decimals):
@@ -69,7 +73,8 @@ def main(arguments):
     text = RESULTS.read_text(encoding="utf-8")
     new = text
     for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL, "nearest": NEAREST}),
-                              (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED})):
+                              (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED}),
+                              (BEGIN_MAPS, END_MAPS, {"unmapped": UNMAPPED, "mapped": MAPPED})):
         if text.count(begin) != 1 or text.count(end) != 1:
             sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")
         head, rest = new.split(begin)

@@ -8,6 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "dataset/dataset.h"
+#include "dataset/map.h"
+#include "dataset/rewrite.h"
 #include "support/make_dataset.h"
 #include "synth/exact.h"
 #include "synth/synth.h"
@@ -28,14 +31,15 @@ static void *must_have(void *p)
     return p;
 }
 
-static void pack(struct world *world, const char *folder, const char *scan, const struct spl_photo_options *photos)
+static void pack(struct world *world, const char *folder, const char *scan, const struct spl_photo_options *photos,
+                 const struct spl_map_options *maps)
 {
     struct spl_error err = {0};
     char packed[512];
     snprintf(packed, sizeof packed, "%s/world.spld", folder);
     const struct spl_pack_options options = {
         .size = sizeof options,
-        .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos};
+        .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos, .maps = maps};
     must(spl_pack(&options, NULL, &err), world->name, &err);
     must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);
     unlink(packed);
@@ -66,7 +70,7 @@ void world_init(struct world *world, const struct scan *scan)
     must(spl_scene_create(scan->scene, &world->scene, &err), scan->scene, &err);
     make_folder(folder);
     synth(scan, folder, path);
-    pack(world, folder, path, NULL);
+    pack(world, folder, path, NULL, NULL);
     unlink(path);
     rmdir(folder);
 }
@@ -95,9 +99,59 @@ void world_init_photos(struct world *world, const char *name, const struct point
                   fwrite(points[i].color, sizeof points[i].color, 1, file) == 1 && written;
     if (fclose(file) || !written)
         must(1, path, &(struct spl_error){.message = "cannot be written"});
-    pack(world, folder, path, photos);
+    pack(world, folder, path, photos, NULL);
     unlink(path);
     rmdir(folder);
+}
+
+void world_init_mapped(struct world *world, const char *name, const char *scan, const char *panoramas)
+{
+    char folder[256];
+    const struct spl_map_options maps = {.size = sizeof maps, .panoramas = panoramas};
+    *world = (struct world){0};
+    snprintf(world->name, sizeof world->name, "%s", name);
+    make_folder(folder);
+    pack(world, folder, scan, NULL, &maps);
+    rmdir(folder);
+    must(!spl_dataset_get_info(world->dataset)->maps, name, &(struct spl_error){.message = "no map was made"});
+}
+
+/* What the map that is asked for is read into. */
+struct lent {
+    const struct spl_dataset *from;
+    uint32_t *words;
+};
+
+static int lend_map(void *context, uint32_t index, const uint32_t **words, struct spl_error *err)
+{
+    struct lent *lent = context;
+    free(lent->words);
+    *words = lent->words = must_have(malloc(spl_dataset_get_map_bytes(lent->from, index)));
+    return spl_dataset_read_map(lent->from, index, lent->words, err);
+}
+
+void world_stop_trimming(struct world *world)
+{
+    struct spl_error err = {0};
+    char folder[256], path[512];
+    struct lent lent = {.from = world->dataset};
+    struct spl_rewrite rewrite = {.from = world->dataset, .get_map = lend_map, .context = &lent};
+    size_t count = spl_dataset_get_info(world->dataset)->chunks;
+    struct spl_chunk_stations *stations = must_have(malloc(count * sizeof *stations));
+    memcpy(stations, spl_dataset_get_chunk_stations(world->dataset), count * sizeof *stations);
+    for (size_t i = 0; i < count; i++)
+        stations[i].seen_by[0] &= SPL_STATION_ROW;
+    rewrite.maps = spl_dataset_get_maps(world->dataset, &rewrite.map_count);
+    rewrite.stations = stations;
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/world.spld", folder);
+    must(spl_dataset_rewrite(&rewrite, path, &err), world->name, &err);
+    spl_dataset_close(world->dataset);
+    must(spl_dataset_open(path, false, &world->dataset, &err), world->name, &err);
+    unlink(path);
+    rmdir(folder);
+    free(lent.words);
+    free(stations);
 }
 
 void world_finish(struct suite *suite, struct world *world)

@@ -28,7 +28,7 @@ struct world {
     char name[64];
 };
 
-enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP };
+enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP, PLANT_NO_TRIM };
 
 struct suite {
     struct report report;
@@ -44,6 +44,10 @@ void world_init_points(struct world *world, const char *name, const struct point
 /* The same with photographs. */
 void world_init_photos(struct world *world, const char *name, const struct point *points, size_t count,
                        const struct spl_photo_options *photos);
+/* A scan's file with maps of its stations: from panoramas, or (NULL) from the scan's own colours. */
+void world_init_mapped(struct world *world, const char *name, const char *scan, const char *panoramas);
+/* Chunks are no longer said to reach where their station saw through. Before the world is rendered. */
+void world_stop_trimming(struct world *world);
 void world_finish(struct suite *suite, struct world *world);
 
 /* The points of the scene's scan, which the caller frees. */

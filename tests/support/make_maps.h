@@ -1,38 +1,28 @@
-/* Maps of stations without scans: what each direction gives is a function's, on any dataset. Anything that goes wrong
- * ends the test program. */
+/* Maps of stations for tests: rows, words and stations of chunks that are right in form and mean nothing. Anything that
+ * goes wrong ends the test program. */
 #ifndef TEST_SUPPORT_MAKE_MAPS_H
 #define TEST_SUPPORT_MAKE_MAPS_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include "dataset/dataset.h"
 
-#include <splatd/dataset.h>
+enum { make_maps_most = 8 };
 
-#include "dataset/map.h"
-
-struct make_map {
-    struct spl_map_row row;
-    /* Of unit direction `d` of the station's frame: its colour, 0..255, and its range: INFINITY = nothing came back,
-     * NaN = not scanned. */
-    void (*look)(const struct make_map *map, const double d[3], double color[3], double *range);
-    const void *context;
+struct make_maps {
+    struct spl_map_row rows[make_maps_most];
+    uint32_t *words[make_maps_most], count;
+    struct spl_chunk_stations *stations; /* by chunk of the dataset */
+    uint32_t asked;                      /* maps that were asked for */
+    size_t page_bytes;                   /* of the file that is made; 0 = the writer's */
 };
 
-/* A row at `position`, turned about some axis by `turn` radians. */
-struct spl_map_row make_map_row(const double position[3], double turn, uint32_t side, uint32_t levels,
-                                uint32_t range_side);
+/* `count` (up to make_maps_most) stations over the dataset, which keeps all tables, with maps of different sides. */
+struct make_maps make_maps(const struct spl_dataset *dataset, uint32_t count, uint32_t seed);
+void free_maps(struct make_maps *maps);
 
-/* From world to the station's frame. */
-void make_map_local(const struct spl_map_row *row, const double world[3], double local[3]);
+/* For struct spl_rewrite; the context is the struct make_maps. Maps must be asked for in their order. */
+int make_maps_get(void *context, uint32_t index, const uint32_t **words, struct spl_error *err);
 
-/* `from` with maps, as an open, verified dataset whose file is gone already. Each chunk has the stations that `seen`
- * (by chunk, of which there are as many as `from` has) says. */
-struct spl_dataset *make_mapped(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
-                                const struct spl_chunk_stations *seen);
-
-/* The same where every chunk is seen by the same stations, the first four: its own is one of them in turn, which trims
- * it where `trims`. */
-struct spl_dataset *make_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
-                                      bool trims);
+/* Writes `path`: `from` with these maps. */
+void make_mapped_file(const struct spl_dataset *from, struct make_maps *maps, const char *path);
 
 #endif

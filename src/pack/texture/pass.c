@@ -67,6 +67,7 @@ static int allocate(struct spl_photo_pass *pass, const struct spl_dataset *datas
 
 static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, struct spl_error *err)
 {
+    struct spl_photo_whole whole = {0};
     uint32_t usable = 0;
     int rc = SPL_OK;
     spl_stage_begin(pass->stage, "photographs", NULL, (uint64_t)pass->report->photographs * pass->splats.chunk_count);
@@ -74,7 +75,7 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
         const struct spl_named_view *view = &pass->list->views[i];
         struct spl_photo photo;
         struct spl_error why = {0};
-        if (!(rc = spl_photo_open(&photo, view, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, &why))) {
+        if (!(rc = spl_photo_open(&photo, view, &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, &why))) {
             uint64_t seen = spl_candidates_look(&pass->candidates, &pass->splats, &photo, (uint16_t)i, pass->stage);
             spl_photo_close(&photo);
             if (!seen && spl_photo_is_face(view))
@@ -89,6 +90,7 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
         if (!rc)
             rc = spl_stage_check(pass->stage, err);
     }
+    spl_photo_whole_finish(&whole);
     spl_stage_end(pass->stage);
     if (!rc && !usable)
         rc = spl_fail_field(err, SPL_E_INPUT, "images", "%s: no photograph shows a splat", pass->options->cameras);

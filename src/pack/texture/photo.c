@@ -10,7 +10,6 @@
 
 #include "base/memory.h"
 #include "geom/size.h"
-#include "pack/texture/photo_image.h"
 
 enum { black = 6, border_steps = 32 };
 static const double widest = 5; /* tangent of the angle off the axis to which depth is drawn */
@@ -110,7 +109,9 @@ static struct spl_camera find_depth_camera(const struct spl_named_view *view, ui
 uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side)
 {
     struct spl_camera depth = find_depth_camera(view, depth_side);
-    return (uint64_t)view->camera.width * view->camera.height * 4 * 4 / 3 + (uint64_t)depth.width * depth.height * 4;
+    uint64_t whole = spl_photo_is_face(view) ? (uint64_t)view->inner->width * view->inner->height * 4 : 0;
+    return whole + (uint64_t)view->camera.width * view->camera.height * 4 * 4 / 3 +
+           (uint64_t)depth.width * depth.height * 4;
 }
 
 static int render_depth(struct spl_photo *photo, struct spl_renderer *renderer, const struct spl_dataset *dataset,
@@ -147,14 +148,16 @@ static int render_depth(struct spl_photo *photo, struct spl_renderer *renderer, 
     return SPL_OK;
 }
 
-int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_renderer *renderer,
-                   const struct spl_dataset *dataset, uint32_t depth_side, struct spl_error *err)
+int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_photo_whole *whole,
+                   struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t depth_side,
+                   struct spl_error *err)
 {
     struct spl_image pixels = {0};
     struct spl_image_info info;
     *photo = (struct spl_photo){0};
     int rc = spl_photo_image_get_info(view, &info, err);
-    if (rc || (rc = spl_photo_image_load(view, &pixels, err)) || (rc = spl_photo_init(photo, view, &pixels, err)))
+    if (rc || (rc = spl_photo_image_load_of(whole, view, &pixels, err)) ||
+        (rc = spl_photo_init(photo, view, &pixels, err)))
         return rc;
     photo->depth_camera = find_depth_camera(view, depth_side);
     if ((rc = render_depth(photo, renderer, dataset, err)))

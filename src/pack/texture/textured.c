@@ -28,11 +28,14 @@ static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *da
 {
     const struct spl_texture_settings settings = spl_texture_settings_get(pass->options);
     struct spl_resample_error error[3] = {0};
+    struct spl_photo_whole whole = {0};
     struct spl_photo photo;
     uint32_t best = 0;
     for (uint32_t i = 0; i < pass->report->photographs; i++)
         best = pass->uses[i] > pass->uses[best] ? i : best;
-    int rc = spl_photo_open(&photo, &pass->list->views[best], pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, err);
+    int rc = spl_photo_open(&photo, &pass->list->views[best], &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE,
+                            err);
+    spl_photo_whole_finish(&whole);
     if (rc)
         return rc;
     uint32_t stride = (uint32_t)(pass->uses[best] / splats_compared + 1);
@@ -55,6 +58,7 @@ static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *da
 static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *dataset, struct spl_textures *textures,
                          struct spl_error *err)
 {
+    struct spl_photo_whole whole = {0};
     int rc = SPL_OK;
     spl_stage_begin(pass->stage, "resampling", NULL, (uint64_t)pass->report->photographs * pass->splats.chunk_count);
     for (uint32_t i = 0; !rc && i < pass->report->photographs; i++) {
@@ -63,7 +67,7 @@ static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *
             spl_stage_add(pass->stage, pass->splats.chunk_count, 0);
             continue;
         }
-        rc = spl_photo_open(&photo, &pass->list->views[i], pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, err);
+        rc = spl_photo_open(&photo, &pass->list->views[i], &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, err);
         if (rc)
             break;
         rc = spl_textures_take(textures, &pass->splats, &pass->candidates, &pass->chosen, pass->gains, &photo,
@@ -72,6 +76,7 @@ static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *
         if (!rc)
             rc = spl_stage_check(pass->stage, err);
     }
+    spl_photo_whole_finish(&whole);
     spl_stage_end(pass->stage);
     return rc ? rc : spl_textures_list(textures, pass->splats.count, err);
 }

@@ -56,6 +56,16 @@ static json_t *describe_textures(const struct spl_dataset_info *info)
     return json_pack("{s:i, s:i, s:o}", "size", (int)info->texture_size, "atoms", (int)info->atoms, "methods", methods);
 }
 
+static json_t *describe_maps(const struct spl_dataset_info *info)
+{
+    json_t *methods = json_array();
+    for (int i = 0; i < SPL_METHOD_COUNT; i++)
+        if (spl_method_get((enum spl_method)i)->params & SPL_PARAM_BIT(maps))
+            json_array_append_new(methods, json_string(spl_method_name((enum spl_method)i)));
+    return json_pack("{s:o, s:o, s:o, s:o}", "stations", count(info->maps), "texels", count(info->map_texels), "bytes",
+                     count(info->map_bytes), "methods", methods);
+}
+
 /* What picks give of a splat beside what every dataset has. */
 static json_t *describe_attributes(const struct spl_dataset_info *info)
 {
@@ -105,6 +115,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "attributes", describe_attributes(info));
     set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
+    set(json, "maps", info->maps ? describe_maps(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)
         if (spl_format_is_built((enum spl_format)i))

@@ -140,10 +140,12 @@ static int resolve_demand(const struct values *values, const struct spl_camera_l
     demand->keep_lod = given(values, PARAM_lod);
     demand->keep_supersample = given(values, PARAM_supersample);
     demand->keep_atoms = given(values, PARAM_atoms);
+    demand->keep_maps = given(values, PARAM_maps);
     demand->kept.method = out->view.method;
     demand->kept.lod = out->view.lod;
     demand->kept.supersample = out->view.supersample;
     demand->kept.atoms = out->view.disc.atoms;
+    demand->kept.maps = out->view.maps == SPL_MAPS_ON ? SPL_SETTING_MAPS_ON : SPL_SETTING_MAPS_OFF;
     return 0;
 }
 

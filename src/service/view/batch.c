@@ -174,7 +174,7 @@ static int begin(struct batch *batch, struct seat *seat, size_t i, struct spl_er
     const struct spl_view_request *view = &batch->views.views[i];
     struct spl_key key = {0};
     if (!view->planned) {
-        key = spl_key_make(view, batch->entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));
+        key = spl_key_make(view, batch->entry->info, spl_pipeline_get_renderer(service->views->pipeline));
         struct spl_rendering *rendering = spl_cache_find(service->views->cache, &key);
         if (rendering) {
             spl_count(service->counters, cache_hits);

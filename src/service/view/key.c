@@ -10,6 +10,8 @@
 
 #include <xxhash.h>
 
+#include "render/method.h"
+
 static uint64_t hash_program(void)
 {
     unsigned char block[1 << 16];
@@ -80,13 +82,14 @@ static void add_encoding(struct form *form, const struct spl_view_request *reque
     add_number(form, encode->format == SPL_FORMAT_PNG && distance ? encode->depth_scale : 0);
 }
 
-struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t version, uint64_t renderer)
+struct spl_key spl_key_make(const struct spl_view_request *request, const struct spl_dataset_info *dataset,
+                            uint64_t renderer)
 {
     const struct spl_view *view = &request->view;
     const uint8_t *b = view->background;
     uint32_t background = (uint32_t)b[0] << 24 | (uint32_t)b[1] << 16 | (uint32_t)b[2] << 8 | b[3];
     struct form form = {0};
-    add(&form, version);
+    add(&form, dataset->version);
     add(&form, renderer);
     add_camera(&form, &view->camera);
     add(&form, (uint64_t)view->method << 32 | view->layers);
@@ -95,7 +98,9 @@ struct spl_key spl_key_make(const struct spl_view_request *request, uint64_t ver
     bool colored = view->layers >> SPL_LAYER_COLOR & 1;
     uint32_t params = spl_method_get_params(view->method);
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {
-        bool counts = params >> i & 1 && (colored || spl_method_param_get(i)->changes == SPL_CHANGES_SHAPES);
+        const struct spl_method_param_info *param = spl_method_param_get(i);
+        bool counts = params >> i & 1 && spl_method_param_counts(param, dataset) &&
+                      (colored || param->changes != SPL_CHANGES_TEXTURES);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
     add(&form, colored ? background : 0);

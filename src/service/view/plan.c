@@ -67,20 +67,6 @@ void spl_plan_destroy(struct spl_plan *plan)
     free(plan);
 }
 
-static void set_supersample(struct spl_view *view, const struct spl_setting *setting)
-{
-    view->supersample = setting->supersample;
-}
-
-/* Can this renderer draw it at all? A profile may come from one that can do more. */
-static bool is_usable(const struct spl_setting *setting)
-{
-    struct spl_view view;
-    spl_view_init(&view);
-    set_supersample(&view, setting);
-    return view.supersample == setting->supersample;
-}
-
 /* What clients read: where the file lies is not their business. */
 static void hide_place(const struct spl_plan *plan, struct spl_error *err)
 {
@@ -106,7 +92,7 @@ static void read_profile(struct spl_plan *plan)
         spl_log_warn("profile ignored: %s", err.message);
     if (rc)
         hide_place(plan, &err);
-    if (!spl_planner_init(&planner, rc ? NULL : &profile, is_usable, &err)) {
+    if (!spl_planner_init(&planner, rc ? NULL : &profile, NULL, &err)) {
         spl_planner_finish(&plan->planner);
         plan->planner = planner;
     } else {
@@ -156,6 +142,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         read_profile(plan);
     struct spl_demand demand = request->demand;
     demand.keep_atoms &= plan->info->atoms > 0;
+    demand.keep_maps &= plan->info->maps > 0;
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
         demand.keep_method = true; /* not every method has normals of bare points */
         demand.kept.method = SPL_METHOD_DEFAULT;
@@ -168,10 +155,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     int rc = spl_planner_choose(&plan->planner, &demand, choice, err);
     if (rc)
         return rc;
-    request->view.method = choice->setting.method;
-    request->view.lod = choice->setting.lod;
-    request->view.disc.atoms = choice->setting.atoms;
-    set_supersample(&request->view, &choice->setting);
+    spl_setting_apply(&choice->setting, &request->view);
     *promised_ms = choice->ms + demand.extra_ms;
     return 0;
 }
@@ -179,12 +163,16 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
 void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
 {
     const struct spl_view *view = &request->view;
-    uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params & ~SPL_PARAM_BIT(atoms);
+    uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params;
+    params &= ~(SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps)); /* which are settings */
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (params >> i & 1 && spl_view_get_param(view, i) != spl_method_param_get(i)->otherwise)
             return; /* what it took says nothing of the settings that were measured */
     struct spl_setting setting = {view->method, view->lod, view->supersample,
-                                  plan->info->atoms ? view->disc.atoms : SPL_TEXTURE_ATOMS};
+                                  plan->info->atoms ? view->disc.atoms : SPL_TEXTURE_ATOMS,
+                                  !plan->info->maps           ? SPL_SETTING_NO_MAPS
+                                  : view->maps == SPL_MAPS_ON ? SPL_SETTING_MAPS_ON
+                                                              : SPL_SETTING_MAPS_OFF};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
     if (index >= 0)
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);

@@ -22,13 +22,16 @@ static void add_plan(struct spl_headers *headers, const struct spl_job *job)
         return;
     double took_ms = (double)(now - job->began_ns) / SPL_NS_PER_MS;
     bool late = took_ms > SPL_BUDGET_TOLERANCE * job->request.demand.budget_ms; // false without a budget
-    char psnr[32] = "", atoms[32] = "";
+    char psnr[32] = "", atoms[32] = "", maps[32] = "";
     if (isfinite(choice->psnr))
         snprintf(psnr, sizeof psnr, "; psnr=%.2f", choice->psnr);
     if (job->entry && job->entry->info->atoms)
         snprintf(atoms, sizeof atoms, "; atoms=%u", choice->setting.atoms);
-    spl_headers_add(headers, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g%s",
-                    spl_method_name(choice->setting.method), choice->setting.lod, choice->setting.supersample, atoms);
+    if (job->entry && job->entry->info->maps && spl_setting_has_maps(choice->setting.method))
+        snprintf(maps, sizeof maps, "; maps=%s", spl_maps_name(job->request.view.maps));
+    spl_headers_add(headers, "Splatd-Chosen", "method=%s; lod=%g; supersample=%g%s%s",
+                    spl_method_name(choice->setting.method), choice->setting.lod, choice->setting.supersample, atoms,
+                    maps);
     spl_headers_add(headers, "Splatd-Promised", "ms=%.2f%s", job->promised_ms, psnr);
     spl_headers_add(headers, "Splatd-Took", "ms=%.2f", took_ms);
     spl_headers_add(headers, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");

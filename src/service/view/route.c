@@ -75,7 +75,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     if (rc || spl_view_check_dataset(&view, entry->info, &err))
         goto refuse;
     if (!view.planned) {
-        key = spl_key_make(&view, entry->info->version, spl_pipeline_get_renderer(service->views->pipeline));
+        key = spl_key_make(&view, entry->info, spl_pipeline_get_renderer(service->views->pipeline));
         request->validated = call->method == SPL_GET;
         request->versioned = view.versioned;
         if (answer_at_once(request, &view, &key))

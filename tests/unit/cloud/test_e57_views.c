@@ -136,6 +136,26 @@ static void panoramas_are_cut_into_faces_around_their_pose(void **state)
     spl_view_list_finish(&list);
 }
 
+static void a_large_panorama_is_taken_and_a_larger_one_is_not(void **state)
+{
+    (void)state;
+    for (int larger = 0; larger < 2; larger++) {
+        struct e57_writer w;
+        struct spl_view_list list;
+        struct spl_error err = {0};
+        unsigned long long blob;
+        begin(&w, &blob);
+        e57_add_image(&w,
+                      "<name>s</name>%s<sphericalRepresentation><imageWidth>%d</imageWidth><imageHeight>8192"
+                      "</imageHeight><pixelWidth>%.17g</pixelWidth><pixelHeight>%.17g</pixelHeight>" JPEG
+                      "</sphericalRepresentation>",
+                      e57_pose(1, 0, 0, 0, 0, 0, 0), 16384 + larger, M_PI / 8193, M_PI / 8192, blob);
+        assert_int_equal(end(&w, &(struct spl_photograph_options){0}, &list, &err), larger ? SPL_E_INPUT : 0);
+        assert_int_equal(list.count, larger ? 0 : 6);
+        spl_view_list_finish(&list);
+    }
+}
+
 static void hands_out(const char *format, const char *pose, const char *part)
 {
     struct e57_writer w;
@@ -245,6 +265,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pinhole_looks_along_its_negative_z),
         cmocka_unit_test(panoramas_are_cut_into_faces_around_their_pose),
+        cmocka_unit_test(a_large_panorama_is_taken_and_a_larger_one_is_not),
         cmocka_unit_test(what_cannot_be_a_photograph_is_refused),
         cmocka_unit_test(images_are_listed),
         cmocka_unit_test(no_image_and_no_memory),

@@ -224,6 +224,32 @@ static void test_metres_beside_feet(void **state)
     assert_non_null(strstr(together, "bring all scans into one unit first"));
 }
 
+static void test_panoramas(void **state)
+{
+    char output[16384];
+    (void)state;
+    assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
+                     0);
+    json_t *json = json_of("yard/courtyard.ply"), *pack = json_object_get(json, "pack");
+    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0}]"));
+    assert_true(is(pack, "warnings", "[]"));
+    json_decref(json);
+    write_text("yard/panoramas/station-2.color.png", "");
+    assert_int_equal(run("info yard/courtyard.ply", output, sizeof output), 0);
+    assert_non_null(strstr(output, "\n  panoramas     3, for maps of stations: --panoramas yard/panoramas\n"));
+    assert_non_null(strstr(strstr(output, "\n  warnings"), "station-2"));
+    write_text("yard/second.ply", ply); /* two beside one folder */
+    assert_int_equal(run("info yard/courtyard.ply yard/second.ply", output, sizeof output), 0);
+    assert_non_null(strstr(strstr(output, "2 scans together"), "\n  panoramas     3, "));
+    assert_null(strstr(strstr(output, "\n  panoramas") + 1, "\n  panoramas"));
+    write_text("yard/panoramas/panoramas.json", "{\"panoramas\": 7}");
+    json = json_of("yard/second.ply");
+    pack = json_object_get(json, "pack");
+    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0}]"));
+    assert_int_equal(json_array_size(json_object_get(pack, "warnings")), 1);
+    json_decref(json);
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -243,7 +269,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_json),    cmocka_unit_test(test_headers_that_lie), cmocka_unit_test(test_several),
         cmocka_unit_test(test_options), cmocka_unit_test(test_images),
-        cmocka_unit_test(test_metres_beside_feet),
+        cmocka_unit_test(test_metres_beside_feet), cmocka_unit_test(test_panoramas),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

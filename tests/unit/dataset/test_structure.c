@@ -179,6 +179,10 @@ FORGE(points_few, json_object_set_new(p->meta, "points", json_integer(399)))
 FORGE(part_of_less, json_object_set_new(p->meta, "part_of", json_integer(400)))
 FORGE(part_of_text, json_object_set_new(p->meta, "part_of", json_string("all")))
 FORGE(points_text, json_object_set_new(p->meta, "points", json_string("400")))
+FORGE(pruned_right, json_object_set_new(p->meta, "pruned", json_pack("{s:i}", "of", 400)))
+FORGE(pruned_less, json_object_set_new(p->meta, "pruned", json_pack("{s:i}", "of", 399)))
+FORGE(pruned_more, json_object_set_new(p->meta, "pruned", json_pack("{s:i}", "of", 401)))
+FORGE(pruned_text, json_object_set_new(p->meta, "pruned", json_string("of")))
 FORGE(points_gone, json_object_del(p->meta, "points"))
 FORGE(radius_gone, json_object_del(p->meta, "splat_radius"))
 FORGE(bounds_turned, json_array_set_new(json_object_get(json_object_get(p->meta, "bounds"), "min"), 0, json_real(1e9)))
@@ -265,6 +269,10 @@ static const struct {
     {part_of_less, "section META: \"part_of\" is 400, and must be more than \"points\""},
     {part_of_text, "section META: \"part_of\" is \"all\", and must be a whole number"},
     {points_text, "section META: \"points\" is \"400\", and must be a whole number"},
+    {pruned_right, NULL},
+    {pruned_less, "section META: \"pruned.of\" is 399, and must be a whole number from \"leaf_splats\" to"},
+    {pruned_more, "section META: \"pruned.of\" is 401, and must be a whole number from \"leaf_splats\" to"},
+    {pruned_text, "section META: \"pruned.of\" is missing, and must be"},
     {points_gone, "section META: \"points\" is missing, and must be"},
     {radius_gone, "section META: \"splat_radius\" is missing, and must be"},
     {bounds_turned, "section META: \"bounds.min[0]\" is 1000000000.0, and must be at most that of"},

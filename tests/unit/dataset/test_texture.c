@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-#include <xxhash.h>
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
@@ -21,6 +20,7 @@
 #include "sparse/atom.h"
 #include "support/make_dataset.h"
 #include "support/make_textures.h"
+#include "support/spoil.h"
 
 static char folder[256], path[300];
 
@@ -424,61 +424,6 @@ static void test_rewrite(void **state)
     free(colors);
 }
 
-/* A file in memory. */
-struct file {
-    uint8_t *bytes;
-    size_t size;
-    struct spl_file_header *header;
-    struct spl_section *table;
-};
-
-static struct file load(void)
-{
-    FILE *from = fopen(path, "rb");
-    struct file f = {0};
-    assert_int_equal(fseek(from, 0, SEEK_END), 0);
-    f.size = (size_t)ftell(from);
-    rewind(from);
-    f.bytes = malloc(f.size);
-    assert_int_equal(fread(f.bytes, 1, f.size, from), f.size);
-    fclose(from);
-    f.header = (struct spl_file_header *)(void *)f.bytes;
-    f.table = (struct spl_section *)(void *)(f.bytes + f.header->table_offset);
-    return f;
-}
-
-static struct spl_section *find(const struct file *f, uint32_t type)
-{
-    for (uint32_t i = 0; i < f->header->section_count; i++)
-        if (f->table[i].type == type)
-            return &f->table[i];
-    fail();
-    return NULL;
-}
-
-static void store(const struct file *f, bool rehash)
-{
-    for (uint32_t i = 0; rehash && i < f->header->section_count; i++)
-        f->table[i].hash = XXH3_64bits(f->bytes + f->table[i].offset, f->table[i].bytes);
-    if (rehash) {
-        f->header->table_hash = XXH3_64bits(f->table, f->header->section_count * sizeof *f->table);
-        f->header->header_hash = XXH3_64bits(f->header, offsetof(struct spl_file_header, header_hash));
-    }
-    FILE *to = fopen(path, "wb");
-    assert_int_equal(fwrite(f->bytes, 1, f->size, to), f->size);
-    assert_int_equal(fclose(to), 0);
-}
-
-static void expect(const char *part)
-{
-    struct spl_dataset *dataset = NULL;
-    struct spl_error err = {0};
-    int rc = spl_dataset_open(path, true, &dataset, &err);
-    spl_dataset_close(dataset);
-    if (rc != SPL_E_CORRUPT || !strstr(err.message, part))
-        fail_msg("expected '%s', got %d '%s'", part, rc, err.message);
-}
-
 static void test_bad_files(void **state)
 {
     (void)state;
@@ -488,20 +433,20 @@ static void test_bad_files(void **state)
     const struct spl_dataset_info info = *spl_dataset_get_info(from);
     spl_dataset_close(from);
     spl_dictionary_finish(&dictionary);
-    struct file good = load();
+    struct spoil good = spoil_load(path);
     static const uint32_t types[] = {SPL_SECTION_ATOMS, SPL_SECTION_HEAD, SPL_SECTION_TEXTURES};
     static const char *const names[] = {"section ATOM fails its checksum", "section HEAD 0 fails its checksum",
                                         "section TEXP 0 fails its checksum"};
     for (int t = 0; t < 3; t++)
         for (uint32_t bit = 0; bit < 64; bit++) {
-            struct file f = load();
-            const struct spl_section *s = find(&f, types[t]);
+            struct spoil f = spoil_load(path);
+            const struct spl_section *s = spoil_find(&f, types[t]);
             uint64_t at = s->bytes * 8 * bit / 64 + bit % 8;
             f.bytes[s->offset + at / 8] ^= (uint8_t)(1u << at % 8);
-            store(&f, false);
-            expect(names[t]);
+            spoil_store(&f, path, false);
+            spoil_expect(path, names[t]);
             free(f.bytes);
-            store(&good, false);
+            spoil_store(&good, path, false);
         }
     const uint32_t words_in_head = (uint32_t)(info.nodes * SPL_NODE_BYTES + info.chunks * SPL_CHUNK_BYTES) / 4;
     const struct {
@@ -524,32 +469,32 @@ static void test_bad_files(void **state)
         {SPL_SECTION_TEXTURES, 0, 0xffffffff, "section TEXP 0: chunk 0 has indices"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        struct file f = load();
-        memcpy(f.bytes + find(&f, rows[i].type)->offset + 4 * rows[i].word, &rows[i].value, 4);
-        store(&f, true);
-        expect(rows[i].part);
+        struct spoil f = spoil_load(path);
+        memcpy(f.bytes + spoil_find(&f, rows[i].type)->offset + 4 * rows[i].word, &rows[i].value, 4);
+        spoil_store(&f, path, true);
+        spoil_expect(path, rows[i].part);
         free(f.bytes);
-        store(&good, false);
+        spoil_store(&good, path, false);
     }
     for (int t = 0; t < 3; t += 2) { /* one kind missing: its type becomes one that readers skip */
-        struct file f = load();
-        find(&f, types[t])->type = SPL_FOURCC('N', 'O', 'N', 'E');
-        store(&f, true);
-        expect("section table lists some of ATOM and a TEXP for each page, but not all");
+        struct spoil f = spoil_load(path);
+        spoil_find(&f, types[t])->type = SPL_FOURCC('N', 'O', 'N', 'E');
+        spoil_store(&f, path, true);
+        spoil_expect(path, "section table lists some of ATOM and a TEXP for each page, but not all");
         free(f.bytes);
-        store(&good, false);
+        spoil_store(&good, path, false);
     }
-    struct file f = load(); /* both missing: heads then have words too many */
-    find(&f, SPL_SECTION_ATOMS)->type = find(&f, SPL_SECTION_TEXTURES)->type = SPL_FOURCC('N', 'O', 'N', 'E');
-    store(&f, true);
-    expect("section PDIR: page 0 has another number of nodes or chunks");
-    store(&good, false);
+    struct spoil f = spoil_load(path); /* both missing: heads then have words too many */
+    spoil_find(&f, SPL_SECTION_ATOMS)->type = spoil_find(&f, SPL_SECTION_TEXTURES)->type = SPL_FOURCC('N', 'O', 'N', 'E');
+    spoil_store(&f, path, true);
+    spoil_expect(path, "section PDIR: page 0 has another number of nodes or chunks");
+    spoil_store(&good, path, false);
     free(f.bytes);
 
     /* Opened without a look at the pages: a bad code is found when it is read. */
-    f = load();
-    f.bytes[find(&f, SPL_SECTION_TEXTURES)->offset] |= 31;
-    store(&f, false);
+    f = spoil_load(path);
+    f.bytes[spoil_find(&f, SPL_SECTION_TEXTURES)->offset] |= 31;
+    spoil_store(&f, path, false);
     assert_int_equal(spl_dataset_open(path, false, &dataset, NULL), SPL_OK);
     uint32_t *words = malloc(spl_dataset_get_texture_bytes(dataset, 0));
     struct spl_error err = {0};
@@ -557,9 +502,9 @@ static void test_bad_files(void **state)
     assert_non_null(strstr(err.message, "section TEXP 0: chunk 0 has indices"));
     spl_dataset_close(dataset);
     /* Overwritten in place after it was verified: found as well. */
-    store(&good, false);
+    spoil_store(&good, path, false);
     assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
-    store(&f, false);
+    spoil_store(&f, path, false);
     err = (struct spl_error){0};
     assert_int_equal(spl_dataset_read_textures(dataset, 0, words, &err), SPL_E_CORRUPT);
     assert_non_null(strstr(err.message, "the textures of page 0 were overwritten"));

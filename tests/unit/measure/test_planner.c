@@ -344,6 +344,59 @@ static void test_atoms_that_nobody_measured(void **state)
     spl_profile_finish(&profile);
 }
 
+/* Splats at lod 1 with maps and without, at twice the lod with them. */
+static void test_maps_are_chosen_and_kept(void **state)
+{
+    (void)state;
+    struct spl_profile profile = make_profile(0);
+    struct spl_planner planner;
+    struct spl_error err = {0};
+    struct spl_choice choice;
+    profile.points[1].setting.maps = profile.points[3].setting.maps = SPL_SETTING_MAPS_ON;
+    profile.points[2].setting = profile.points[3].setting;
+    profile.points[2].setting.maps = SPL_SETTING_MAPS_OFF;
+    assert_int_equal(spl_planner_init(&planner, &profile, NULL, &err), 0);
+    struct spl_demand wanted = demand(NAN, 33);
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 3 && choice.setting.maps == SPL_SETTING_MAPS_ON);
+    wanted = demand(120, NAN);
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 2 && choice.setting.maps == SPL_SETTING_MAPS_OFF);
+    wanted = demand(1000, NAN);
+    wanted.keep_maps = true;
+    wanted.kept.maps = SPL_SETTING_MAPS_OFF;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 2 && choice.psnr == settings[2].psnr);
+    wanted.keep_atoms = true; /* maps are drawn in place of any textures: measured */
+    wanted.kept.atoms = 1;
+    wanted.kept.maps = SPL_SETTING_MAPS_ON;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 3 && choice.psnr == settings[3].psnr && choice.setting.maps == SPL_SETTING_MAPS_ON);
+    wanted.keep_atoms = false;
+    wanted.keep_lod = true; /* at lod 4 only maps were measured: their time, nothing of what it looks like */
+    wanted.kept.lod = 4;
+    wanted.kept.maps = SPL_SETTING_MAPS_OFF;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 1 && choice.setting.maps == SPL_SETTING_MAPS_OFF && isnan(choice.psnr));
+    struct spl_setting drawn = {SPL_METHOD_SPLAT, 1, 1, 0, SPL_SETTING_MAPS_OFF};
+    assert_int_equal(spl_planner_find(&planner, &drawn), 2);
+    drawn.lod = 4;
+    assert_int_equal(spl_planner_find(&planner, &drawn), -1);
+    struct spl_setting points = {SPL_METHOD_POINTS, 2, 1, 0, SPL_SETTING_MAPS_ON}; /* which take none */
+    assert_int_equal(spl_planner_find(&planner, &points), 0);
+    spl_planner_finish(&planner);
+    spl_profile_finish(&profile);
+    planner = make_planner(0); /* a profile that names no maps: of any of them */
+    drawn = (struct spl_setting){SPL_METHOD_SPLAT, 2, 1, 0, SPL_SETTING_MAPS_ON};
+    assert_int_equal(spl_planner_find(&planner, &drawn), 2);
+    wanted = demand(100, NAN);
+    wanted.keep_maps = true;
+    wanted.kept.maps = SPL_SETTING_MAPS_OFF;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.index == 2 && choice.setting.maps == SPL_SETTING_MAPS_OFF && isnan(choice.psnr));
+    spl_planner_finish(&planner);
+}
+
 static double normal(unsigned short seed[3])
 {
     return sqrt(-2 * log(1 - erand48(seed))) * cos(2 * 3.14159265358979 * erand48(seed));
@@ -486,6 +539,7 @@ int main(void)
         cmocka_unit_test(test_without_a_profile_nothing_is_promised),
         cmocka_unit_test(test_atoms_are_chosen_and_kept),
         cmocka_unit_test(test_atoms_that_nobody_measured),
+        cmocka_unit_test(test_maps_are_chosen_and_kept),
         cmocka_unit_test(test_a_slower_machine_is_learned_through_noise),
         cmocka_unit_test(test_layers_learn_apart),
         cmocka_unit_test(test_outliers_and_nonsense_are_bounded),

@@ -149,6 +149,9 @@ static void test_what_cannot_be_loaded_is_not_saved(void **state)
     "{\"method\": \"points\", \"lod\": 1, \"supersample\": 1, \"atoms\": 2, \"ms\": 8, \"ms_q90\": 9, \"fixed_ms\": "  \
     "1, "                                                                                                              \
     "\"ms_per_mpx\": 7}"
+#define MAPPED(maps, atoms)                                                                                            \
+    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"atoms\": " atoms ", \"maps\": \"" maps "\", \"ms\": 8, "     \
+    "\"ms_q90\": 9, \"fixed_ms\": 1, \"ms_per_mpx\": 7}"
 #define GOOD                                                                                                           \
     "{\"format\": \"splatd-profile\", \"format_version\": 1, \"splatd\": \"0.1.0\", \"dataset\": {\"id\": \"hall\", "  \
     "\"version\": \"0123456789abcdef\"}, \"device\": {\"backend\": \"egl\", \"name\": \"n\", \"driver\": \"d\", "      \
@@ -222,8 +225,12 @@ static void test_every_broken_field_is_named(void **state)
         {"\"future\": {}", "\"atoms\": -1", "atoms"},
         {"\"future\": {}", "\"atoms\": 2.5", "atoms"},
         {"\"future\": {}", "\"atoms\": null", "atoms"},
+        {"\"future\": {}", "\"maps\": \"both\"", "maps"},
+        {"\"future\": {}", "\"maps\": true", "maps"},
+        {"\"future\": {}", "\"maps\": \"\"", "maps"},
         {OTHER, TEXTURED ", " TEXTURED, "points"},
         {OTHER, OTHER ", " FEWER_OF_POINTS, "points"}, // which draw no textures
+        {OTHER, MAPPED("on", "8") ", " MAPPED("on", "2"), "points"}, // maps in place of textures
         {"\"ms\": 80", "\"ms\": 0", "ms"},
         {"\"ms\": 80", "\"ms\": -80", "ms"},
         {"\"ms\": 80", "\"ms\": null", "ms"},
@@ -248,6 +255,41 @@ static void test_every_broken_field_is_named(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         refuse(cases[i].find, cases[i].replace, cases[i].field);
+}
+
+/* With maps, without, and where there are none: other settings, which are written as they are read. */
+static void test_maps(void **state)
+{
+    (void)state;
+    static const char plain[] = "{\"format\": \"splatd-profile\"";
+    char text[4096];
+    struct spl_profile profile;
+    snprintf(text, sizeof text, "%.*s%s, %s, %s]}", (int)(strstr(GOOD, OTHER) - GOOD), GOOD, MAPPED("on", "8"),
+             MAPPED("off", "8"), MAPPED("off", "2"));
+    assert_int_equal(strncmp(text, plain, sizeof plain - 1), 0);
+    assert_int_equal(spl_profile_parse(text, strlen(text), "file", &profile, NULL), 0);
+    assert_true(profile.count == 4 && profile.points[0].setting.maps == SPL_SETTING_NO_MAPS);
+    assert_true(profile.points[1].setting.maps == SPL_SETTING_MAPS_ON);
+    assert_true(profile.points[3].setting.maps == SPL_SETTING_MAPS_OFF && profile.points[3].setting.atoms == 2);
+    json_t *json = spl_profile_to_json(&profile);
+    static const char *const names[] = {NULL, "on", "off", "off"};
+    for (size_t i = 0; i < 4; i++) {
+        const json_t *maps = json_object_get(json_array_get(json_object_get(json, "points"), i), "maps");
+        assert_int_equal(!maps, !names[i]);
+        if (maps)
+            assert_string_equal(json_string_value(maps), names[i]);
+    }
+    json_decref(json);
+    struct spl_view view;
+    spl_view_init(&view);
+    assert_int_equal(view.maps, SPL_MAPS_ON);
+    spl_setting_apply(&profile.points[3].setting, &view);
+    assert_true(view.maps == SPL_MAPS_OFF && view.disc.atoms == 2);
+    spl_setting_apply(&profile.points[0].setting, &view); /* says nothing of them */
+    assert_int_equal(view.maps, SPL_MAPS_OFF);
+    spl_setting_apply(&profile.points[1].setting, &view);
+    assert_int_equal(view.maps, SPL_MAPS_ON);
+    spl_profile_finish(&profile);
 }
 
 static void test_files_that_are_no_profiles(void **state)
@@ -317,6 +359,7 @@ int main(void)
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_what_cannot_be_loaded_is_not_saved),
         cmocka_unit_test(test_every_broken_field_is_named),
+        cmocka_unit_test(test_maps),
         cmocka_unit_test(test_files_that_are_no_profiles),
         cmocka_unit_test(test_where_a_profile_lies),
         cmocka_unit_test(test_front),

@@ -506,7 +506,19 @@ static void test_report(void **state)
     assert_int_equal(count_of(svg, "stroke-opacity"), 3); /* fewer atoms are paler: curve, legend, point */
     assert_non_null(strstr(svg, "splat atoms=2"));
     free(svg);
+    report.profile.points[0].setting = (struct spl_setting){SPL_METHOD_SPLAT, 4, 1, 8, SPL_SETTING_MAPS_ON};
+    assert_int_equal(spl_report_chart(&report.profile, 1, 22, &(struct spl_peers){peer, 3}, &svg, &length, NULL), 0);
+    assert_int_equal(count_of(svg, "<polyline"), 4);
+    assert_non_null(strstr(svg, ">splat + panorama<"));
+    assert_int_equal(count_of(svg, "class=\"curve s4\""), 2); /* after the methods' colours; peers then have the next */
+    assert_int_equal(count_of(svg, "class=\"curve s5\""), 2);
+    free(svg);
+    assert_int_equal(spl_report_to_csv(&report, &csv, &length, NULL), 0);
+    assert_non_null(strstr(csv, ",on\npoints,"));
+    free(csv);
     char name[64];
+    spl_report_setting_name(&report.profile.points[0].setting, name);
+    assert_string_equal(name, "splat lod=4 maps=on");
     spl_report_setting_name(&settings[0], name);
     assert_string_equal(name, "splat lod=1 atoms=2");
     spl_report_setting_name(&settings[1], name);

@@ -134,6 +134,71 @@ static void the_size_that_the_file_says_must_be_the_images(void **state)
     spl_view_list_finish(&list);
 }
 
+static void a_panorama_is_read_once_for_its_faces(void **state)
+{
+    struct spl_view_list list;
+    struct spl_photo_whole whole = {0};
+    (void)state;
+    load(1, width, &list);
+    for (size_t v = 0; v < list.count; v++) {
+        struct spl_image image, alone;
+        if (v == 1)
+            assert_int_equal(truncate(path, 0), 0); /* no face but the first needs the file */
+        assert_int_equal(spl_photo_image_load_of(&whole, &list.views[v], &image, NULL), 0);
+        assert_int_equal(spl_photo_image_load(&list.views[v], &alone, NULL), v ? SPL_E_INPUT : 0);
+        if (!v)
+            assert_memory_equal(image.pixels, alone.pixels, (size_t)image.width * image.height * 4);
+        spl_image_finish(&image);
+        spl_image_finish(&alone);
+    }
+    spl_photo_whole_finish(&whole);
+    spl_view_list_finish(&list);
+}
+
+/* White on the left and nothing, which is stored as black, on the right: between them is white, ever thinner. */
+static void what_a_panorama_does_not_show_lends_no_colour(void **state)
+{
+    static uint8_t texels[height][width][4];
+    struct spl_image image = {
+        .layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = width, .height = height, .pixels = texels};
+    const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
+    struct spl_inner_photograph inner = {.path = path, .is_panorama = true, .width = width, .height = height};
+    struct spl_named_view view = {.photograph = path, .inner = &inner};
+    struct spl_encoded png;
+    (void)state;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width / 2; x++)
+            memset(texels[y][x], 255, 4);
+    assert_int_equal(spl_image_encode(&image, &options, &png, NULL), 0);
+    FILE *out = fopen(path, "wb");
+    assert_non_null(out);
+    assert_int_equal(fwrite(png.bytes, 1, png.length, out), png.length);
+    fclose(out);
+    spl_encoded_finish(&png);
+    inner.panorama = (struct spl_panorama){.width = width,
+                                           .height = height,
+                                           .across = width / (2 * M_PI),
+                                           .down = height / M_PI,
+                                           .horizon = height / 2.0};
+    spl_panorama_face(0, inner.panorama.rotation);
+    view.camera = (struct spl_camera){.width = 200, .height = 200, .fx = 100, .fy = 100, .cx = 100, .cy = 100};
+    assert_int_equal(spl_photo_image_load(&view, &image, NULL), 0);
+    unsigned thin = 0;
+    for (size_t i = 0; i < 200 * 200; i++) {
+        const uint8_t *texel = (const uint8_t *)image.pixels + 4 * i;
+        thin += texel[3] > 0 && texel[3] < 255;
+        assert_true(!texel[3] || texel[0] == 255);
+    }
+    assert_true(thin > 200);
+    spl_image_finish(&image);
+    inner.height++;
+    struct spl_error err = {0};
+    assert_int_equal(spl_photo_image_load(&view, &image, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "width");
+    unlink(path);
+    assert_int_equal(spl_photo_image_load(&view, &image, NULL), SPL_E_NOT_FOUND);
+}
+
 static int remove_file(void **state)
 {
     (void)state;
@@ -147,6 +212,8 @@ int main(void)
         cmocka_unit_test(faces_have_the_panoramas_colours),
         cmocka_unit_test(a_quarter_of_a_panorama_ends_at_its_edges),
         cmocka_unit_test(the_size_that_the_file_says_must_be_the_images),
+        cmocka_unit_test(a_panorama_is_read_once_for_its_faces),
+        cmocka_unit_test(what_a_panorama_does_not_show_lends_no_colour),
     };
     snprintf(path, sizeof path, "/tmp/splatd-test-inner-%ld", (long)getpid());
     return cmocka_run_group_tests(tests, NULL, remove_file);

@@ -10,7 +10,8 @@
 
 #include "service/view/key.h"
 
-enum { version = 7, renderer = 9 };
+enum { renderer = 9 };
+static const struct spl_dataset_info plain = {.version = 7}, textured = {.version = 7, .atoms = 16, .maps = 4};
 
 static int stay(const struct spl_camera_places *places, uint32_t crs, const char *name, const double in[3],
                 double out[3], struct spl_error *err)
@@ -24,7 +25,7 @@ static int stay(const struct spl_camera_places *places, uint32_t crs, const char
     return 0;
 }
 
-static struct spl_key key_of(const char *query)
+static struct spl_key key_of(const struct spl_dataset_info *dataset, const char *query)
 {
     static const struct spl_camera_places places = {stay};
     static const struct spl_camera_defaults defaults = {.eye = {10, 0, 0},
@@ -45,7 +46,7 @@ static struct spl_key key_of(const char *query)
                     : spl_view_request_from_query(query, strlen(query), &defaults, &limits, &request, &err);
     if (rc)
         fail_msg("%s: %s", query, err.message);
-    return spl_key_make(&request, version, renderer);
+    return spl_key_make(&request, dataset, renderer);
 }
 
 static void what_means_the_same_has_one_key(void **state)
@@ -57,6 +58,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"", "eye=10,0,-0&target=0,0,0&up=0,0,2&fov=60&near=0.01&background=%23000000"},
         {"", "v=0123456789abcdef"},
         {"", "chroma=420"},
+        {"", "maps=on"},
         {"width=320", "width=320&height=180"},
         {"height=180", "{\"width\":320,\"height\":180}"},
         {"width=1280", ""},
@@ -82,7 +84,25 @@ static void what_means_the_same_has_one_key(void **state)
          "{\"camera\":{\"matrix\":[0,0,-1,5,1,0,0,0,0,-1,0,0,0,0,0,1],\"convention\":\"opencv\",\"fx\":50}}"},
     };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        struct spl_key a = key_of(pairs[i][0]), b = key_of(pairs[i][1]);
+        struct spl_key a = key_of(&textured, pairs[i][0]), b = key_of(&textured, pairs[i][1]);
+        if (!spl_key_equal(&a, &b))
+            fail_msg("'%s' and '%s' differ", pairs[i][0], pairs[i][1]);
+    }
+}
+
+static void what_a_dataset_lacks_is_left_out(void **state)
+{
+    (void)state;
+    static const char *const pairs[][2] = {
+        {"", "atoms=0"},
+        {"", "{\"atoms\": 5}"},
+        {"layers=color,depth", "layers=color,depth&atoms=3"},
+        {"", "maps=off"},
+        {"layer=depth", "layer=depth&maps=off"},
+        {"@x=1&y=1", "@x=1&y=1&maps=off"},
+    };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        struct spl_key a = key_of(&plain, pairs[i][0]), b = key_of(&plain, pairs[i][1]);
         if (!spl_key_equal(&a, &b))
             fail_msg("'%s' and '%s' differ", pairs[i][0], pairs[i][1]);
     }
@@ -123,6 +143,9 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
         "layer=coverage",
         "supersample=2",
         "atoms=0",
+        "maps=off",
+        "layer=depth&maps=off", /* silhouettes, too */
+        "@x=640&y=360&maps=off",
         "supersample=0.5",
         "margin=0",
         "margin=1.5",
@@ -159,7 +182,7 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
     enum { count = sizeof queries / sizeof *queries };
     struct spl_key keys[count];
     for (size_t i = 0; i < count; i++) {
-        keys[i] = key_of(queries[i]);
+        keys[i] = key_of(&textured, queries[i]);
         for (size_t j = 0; j < i; j++)
             if (spl_key_equal(&keys[i], &keys[j]))
                 fail_msg("'%s' and '%s' share a key", queries[i], queries[j]);
@@ -171,11 +194,13 @@ static void version_and_renderer_are_part_of_it(void **state)
     (void)state;
     struct spl_view_request request = {.encode.quality = 90};
     spl_view_init(&request.view);
-    struct spl_key key = spl_key_make(&request, 1, 1), other = spl_key_make(&request, 2, 1);
+    struct spl_dataset_info newer = plain;
+    newer.version++;
+    struct spl_key key = spl_key_make(&request, &plain, 1), other = spl_key_make(&request, &newer, 1);
     assert_false(spl_key_equal(&key, &other));
-    other = spl_key_make(&request, 1, 2);
+    other = spl_key_make(&request, &plain, 2);
     assert_false(spl_key_equal(&key, &other));
-    other = spl_key_make(&request, 1, 1);
+    other = spl_key_make(&request, &plain, 1);
     assert_true(spl_key_equal(&key, &other));
 
     struct spl_device_info a = {.backend = "vulkan", .name = "one", .driver = "1.0"}, b = a;
@@ -235,6 +260,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_means_the_same_has_one_key),
+        cmocka_unit_test(what_a_dataset_lacks_is_left_out),
         cmocka_unit_test(what_changes_a_byte_has_a_key_of_its_own),
         cmocka_unit_test(version_and_renderer_are_part_of_it),
         cmocka_unit_test(if_none_match_is_read_as_the_standard_says),

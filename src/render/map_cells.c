@@ -1,5 +1,5 @@
 /* Cells by station; see stations.h. A bit a cell, of stations that a tile meets. */
-#include "render/stations.h"
+#include "render/map_cells.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,9 +11,9 @@
  * and the whole image, whose doubles differ in the last place, do not fall on two sides of a cell's edge. */
 static const double around = 2.37;
 
-int spl_stations_init(struct spl_stations *stations, const struct spl_select_params *params, struct spl_error *err)
+int spl_map_cells_init(struct spl_map_cells *stations, const struct spl_select_params *params, struct spl_error *err)
 {
-    *stations = (struct spl_stations){.params = params};
+    *stations = (struct spl_map_cells){.params = params};
     uint32_t count = spl_dataset_get_info(params->dataset)->maps;
     if (!params->maps || !count)
         return SPL_OK;
@@ -27,20 +27,20 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_select_par
     stations->cells = spl_alloc(count, sizeof *stations->cells, err);
     if (stations->answers && stations->cells)
         return SPL_OK;
-    spl_stations_finish(stations);
+    spl_map_cells_finish(stations);
     return SPL_E_NOMEM;
 }
 
-void spl_stations_finish(struct spl_stations *stations)
+void spl_map_cells_finish(struct spl_map_cells *stations)
 {
     for (uint32_t i = 0; i < stations->count && stations->cells; i++)
         free(stations->cells[i]);
     free(stations->cells);
     free(stations->answers);
-    *stations = (struct spl_stations){0};
+    *stations = (struct spl_map_cells){0};
 }
 
-static bool has_map(struct spl_stations *stations, uint32_t station)
+static bool has_map(struct spl_map_cells *stations, uint32_t station)
 {
     uint8_t *answer = &stations->answers[station];
     if (!*answer)
@@ -48,13 +48,13 @@ static bool has_map(struct spl_stations *stations, uint32_t station)
     return *answer == 1 + SPL_SELECT_YES;
 }
 
-static uint64_t row_words(const struct spl_stations *stations)
+static uint64_t row_words(const struct spl_map_cells *stations)
 {
     return (stations->size[0] + 63) / 64;
 }
 
 /* The cells [first, end) that what lies in front of the near plane of the box can project to. */
-static void find_cells(const struct spl_stations *stations, const struct spl_view_box *box, uint32_t first[2],
+static void find_cells(const struct spl_map_cells *stations, const struct spl_view_box *box, uint32_t first[2],
                        uint32_t end[2])
 {
     const struct spl_camera *camera = stations->params->camera;
@@ -70,7 +70,7 @@ static void find_cells(const struct spl_stations *stations, const struct spl_vie
     }
 }
 
-static int mark(struct spl_stations *stations, uint32_t station, const uint32_t first[2], const uint32_t end[2],
+static int mark(struct spl_map_cells *stations, uint32_t station, const uint32_t first[2], const uint32_t end[2],
                 struct spl_error *err)
 {
     uint64_t words = row_words(stations), **cells = &stations->cells[station];
@@ -86,7 +86,7 @@ static int mark(struct spl_stations *stations, uint32_t station, const uint32_t 
     return SPL_OK;
 }
 
-int spl_stations_add(struct spl_stations *stations, const struct spl_chunk_stations *seen,
+int spl_map_cells_add(struct spl_map_cells *stations, const struct spl_chunk_stations *seen,
                      const struct spl_view_box *box, struct spl_draw_list *list, struct spl_error *err)
 {
     const struct spl_select_params *params = stations->params;
@@ -110,7 +110,7 @@ int spl_stations_add(struct spl_stations *stations, const struct spl_chunk_stati
     return trims;
 }
 
-int spl_stations_lay_out(const struct spl_stations *stations, struct spl_draw_list *list, struct spl_error *err)
+int spl_map_cells_lay_out(const struct spl_map_cells *stations, struct spl_draw_list *list, struct spl_error *err)
 {
     uint64_t words = row_words(stations);
     int rc = SPL_OK;

@@ -1,0 +1,213 @@
+/* Which stations see a chunk, and whether its own trims it. A chunk's own station is that of most of its splats: the
+ * first; the next three are those that see its splats best, by cosine over distance. It trims where a disc, drawn up to
+ * twice as large as levels are scaled, reaches a place that is dropped; but not where that is the place of a splat that
+ * another station saw: what stood there was gone when the own one looked.
+ *
+ * Each chunk is one thread's, so threads change nothing. */
+#include "pack/maps/sees.h"
+
+#include <math.h>
+
+#include "base/parallel.h"
+#include "geom/polar.h"
+#include "geom/tangent.h"
+
+enum { asked = 16, rim = 8 };
+static const double steepest = 5.67, grown = 2; /* tangent of 80 degrees; how much levels' discs are scaled at most */
+
+double spl_map_tolerance(const struct spl_map_row *row, double range, double radius, double cosine)
+{
+    double slant = cosine > 0 ? fmin(sqrt(fmax(1 - cosine * cosine, 0)) / cosine, steepest) : steepest;
+    return (double)row->slack + 0.35 * radius + range * spl_polar_texel(row->range_side) * slant;
+}
+
+/* The codes around a point; its range. */
+static double find_codes(const struct spl_map_sight *map, const double own[3], uint16_t codes[4])
+{
+    double place[2];
+    uint32_t side = map->row->range_side, width = spl_polar_width(side, SPL_MAP_RANGE_APRON);
+    spl_polar_place(side, SPL_MAP_RANGE_APRON, own, place);
+    size_t at = (size_t)floor(place[1] - 0.5) * width + (size_t)floor(place[0] - 0.5);
+    for (size_t k = 0; k < 4; k++)
+        codes[k] = spl_map_get_code(map->codes, at + k % 2 + k / 2 * width);
+    return sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+}
+
+static double code_of(const struct spl_map_row *row, double range)
+{
+    return 1 + (1 - (double)row->near / fmax(range, (double)row->near)) * (SPL_MAP_FARTHEST - 1);
+}
+
+bool spl_map_drops(const struct spl_map_sight *map, const double own[3], double radius, double cosine)
+{
+    uint16_t codes[4];
+    double range = find_codes(map, own, codes);
+    double most = code_of(map->row, range + spl_map_tolerance(map->row, range, radius, cosine));
+    for (int k = 0; k < 4; k++)
+        if (codes[k] == SPL_MAP_UNKNOWN || codes[k] <= most)
+            return false;
+    return true;
+}
+
+double spl_map_shows(const struct spl_map_sight *map, const double own[3], double radius, double cosine)
+{
+    uint16_t codes[4];
+    double range = find_codes(map, own, codes), tolerance = spl_map_tolerance(map->row, range, radius, cosine);
+    double low = code_of(map->row, range - tolerance), high = code_of(map->row, range + tolerance), share = 0;
+    for (int k = 0; k < 4; k++)
+        if (codes[k] != SPL_MAP_UNKNOWN && codes[k] != SPL_MAP_NO_RETURN)
+            share += 0.25 * (codes[k] >= floor(low) && codes[k] <= ceil(high));
+    return share;
+}
+
+struct pass {
+    const struct spl_splats *splats;
+    const struct spl_stations *stations;
+    const uint16_t *row_of;
+    const struct spl_map_sight *maps;
+    uint32_t count;
+    struct spl_stage *stage;
+    struct spl_chunk_stations *out;
+};
+
+static double cosine_of(const struct spl_station *station, const struct spl_world_splat *s, double *range)
+{
+    double along = 0, square = 0;
+    for (int i = 0; i < 3; i++) {
+        double from = s->position[i] - station->position[i];
+        along += from * (double)s->splat.normal[i];
+        square += from * from;
+    }
+    *range = sqrt(square);
+    return square > 0 ? fmin(fabs(along) / *range, 1) : 0;
+}
+
+/* The row + 1 of the station that most of a chunk's splats have, by votes that pair off and are then counted; 0. */
+static uint16_t find_own(const struct pass *p, const uint16_t *of, uint32_t count)
+{
+    uint16_t own = 0;
+    uint32_t most = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        uint16_t row = of[i] == SPL_NOT_A_STATION ? 0 : p->row_of[of[i]];
+        uint32_t votes = 0;
+        if (!row || row == own)
+            continue;
+        for (uint32_t k = 0; k < count; k++)
+            votes += of[k] == of[i];
+        if (votes > most || (votes == most && row < own)) {
+            most = votes;
+            own = row;
+        }
+    }
+    return own;
+}
+
+static bool reaches_through(const struct spl_map_sight *map, const struct spl_station *station,
+                            const struct spl_world_splat *s, double cosine)
+{
+    float u[3], v[3];
+    spl_tangent_frame(s->splat.normal, u, v);
+    for (int k = 0; k < 2 * rim; k++) {
+        double radius = (double)s->splat.radius * (k < rim ? 1 : grown), angle = 2 * M_PI * k / rim, p[3], own[3];
+        for (int i = 0; i < 3; i++)
+            p[i] = s->position[i] + radius * (cos(angle) * (double)u[i] + sin(angle) * (double)v[i]);
+        spl_station_to_own(station, p, own);
+        if (spl_map_drops(map, own, (double)s->splat.radius, cosine))
+            return true;
+    }
+    return false;
+}
+
+static bool find_trims(const struct spl_station *station, uint32_t station_index, const struct spl_map_sight *map,
+                       const struct spl_world_splat *list, const uint16_t *of, uint32_t count)
+{
+    uint32_t gone = 0;
+    bool trims = false;
+    double range, own[3];
+    for (uint32_t i = 0; i < count; i++) {
+        double cosine = cosine_of(station, &list[i], &range);
+        if (!trims)
+            trims = reaches_through(map, station, &list[i], cosine);
+        if (of[i] == station_index)
+            continue;
+        spl_station_to_own(station, list[i].position, own);
+        gone += spl_map_drops(map, own, (double)list[i].splat.radius, cosine);
+    }
+    return trims && 20 * gone <= count;
+}
+
+/* Keeps the best, of equal ones the first. */
+static void keep_best(double score, uint16_t row, double best[SPL_CHUNK_STATIONS], uint16_t rows[SPL_CHUNK_STATIONS])
+{
+    for (int k = 0; k < SPL_CHUNK_STATIONS; k++)
+        if (score > best[k]) {
+            double old = best[k];
+            uint16_t old_row = rows[k];
+            best[k] = score;
+            rows[k] = row;
+            score = old;
+            row = old_row;
+        }
+}
+
+static void judge_chunk(const struct pass *p, uint32_t c)
+{
+    struct spl_world_splat list[SPL_CHUNK_SPLATS];
+    struct spl_chunk_stations *out = &p->out[c];
+    const uint16_t *of = p->stations->of + p->splats->chunks[c].first_id;
+    uint32_t count = spl_splats_get(p->splats, c, list), step = (count + asked - 1) / asked, used = 0;
+    bool discs = spl_splats_is_discs(p->splats, c);
+    uint16_t own = discs ? find_own(p, of, count) : 0, rows[SPL_CHUNK_STATIONS] = {0};
+    double best[SPL_CHUNK_STATIONS] = {0}, extent = 0;
+    const int last = SPL_CHUNK_STATIONS - 1;
+    *out = (struct spl_chunk_stations){0};
+    for (uint32_t i = 0; i < count; i++)
+        extent = fmax(extent, hypot(hypot(list[i].position[0] - list[0].position[0],
+                                          list[i].position[1] - list[0].position[1]),
+                                    list[i].position[2] - list[0].position[2]));
+    for (uint32_t s = 0; s < p->stations->count; s++) {
+        const struct spl_station *station = &p->stations->list[s];
+        uint16_t row = p->row_of[s];
+        double score = 0, range, at[3];
+        if (!row)
+            continue;
+        if (row == own) {
+            bool trims = find_trims(station, s, &p->maps[row - 1], list, of, count);
+            out->seen_by[used++] = (uint16_t)(own | (trims ? SPL_STATION_TRIMS : 0));
+            continue;
+        }
+        cosine_of(station, &list[0], &range);
+        if ((double)((count + step - 1) / step) <= best[last] * (range - extent))
+            continue; /* too far away, however squarely it is seen */
+        for (uint32_t i = 0; i < count; i += step) {
+            double cosine = cosine_of(station, &list[i], &range);
+            if (!(range > 0))
+                continue;
+            spl_station_to_own(station, list[i].position, at);
+            score += cosine / range * spl_map_shows(&p->maps[row - 1], at, (double)list[i].splat.radius, cosine);
+        }
+        keep_best(score, row, best, rows);
+    }
+    for (int k = 0; k < SPL_CHUNK_STATIONS && rows[k] && used < SPL_CHUNK_STATIONS; k++)
+        out->seen_by[used++] = rows[k];
+}
+
+static void judge_chunks(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct pass *p = context;
+    for (uint32_t c = (uint32_t)begin; c < end; c++) {
+        judge_chunk(p, c);
+        spl_stage_add(p->stage, 1, worker);
+    }
+}
+
+int spl_map_find_chunks(const struct spl_splats *splats, const struct spl_stations *stations, const uint16_t *row_of,
+                        const struct spl_map_sight *maps, uint32_t count, struct spl_stage *stage,
+                        struct spl_chunk_stations *out, struct spl_error *err)
+{
+    struct pass p = {splats, stations, row_of, maps, count, stage, out};
+    spl_stage_begin(stage, "stations of chunks", NULL, splats->chunk_count);
+    spl_parallel_for(stage->threads, splats->chunk_count, 8, judge_chunks, &p);
+    spl_stage_end(stage);
+    return spl_stage_check(stage, err);
+}

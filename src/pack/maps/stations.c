@@ -1,0 +1,268 @@
+/* Stations and their splats. Whose a splat is the stream "scan" says, by numbers that are META's stations in their
+ * order. Where nobody says it, splats belong to the station that sees them best: largest cosine over distance among
+ * those whose z-buffer (sight.h) shows them. The caller's thread; loops over chunks are parallel, and each writes
+ * what belongs to its own splats, so that threads change nothing. */
+#include "pack/maps/stations.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/array.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "dataset/map.h"
+#include "geom/unit.h"
+#include "pack/maps/sight.h"
+
+static const double tripod_m = 0.5, hair_m = 1e-3;
+
+struct pass {
+    const struct spl_splats *splats;
+    struct spl_stations *stations;
+    struct spl_stage *stage;
+    const struct spl_stream *scan;
+    uint32_t scan_index;
+    const struct spl_sight *sight; /* of the station that is asked */
+    uint32_t station;
+    float *best; /* by splat id: cosine over distance */
+};
+
+void spl_station_turn(const struct spl_station *station, const double world[3], double own[3])
+{
+    for (int i = 0; i < 3; i++)
+        own[i] = station->rotation[i] * world[0] + station->rotation[3 + i] * world[1] +
+                 station->rotation[6 + i] * world[2];
+}
+
+void spl_station_to_own(const struct spl_station *station, const double world[3], double own[3])
+{
+    const double from[3] = {world[0] - station->position[0], world[1] - station->position[1],
+                            world[2] - station->position[2]};
+    spl_station_turn(station, from, own);
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+static int add(struct spl_stations *stations, size_t *capacity, const double position[3], const double rotation[9],
+               struct spl_error *err)
+{
+    static const double upright[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    if (stations->count == SPL_MAPS_MAX)
+        return spl_fail(err, SPL_E_LIMIT, "more than %u stations; a dataset has maps of no more", SPL_MAPS_MAX);
+    if (spl_array_reserve(stations->list, *capacity, stations->count + 1u, err))
+        return SPL_E_NOMEM;
+    struct spl_station *station = &stations->list[stations->count++];
+    memcpy(station->position, position, sizeof station->position);
+    memcpy(station->rotation, rotation ? rotation : upright, sizeof station->rotation);
+    return SPL_OK;
+}
+
+/* The nearest rotation to three axes that are about orthonormal: rows of a matrix in text have six digits at times. */
+static bool straighten(double r[9])
+{
+    for (int round = 0; round < 8; round++) { /* R (3 - R^T R) / 2 */
+        double gram[9], next[9];
+        for (int i = 0; i < 9; i++)
+            gram[i] = r[i / 3] * r[i % 3] + r[3 + i / 3] * r[3 + i % 3] + r[6 + i / 3] * r[6 + i % 3];
+        for (int i = 0; i < 9; i++) {
+            next[i] = 1.5 * r[i];
+            for (int k = 0; k < 3; k++)
+                next[i] -= 0.5 * r[i / 3 * 3 + k] * gram[3 * k + i % 3];
+        }
+        memcpy(r, next, sizeof next);
+    }
+    double det = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                 r[2] * (r[3] * r[7] - r[4] * r[6]);
+    return fabs(det - 1) < 1e-9;
+}
+
+/* META's stations, 4 x 4 by rows. One that is mirrored or bent keeps its place and stands upright. */
+static int take_scanned(struct spl_stations *stations, const json_t *list, struct spl_error *err)
+{
+    size_t capacity = 0;
+    int rc = SPL_OK;
+    for (size_t i = 0; !rc && i < json_array_size(list); i++) {
+        double m[16], rotation[9], position[3];
+        bool finite = true;
+        for (size_t k = 0; k < 16; k++) {
+            m[k] = json_number_value(json_array_get(json_array_get(list, i), k));
+            finite &= isfinite(m[k]) != 0;
+        }
+        for (int k = 0; k < 9; k++)
+            rotation[k] = m[k / 3 * 4 + k % 3];
+        for (int k = 0; k < 3; k++)
+            position[k] = m[4 * k + 3];
+        if (!finite)
+            rc = spl_fail(err, SPL_E_INPUT, "station %zu has a pose that is no number", i + 1);
+        else
+            rc = add(stations, &capacity, position, straighten(rotation) ? rotation : NULL, err);
+    }
+    return rc;
+}
+
+/* The axes of the panorama that a view is a face of: z up, as its scanner's are. */
+static bool find_axes(const struct spl_named_view *view, double rotation[9])
+{
+    if (!view->inner || !view->inner->is_panorama)
+        return false;
+    const double *face = view->inner->panorama.rotation, *camera = view->camera.rotation;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) { /* world to panorama is face * camera; the station's is its transpose */
+            rotation[3 * j + i] = 0;
+            for (int k = 0; k < 3; k++)
+                rotation[3 * j + i] += face[3 * i + k] * camera[3 * k + j];
+        }
+    return straighten(rotation);
+}
+
+static int take_eyes(struct spl_stations *stations, const struct spl_view_list *views, double metre,
+                     struct spl_error *err)
+{
+    size_t capacity = 0;
+    int rc = SPL_OK;
+    for (size_t v = 0; !rc && v < views->count; v++) {
+        double rotation[9];
+        bool panorama = find_axes(&views->views[v], rotation), known = false;
+        for (uint32_t s = stations->count; s-- && !known;)
+            known = distance(stations->list[s].position, views->views[v].camera.eye) <=
+                    (panorama ? hair_m : tripod_m) * metre;
+        if (!known)
+            rc = add(stations, &capacity, views->views[v].camera.eye, panorama ? rotation : NULL, err);
+    }
+    return rc;
+}
+
+static int place_views(struct pass *p, const struct spl_view_list *views, double metre,
+                       void (*nowhere)(void *context, const struct spl_named_view *view, double metres), void *context,
+                       struct spl_error *err)
+{
+    struct spl_stations *stations = p->stations;
+    if (!(stations->of_view = spl_alloc_raw(views->count, sizeof *stations->of_view, err)))
+        return SPL_E_NOMEM;
+    for (size_t v = 0; v < views->count; v++) {
+        double nearest = INFINITY;
+        for (uint32_t s = 0; s < stations->count; s++) {
+            double far = distance(stations->list[s].position, views->views[v].camera.eye);
+            if (far < nearest) {
+                nearest = far;
+                stations->of_view[v] = s;
+            }
+        }
+        if (nearest <= tripod_m * metre)
+            continue;
+        stations->of_view[v] = UINT32_MAX;
+        if (nowhere)
+            nowhere(context, &views->views[v], nearest);
+    }
+    return SPL_OK;
+}
+
+static void read_scans(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct pass *p = context;
+    const struct spl_splats *splats = p->splats;
+    (void)worker;
+    for (uint32_t c = (uint32_t)begin; c < end; c++) {
+        const struct spl_chunk *chunk = &splats->chunks[c];
+        uint16_t *of = p->stations->of + chunk->first_id;
+        size_t bytes;
+        const uint32_t *words = spl_dataset_get_page(splats->dataset, splats->nodes[splats->node_of[c]].page, &bytes);
+        for (uint32_t i = 0; i < chunk->count; i++)
+            of[i] = p->scan ? SPL_NOT_A_STATION : 0;
+        if (!p->scan || !spl_splats_is_discs(splats, c))
+            continue;
+        words += chunk->geometry_word + spl_chunk_words(chunk) +
+                 spl_dataset_get_stream_words(splats->dataset, p->scan_index, c);
+        for (uint32_t i = 0; i < chunk->count; i++) {
+            double scan =
+                spl_stream_decode(p->scan, (struct spl_stream_code){p->scan->base[c], p->scan->width[c]}, words, i);
+            if (scan >= 0 && scan < p->stations->count)
+                of[i] = (uint16_t)scan;
+        }
+    }
+}
+
+static void judge_sight(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct pass *p = context;
+    struct spl_world_splat splats[SPL_CHUNK_SPLATS];
+    for (uint32_t c = (uint32_t)begin; c < end; c++) {
+        uint64_t id = p->splats->chunks[c].first_id;
+        uint32_t count = spl_splats_is_discs(p->splats, c) ? spl_splats_get(p->splats, c, splats) : 0;
+        for (uint32_t i = 0; i < count; i++, id++) {
+            double cosine, range;
+            if (!spl_sight_sees(p->sight, &splats[i], &cosine, &range) || (float)(cosine / range) <= p->best[id])
+                continue;
+            p->best[id] = (float)(cosine / range);
+            p->stations->of[id] = (uint16_t)p->station;
+        }
+        spl_stage_add(p->stage, 1, worker);
+    }
+}
+
+static int judge_all(struct pass *p, struct spl_error *err)
+{
+    struct spl_stations *stations = p->stations;
+    int rc = (p->best = spl_alloc(p->splats->count, sizeof *p->best, err)) ? SPL_OK : SPL_E_NOMEM;
+    if (!rc)
+        memset(stations->of, 0xff, p->splats->count * sizeof *stations->of);
+    spl_stage_begin(p->stage, "stations", NULL, (uint64_t)stations->count * p->splats->chunk_count);
+    for (p->station = 0; !rc && p->station < stations->count; p->station++) {
+        struct spl_sight sight;
+        if ((rc = spl_sight_init(&sight, &stations->list[p->station], p->splats, p->stage->threads, err)))
+            break;
+        p->sight = &sight;
+        spl_parallel_for(p->stage->threads, p->splats->chunk_count, 16, judge_sight, p);
+        spl_sight_finish(&sight);
+        rc = spl_stage_check(p->stage, err);
+    }
+    spl_stage_end(p->stage);
+    free(p->best);
+    return rc;
+}
+
+int spl_stations_init(struct spl_stations *stations, const struct spl_splats *splats, const struct spl_view_list *views,
+                      struct spl_stage *stage,
+                      void (*nowhere)(void *context, const struct spl_named_view *view, double metres), void *context,
+                      struct spl_error *err)
+{
+    struct pass p = {.splats = splats, .stations = stations, .stage = stage};
+    const struct spl_dataset_info *info = spl_dataset_get_info(splats->dataset);
+    const json_t *known = json_object_get(spl_dataset_get_meta(splats->dataset), "stations");
+    int scan = spl_dataset_find_stream(splats->dataset, "scan"), rc;
+    double unit_m, metre = spl_unit_parse(info->unit, &unit_m) && unit_m > 0 ? 1 / unit_m : 1;
+    uint32_t streams;
+    *stations = (struct spl_stations){.scanned = json_array_size(known) == 1 || (json_array_size(known) && scan >= 0)};
+    if (stations->scanned && scan >= 0) {
+        p.scan = spl_dataset_get_streams(splats->dataset, &streams) + scan;
+        p.scan_index = (uint32_t)scan;
+    }
+    rc = json_array_size(known) ? take_scanned(stations, known, err) : take_eyes(stations, views, metre, err);
+    if (!rc && !stations->count)
+        rc = spl_fail_field(err, SPL_E_INPUT, "panoramas",
+                            "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
+                            "is no panorama; name one by --panoramas");
+    if (!rc)
+        rc = place_views(&p, views, metre, nowhere, context, err);
+    if (!rc && !(stations->of = spl_alloc_raw(splats->count, sizeof *stations->of, err)))
+        rc = SPL_E_NOMEM;
+    if (!rc && stations->scanned)
+        spl_parallel_for(stage->threads, splats->chunk_count, 64, read_scans, &p);
+    else if (!rc)
+        rc = judge_all(&p, err);
+    if (rc)
+        spl_stations_finish(stations);
+    return rc;
+}
+
+void spl_stations_finish(struct spl_stations *stations)
+{
+    free(stations->list);
+    free(stations->of);
+    free(stations->of_view);
+    *stations = (struct spl_stations){0};
+}

@@ -1,0 +1,138 @@
+/* splatd info of datasets with maps and of pruned ones, as people and scripts meet it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include <jansson.h>
+
+#include "dataset/rewrite.h"
+#include "support/make_dataset.h"
+#include "support/make_look_map.h"
+
+static char folder[256];
+
+/* `splatd info ARGUMENTS` in the folder. */
+static const char *tell(const char *arguments)
+{
+    static char output[32768];
+    char line[2048];
+    snprintf(line, sizeof line, "cd '%s' && '%s' info %s", folder, getenv("SPLATD_BINARY"), arguments);
+    FILE *pipe = popen(line, "r");
+    assert_non_null(pipe);
+    output[fread(output, 1, sizeof output - 1, pipe)] = 0;
+    assert_int_equal(WEXITSTATUS(pclose(pipe)), 0);
+    return output;
+}
+
+static json_t *tell_json(const char *name)
+{
+    char arguments[300];
+    snprintf(arguments, sizeof arguments, "--json %s", name);
+    json_t *json = json_loads(tell(arguments), 0, NULL);
+    assert_non_null(json);
+    return json;
+}
+
+static const char *place(const char *name)
+{
+    static char path[600];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static void look(const double direction[3], uint8_t color[3], double *range)
+{
+    memset(color, direction[2] > 0 ? 200 : 20, 3);
+    *range = direction[2] > 0 ? INFINITY : 5;
+}
+
+static long long number(const json_t *json, const char *key)
+{
+    const json_t *value = json_object_get(json, key);
+    assert_true(json_is_integer(value));
+    return json_integer_value(value);
+}
+
+static void test_maps(void **state)
+{
+    const struct spl_dataset *plain = *state;
+    struct spl_map_row row = make_look_row((double[]){1, 2, 3}, 128, 100);
+    make_look_file(plain, &row, look, place("mapped.spld"));
+    json_t *json = tell_json("mapped.spld");
+    const json_t *maps = json_object_get(json, "maps"), *only = json_array_get(json_object_get(maps, "by_station"), 0);
+    long long bytes = (long long)(spl_map_words(&row) * 4), texels = 6 * 128 * 128;
+    assert_true(number(maps, "stations") == 1 && number(maps, "texels") == texels && number(maps, "bytes") == bytes);
+    assert_float_equal(json_real_value(json_object_get(maps, "bytes_per_texel")), (double)bytes / (double)texels, 1e-9);
+    assert_true(number(only, "side") == 128 && number(only, "range_side") == 100 && number(only, "bytes") == bytes);
+    assert_float_equal(json_real_value(json_array_get(json_object_get(only, "position"), 1)), 2, 0);
+    double total = json_real_value(json_object_get(json_object_get(json, "bytes_per_splat"), "total"));
+    long long resident = number(json, "page_bytes");
+    json_decref(json);
+    assert_non_null(strstr(tell("mapped.spld"), "\n  maps          1 station of side 128, 98,304 texels, "));
+
+    /* maps are bytes of the dataset, not of its splats; the stations of their chunks are */
+    int rc = spl_dataset_rewrite(&(struct spl_rewrite){.from = plain}, place("plain.spld"), NULL);
+    assert_int_equal(rc, 0);
+    json = tell_json("plain.spld");
+    assert_true(json_is_null(json_object_get(json, "maps")));
+    double stations = (double)sizeof(struct spl_chunk_stations) * (double)number(json, "chunks");
+    assert_float_equal(json_real_value(json_object_get(json_object_get(json, "bytes_per_splat"), "total")) +
+                           stations / (double)number(json, "splats"),
+                       total, 1e-9);
+    assert_true(number(json, "page_bytes") == resident - bytes);
+    json_decref(json);
+    assert_null(strstr(tell("plain.spld"), "maps"));
+}
+
+static void test_pruned(void **state)
+{
+    const struct spl_dataset *plain = *state;
+    bool *leaf = calloc(spl_dataset_get_info(plain)->nodes, sizeof *leaf);
+    assert_non_null(leaf);
+    leaf[0] = true;
+    struct spl_rewrite what = {.from = plain, .leaf = leaf};
+    assert_int_equal(spl_dataset_rewrite(&what, place("pruned.spld"), NULL), 0);
+    free(leaf);
+    json_t *json = tell_json("pruned.spld");
+    assert_true(number(json_object_get(json, "pruned"), "of") == 400 && number(json, "points") == 400);
+    assert_true(number(json, "leaf_splats") < 400);
+    json_decref(json);
+    assert_non_null(strstr(tell("pruned.spld"), "\n  pruned        of 400 points\n"));
+}
+
+static int begin(void **state)
+{
+    enum { side = 20 };
+    static struct make_splat splats[side * side];
+    for (int i = 0; i < side * side; i++)
+        splats[i] = (struct make_splat){
+            .position = {0.1 * (i % side), 0.1 * (i / side)}, .normal = {0, 0, 1}, .radius = 0.07f, .color = {90, 90, 90}};
+    make_folder(folder);
+    *state = make_dataset_levels(splats, side * side, 2);
+    return 0;
+}
+
+static int end(void **state)
+{
+    char command[300];
+    spl_dataset_close(*state);
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_maps),
+        cmocka_unit_test(test_pruned),
+    };
+    return cmocka_run_group_tests(tests, begin, end);
+}

@@ -1,0 +1,393 @@
+/* Which nodes may lose their children: what a node loses against the naive sum over all pairs, and that the cut is a
+ * cut, of the number wanted, loses less than whole levels do, and keeps splats where geometry or colours need them. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <splatd/pack.h>
+
+#include "clouds.h"
+#include "dataset/chunk.h"
+#include "pack/prune.h"
+#include "pack/prune_loss.h"
+#include "support/make_dataset.h"
+
+/* Side by side, 30 m from each other: two walls, grey and as coloured as can be, foliage, and three wires. */
+enum { places = 4, each = 40000, side = 200, wire_points = 1500 };
+enum place { GREY, COLOURED, FOLIAGE, WIRES };
+
+static char folder[256];
+static struct spl_dataset *scene;
+static uint64_t node_count;
+static const struct spl_node *nodes;
+static const struct spl_chunk *chunks;
+
+static void write_point(FILE *f, double x, double y, double z, unsigned char grey)
+{
+    double at[3] = {x, y, z};
+    unsigned char color[3] = {grey, grey, grey};
+    fwrite(at, sizeof at, 1, f);
+    fwrite(color, sizeof color, 1, f);
+}
+
+static void write_scene(const char *path)
+{
+    uint64_t random = 17;
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fprintf(f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double x\nproperty double y\n"
+            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            3 * each + 3 * wire_points);
+    for (int i = 0; i < each; i++) {
+        double x = 10.0 * (i % side) / side, z = 10.0 * (i / side) / side, noise = 0.004 * (uniform(&random) - 0.5);
+        write_point(f, x, noise, z, 128);
+        write_point(f, x + 30 * COLOURED, noise, z, uniform(&random) < 0.5 ? 0 : 255);
+    }
+    for (int i = 0; i < each; i++)
+        write_point(f, 30 * FOLIAGE + 5 * uniform(&random), 5 * uniform(&random), 5 * uniform(&random), 128);
+    for (int i = 0; i < 3 * wire_points; i++)
+        write_point(f, 30 * WIRES + 0.01 * (i % wire_points), 1.5 * (i / wire_points), 3, 128);
+    assert_int_equal(fclose(f), 0);
+}
+
+static int set_up(void **state)
+{
+    char scan[300], packed[300];
+    const char *input = scan;
+    struct spl_error err = {0};
+    struct spl_pack_options options;
+    (void)state;
+    make_folder(folder);
+    snprintf(scan, sizeof scan, "%s/scene.ply", folder);
+    snprintf(packed, sizeof packed, "%s/scene.spld", folder);
+    write_scene(scan);
+    spl_pack_options_init(&options);
+    options.inputs = &input;
+    options.input_count = 1;
+    options.output = packed;
+    if (spl_pack(&options, NULL, &err) || spl_dataset_open_whole(packed, true, &scene, &err)) {
+        fprintf(stderr, "%s\n", err.message);
+        return 1;
+    }
+    unlink(scan);
+    unlink(packed);
+    rmdir(folder);
+    uint64_t chunk_count;
+    nodes = spl_dataset_get_nodes(scene, &node_count);
+    chunks = spl_dataset_get_chunks(scene, &chunk_count);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    spl_dataset_close(scene);
+    return 0;
+}
+
+static bool is_discs(uint64_t chunk)
+{
+    return spl_chunk_kind(&chunks[chunk]) == SPL_CHUNK_DISCS;
+}
+
+static void decode(uint64_t node, uint64_t chunk, uint32_t i, struct spl_splat *splat, double at[3])
+{
+    size_t bytes;
+    spl_chunk_decode(&chunks[chunk], spl_dataset_get_page(scene, nodes[node].page, &bytes), i, splat);
+    for (int a = 0; a < 3; a++)
+        at[a] = nodes[node].origin[a] + (double)splat->position[a];
+}
+
+static enum place place_of(const double at[3])
+{
+    return (enum place)fmin(fmax(floor((at[0] + 10) / 30), 0), places - 1);
+}
+
+/* As prune.h has it, of one leaf splat against all that `node` draws. */
+static double naive_w(uint64_t node, bool discs, const struct spl_splat *leaf, const double at[3], double seen)
+{
+    double least = INFINITY, color = 0;
+    for (uint64_t c = nodes[node].first_chunk; c < nodes[node].first_chunk + nodes[node].chunk_count; c++) {
+        for (uint32_t i = 0; is_discs(c) == discs && i < chunks[c].count; i++) {
+            struct spl_splat s, end;
+            double p[3], q[3], v[3], along = 0, length = 0, all = 0, distance = 0;
+            decode(node, c, i, &s, p);
+            if (!discs && !s.linear)
+                continue;
+            if (!discs)
+                decode(node, c, i + 1, &end, q);
+            for (int a = 0; a < 3; a++) {
+                double to = discs ? (double)s.normal[a] : q[a] - p[a];
+                v[a] = at[a] - p[a];
+                along += v[a] * to;
+                length += to * to;
+                all += v[a] * v[a];
+            }
+            if (discs) {
+                double off = along, aside = sqrt(fmax(0, all - off * off));
+                distance = hypot(off, fmax(0, aside - (double)s.radius));
+            } else {
+                double t = fmin(fmax(along / length, 0), 1), squared = 0;
+                for (int a = 0; a < 3; a++)
+                    squared += pow(v[a] - t * (q[a] - p[a]), 2);
+                distance = sqrt(squared);
+            }
+            if (distance >= least)
+                continue;
+            least = distance;
+            color = 0;
+            for (int a = 0; a < 3; a++)
+                color += pow(leaf->color[a] - s.color[a], 2) / 3;
+        }
+    }
+    if (least >= 6 * (double)leaf->radius)
+        return 1;
+    double u = least / (double)leaf->radius, g = u * u / (1 + u * u);
+    return 1 - (1 - g) * (1 - (1 - seen) * fmin(1, color / pow(SPL_PRUNE_CONTRAST, 2)));
+}
+
+static uint64_t discs_below(uint64_t node)
+{
+    uint64_t sum = 0;
+    const struct spl_prune_loss loss = {.dataset = scene, .nodes = nodes, .chunks = chunks};
+    for (uint64_t c = 0; c < nodes[node].child_count; c++)
+        sum += discs_below(nodes[node].first_child + c);
+    return nodes[node].child_count ? sum : spl_prune_count(&loss, node);
+}
+
+static void a_node_loses_what_the_naive_sum_says(void **state)
+{
+    (void)state;
+    struct spl_prune_shapes *shapes = spl_prune_shapes_create(NULL);
+    assert_non_null(shapes);
+    for (int mapped = 0; mapped < 2; mapped++) {
+        const struct spl_prune_options options = {.factor = 10, .no_maps = !mapped};
+        const struct spl_prune_loss loss = {scene, &options, nodes, chunks};
+        uint64_t compared[places] = {0};
+        for (uint64_t n = 0; n < node_count; n++) {
+            double sum = 0, at[3];
+            uint64_t first = nodes[n].first_child, children = nodes[n].child_count, taken = 0;
+            bool lowest = children > 0;
+            for (uint64_t c = first; c < first + children; c++)
+                lowest = lowest && !nodes[c].child_count;
+            struct spl_splat leaf;
+            if (!lowest)
+                continue;
+            decode(n, nodes[n].first_chunk, 0, &leaf, at);
+            enum place place = place_of(at);
+            if (compared[place]) /* one of each: all pairs take long */
+                continue;
+            for (uint64_t k = first; k < first + children; k++)
+                for (uint64_t c = nodes[k].first_chunk; c < nodes[k].first_chunk + nodes[k].chunk_count; c++)
+                    for (uint32_t i = 0; i < chunks[c].count; i++, taken++) {
+                        decode(k, c, i, &leaf, at);
+                        sum += naive_w(n, is_discs(c), &leaf, at, mapped);
+                    }
+            double found = spl_prune_get_loss(&loss, n, discs_below(n), shapes);
+            if (fabs(found - sum) > 1e-3 * sum + 1e-6 * (double)taken)
+                fail_msg("node %llu: %g, naively %g of %llu", (unsigned long long)n, found, sum,
+                         (unsigned long long)taken);
+            compared[place] = taken;
+        }
+        assert_true(compared[GREY] && compared[COLOURED] && compared[FOLIAGE]);
+    }
+    spl_prune_shapes_destroy(shapes);
+}
+
+struct planned {
+    bool *leaf;
+    uint64_t by_place[places], lines;
+    struct spl_prune_report report;
+};
+
+/* Plans, and checks that what stays is a cut. */
+static struct planned plan(const struct spl_prune_options *options, unsigned threads)
+{
+    struct planned out = {.leaf = malloc(node_count)};
+    struct spl_stage stage = quiet_stage(threads);
+    struct spl_error err = {0};
+    uint64_t after = 0, steps = 0;
+    bool *gone = calloc(node_count, 1);
+    memset(out.leaf, 2, node_count);
+    if (spl_prune_plan(scene, options, out.leaf, &out.report, &stage, &err))
+        fail_msg("%s", err.message);
+    for (uint64_t n = 0; n < node_count; n++) {
+        assert_true(*(uint8_t *)&out.leaf[n] < 2);
+        assert_false(out.leaf[n] && (gone[n] || !nodes[n].child_count));
+        for (uint64_t c = nodes[n].first_child; c < nodes[n].first_child + nodes[n].child_count; c++)
+            gone[c] = gone[n] || out.leaf[n];
+        bool drawn = !gone[n] && (out.leaf[n] || !nodes[n].child_count);
+        for (uint64_t c = nodes[n].first_chunk; drawn && c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+            struct spl_splat splat;
+            double at[3];
+            out.lines += is_discs(c) ? 0 : spl_chunk_count_pieces(&chunks[c]);
+            for (uint32_t i = 0; is_discs(c) && i < chunks[c].count; i++, after++) {
+                decode(n, c, i, &splat, at);
+                out.by_place[place_of(at)]++;
+            }
+        }
+    }
+    for (int i = 0; i < SPL_PRUNE_STEPS; i++)
+        steps += out.report.by_steps[i];
+    assert_int_equal(out.report.before, spl_dataset_get_info(scene)->leaf_splats);
+    assert_int_equal(out.report.after, after);
+    assert_int_equal(steps, after);
+    assert_true(out.report.dense <= after && out.report.lost >= 0 && out.report.lost <= 1);
+    free(gone);
+    return out;
+}
+
+static void the_number_is_about_the_one_wanted(void **state)
+{
+    (void)state;
+    for (double factor = 2; factor <= 8; factor *= 2) {
+        struct planned p = plan(&(struct spl_prune_options){.factor = factor}, 2);
+        double wanted = (double)p.report.before / factor;
+        if (!((double)p.report.after > wanted / 1.5 && (double)p.report.after < wanted * 1.5))
+            fail_msg("1 / %g: %llu of %llu", factor, (unsigned long long)p.report.after,
+                     (unsigned long long)p.report.before);
+        free(p.leaf);
+    }
+}
+
+static void nothing_is_dropped_at_factor_1(void **state)
+{
+    (void)state;
+    struct planned p = plan(&(struct spl_prune_options){.factor = 1}, 1);
+    assert_int_equal(p.report.after, p.report.before);
+    assert_int_equal(p.report.by_steps[0], p.report.before);
+    assert_true(p.report.slope == 0 && p.report.lost == 0);
+    for (uint64_t n = 0; n < node_count; n++)
+        assert_false(p.leaf[n]);
+    free(p.leaf);
+}
+
+static void a_root_is_never_dropped(void **state)
+{
+    (void)state;
+    struct planned p = plan(&(struct spl_prune_options){.factor = SPL_PRUNE_FACTOR_MAX}, 1);
+    const struct spl_prune_loss loss = {.dataset = scene, .nodes = nodes, .chunks = chunks};
+    assert_true(p.leaf[0]);
+    assert_int_equal(p.report.after, spl_prune_count(&loss, 0));
+    free(p.leaf);
+}
+
+static void threads_change_nothing(void **state)
+{
+    (void)state;
+    struct planned one = plan(&(struct spl_prune_options){.factor = 7, .no_maps = true}, 1);
+    struct planned many = plan(&(struct spl_prune_options){.factor = 7, .no_maps = true}, 5);
+    assert_memory_equal(one.leaf, many.leaf, node_count);
+    assert_memory_equal(&one.report, &many.report, sizeof one.report);
+    free(one.leaf);
+    free(many.leaf);
+}
+
+static void splats_stay_where_they_are_needed(void **state)
+{
+    (void)state;
+    struct planned mapped = plan(&(struct spl_prune_options){.factor = 8}, 2);
+    struct planned plain = plan(&(struct spl_prune_options){.factor = 8, .no_maps = true}, 2);
+    /* with maps foliage keeps more than walls, whatever is painted on them */
+    assert_true(mapped.by_place[FOLIAGE] > 4 * mapped.by_place[GREY]);
+    assert_true(mapped.by_place[FOLIAGE] > 4 * mapped.by_place[COLOURED]);
+    /* without, a wall's colours count too */
+    assert_true(2 * plain.by_place[COLOURED] > 3 * plain.by_place[GREY]);
+    /* wires are geometry */
+    assert_true(mapped.lines > 0 && plain.lines > 0);
+    free(mapped.leaf);
+    free(plain.leaf);
+}
+
+/* The same wall, of which maps show nothing, by `seen` of its chunks. */
+static void what_no_map_shows_keeps_its_colours(void **state)
+{
+    (void)state;
+    uint64_t chunk_count;
+    spl_dataset_get_chunks(scene, &chunk_count);
+    float *seen = calloc(chunk_count, sizeof *seen);
+    for (uint64_t n = 0; n < node_count; n++)
+        for (uint64_t c = nodes[n].first_chunk; c < nodes[n].first_chunk + nodes[n].chunk_count; c++) {
+            struct spl_splat splat;
+            double at[3];
+            decode(n, c, 0, &splat, at);
+            seen[c] = place_of(at) != COLOURED;
+        }
+    struct planned some = plan(&(struct spl_prune_options){.factor = 8, .seen = seen}, 2);
+    struct planned all = plan(&(struct spl_prune_options){.factor = 8}, 2);
+    assert_true(some.by_place[COLOURED] > 2 * all.by_place[COLOURED]);
+    free(some.leaf);
+    free(all.leaf);
+    free(seen);
+}
+
+/* Levels from the root on: none has as few splats and loses less. */
+static void no_whole_level_is_better(void **state)
+{
+    (void)state;
+    const struct spl_prune_options mapped = {.factor = 4};
+    const struct spl_prune_loss loss = {scene, &mapped, nodes, chunks};
+    struct spl_prune_shapes *shapes = spl_prune_shapes_create(NULL);
+    struct planned p = plan(&mapped, 2);
+    int compared = 0;
+    for (int depth = 0; depth < 5; depth++) {
+        double lost = 0, splats = 0;
+        for (uint64_t n = 0; n < node_count; n++) {
+            if (nodes[n].depth != depth && (nodes[n].depth > depth || nodes[n].child_count))
+                continue;
+            splats += (double)spl_prune_count(&loss, n);
+            lost += nodes[n].child_count ? spl_prune_get_loss(&loss, n, discs_below(n), shapes) : 0;
+        }
+        if (splats > (double)p.report.after)
+            continue;
+        assert_true(p.report.lost * (double)p.report.before <= lost);
+        compared++;
+    }
+    assert_true(compared > 0);
+    spl_prune_shapes_destroy(shapes);
+    free(p.leaf);
+}
+
+static void what_cannot_be_is_refused(void **state)
+{
+    (void)state;
+    const double factors[] = {0, 0.99, -1, NAN, INFINITY, SPL_PRUNE_FACTOR_MAX + 1};
+    bool *leaf = malloc(node_count);
+    struct spl_prune_report report;
+    struct spl_stage stage = quiet_stage(2);
+    for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) {
+        struct spl_error err = {0};
+        const struct spl_prune_options options = {.factor = factors[i]};
+        assert_int_equal(spl_prune_plan(scene, &options, leaf, &report, &stage, &err), SPL_E_USAGE);
+        assert_string_equal(err.field, "prune");
+    }
+    atomic_bool cancelled = true;
+    stage.cancelled = &cancelled;
+    const struct spl_prune_options options = {.factor = 10};
+    assert_int_equal(spl_prune_plan(scene, &options, leaf, &report, &stage, NULL), SPL_E_CANCELLED);
+    free(leaf);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_node_loses_what_the_naive_sum_says),
+        cmocka_unit_test(the_number_is_about_the_one_wanted),
+        cmocka_unit_test(nothing_is_dropped_at_factor_1),
+        cmocka_unit_test(a_root_is_never_dropped),
+        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(splats_stay_where_they_are_needed),
+        cmocka_unit_test(what_no_map_shows_keeps_its_colours),
+        cmocka_unit_test(no_whole_level_is_better),
+        cmocka_unit_test(what_cannot_be_is_refused),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
