@@ -18,6 +18,7 @@
 #include "dataset/dataset.h"
 #include "image/load.h"
 #include "pack/maps/edit.h"
+#include "support/e57_writer.h"
 
 enum { side = 64, columns = 120, rows = 60, width = 256 };
 
@@ -252,6 +253,124 @@ static void edits_survive_packing(void **state)
     assert_int_equal(access(exported, F_OK), -1);
 }
 
+/* What lies where: red grows with the world's x, green with its y, blue with its z. */
+static void color_of(const double d[3], uint8_t color[4])
+{
+    for (int c = 0; c < 3; c++)
+        color[c] = (uint8_t)lround(128 + 100 * d[c]);
+    color[3] = 255;
+}
+
+/* A panorama as it sees that, turned by a quarter around z: its middle looks along the world's y. */
+static struct spl_encoded make_turned_panorama(void)
+{
+    static uint8_t texels[width / 2][width][4];
+    const struct spl_image image = {.layer = SPL_LAYER_COLOR, .width = width, .height = width / 2, .pixels = texels};
+    const struct spl_encode_options how = {.size = sizeof how, .format = SPL_FORMAT_PNG};
+    struct spl_encoded png;
+    for (int y = 0; y < width / 2; y++)
+        for (int x = 0; x < width; x++) {
+            double turn = M_PI * (1 - 2 * (x + 0.5) / width) + M_PI / 2, rise = M_PI * (0.5 - (y + 0.5) * 2 / width);
+            color_of((double[3]){cos(rise) * cos(turn), cos(rise) * sin(turn), sin(rise)}, texels[y][x]);
+        }
+    assert_int_equal(spl_image_encode(&image, &how, &png, NULL), 0);
+    return png;
+}
+
+/* The same sphere as E57, with the panorama among its images. */
+static void write_e57(const char *name, const struct spl_encoded *png)
+{
+    static double values[3][columns * rows];
+    static const char *const axes[3] = {"cartesianX", "cartesianY", "cartesianZ"};
+    struct e57_field fields[3];
+    struct e57_writer w;
+    size_t length;
+    for (int i = 0; i < columns * rows; i++) {
+        double turn = -2 * M_PI * (i / rows) / columns, rise = M_PI * ((i % rows + 0.5) / rows - 0.5);
+        values[0][i] = 3 * cos(turn) * cos(rise);
+        values[1][i] = 3 * sin(turn) * cos(rise);
+        values[2][i] = 3 * sin(rise);
+    }
+    for (int k = 0; k < 3; k++)
+        fields[k] = (struct e57_field){.name = axes[k], .type = E57_DOUBLE, .values = values[k], .step = 8000};
+    e57_begin(&w);
+    e57_add_scan(&w, &(struct e57_scan){"scan", e57_pose(1, 0, 0, 0, 0, 0, 0), fields, 3, columns * rows, 0});
+    unsigned long long blob = e57_add_blob(&w, png->bytes, png->length);
+    e57_add_image(&w,
+                  "<name>p</name>%s<sphericalRepresentation><imageWidth>%d</imageWidth><imageHeight>%d</imageHeight>"
+                  "<pixelWidth>%.17g</pixelWidth><pixelHeight>%.17g</pixelHeight><pngImage type=\"Blob\" "
+                  "fileOffset=\"%llu\" length=\"%zu\"/></sphericalRepresentation>",
+                  e57_pose(1, 0, 0, 1, 0, 0, 0), width, width / 2, 2 * M_PI / width, 2 * M_PI / width, blob,
+                  png->length);
+    uint8_t *file = e57_end(&w, NULL, &length);
+    FILE *out = fopen(at(name), "wb");
+    assert_non_null(out);
+    assert_int_equal(fwrite(file, 1, length, out), length);
+    fclose(out);
+    free(file);
+}
+
+static void assert_oriented(const char *name)
+{
+    struct spl_dataset *dataset;
+    uint32_t count;
+    assert_int_equal(spl_dataset_open_whole(at(name), true, &dataset, NULL), 0);
+    const struct spl_map_row *row = spl_dataset_get_maps(dataset, &count);
+    assert_int_equal(count, 1);
+    uint32_t *words = malloc(spl_map_words(row) * sizeof *words);
+    assert_int_equal(spl_dataset_read_map(dataset, 0, words, NULL), 0);
+    for (int i = 0; i < 300; i++) {
+        double place[2], z = 1.98 * (i / 299.0) - 0.99, flat = sqrt(1 - z * z);
+        const double d[3] = {flat * cos(i), flat * sin(i), z};
+        double local[3] = {0};
+        uint8_t wanted[4];
+        float got[3];
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                local[a] += row->rotation[3 * b + a] * d[b];
+        spl_polar_place(row->side, SPL_MAP_APRON, local, place);
+        spl_map_get_color(words + spl_map_level_word(row, 0), row->side, (uint32_t)place[0], (uint32_t)place[1], got);
+        color_of(d, wanted);
+        for (int c = 0; c < 3; c++)
+            assert_true(fabsf(got[c] - wanted[c]) < 10);
+    }
+    free(words);
+    spl_dataset_close(dataset);
+}
+
+static void panoramas_lie_where_they_look(void **state)
+{
+    struct spl_encoded png = make_turned_panorama();
+    struct spl_map_options maps = {.size = sizeof maps};
+    struct spl_pack_report report;
+    struct spl_error err = {0};
+    char list[256];
+    (void)state;
+    write_e57("scan.e57", &png);
+    FILE *file = fopen(at("turned.png"), "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(png.bytes, 1, png.length, file), png.length);
+    fclose(file);
+    spl_encoded_finish(&png);
+    put_text("turned.json", "{\"panoramas\": [{\"name\": \"a\", \"color\": \"turned.png\", \"position\": "
+                            "[0, 0, 0], \"rotation\": [0, -1, 0, 1, 0, 0, 0, 0, 1]}]}");
+    snprintf(list, sizeof list, "%s", at("turned.json"));
+    maps.panoramas = list;
+    if (pack("turned.spld", &maps, &report, &err))
+        fail_msg("%s", err.message);
+    assert_oriented("turned.spld");
+
+    const char *input = at("scan.e57");
+    maps = (struct spl_map_options){.size = sizeof maps, .find = true};
+    const struct spl_pack_options options = {
+        .size = sizeof options, .inputs = &input, .input_count = 1, .output = at("e57.spld"), .maps = &maps};
+    report = (struct spl_pack_report){0};
+    if (spl_pack(&options, &report, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(report.maps.pictures, 6);
+    assert_oriented("e57.spld");
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -272,6 +391,7 @@ int main(void)
         cmocka_unit_test(an_edited_texel_reaches_its_repeats),
         cmocka_unit_test(what_a_scan_brings_along_is_found),
         cmocka_unit_test(edits_survive_packing),
+        cmocka_unit_test(panoramas_lie_where_they_look),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
