@@ -50,6 +50,17 @@ void spl_polar_place(uint32_t side, uint32_t apron, const double d[3], double pl
     place[1] = apron + (d[1] * share + 0.5) * side;
 }
 
+bool spl_polar_is_proper(uint32_t side, uint32_t apron, uint32_t x, uint32_t y)
+{
+    uint32_t cap = side + 2 * apron, chart = x < cap ? 0 : x < 2 * cap ? 1 : 2;
+    double u = x + 0.5 - chart_x(side, apron, (int)chart), v = y + 0.5 - apron;
+    if (chart == 2)
+        return u > 0 && u < 4.0 * side && v > 0 && v < side;
+    u -= 0.5 * side;
+    v -= 0.5 * side;
+    return u * u + v * v <= 0.25 * side * side;
+}
+
 /* acos(1 - t) / sqrt(1 - (1 - t)^2) * 2 / pi, for t of 0 to 1 - cos 45 degrees. */
 static float cap_share(float t)
 {

@@ -37,15 +37,6 @@ void spl_atlas_finish(struct spl_atlas *atlas)
     *atlas = (struct spl_atlas){0};
 }
 
-/* Where the chart of column x begins, aprons included, and whether (x, y) is a texel of it proper. */
-static bool is_proper(const struct spl_atlas *atlas, uint32_t x, uint32_t y, uint32_t *left)
-{
-    uint32_t cap = atlas->side + 2 * apron, chart = x < cap ? 0 : x < 2 * cap ? 1 : 2;
-    *left = chart * cap;
-    x -= *left;
-    return y >= apron && y < apron + atlas->side && x >= apron && x < apron + (chart == 2 ? 4 : 1) * atlas->side;
-}
-
 /* Adds the bilinear texel at a place within a chart proper, times `share`. */
 static void add_bilinear(const struct spl_atlas *atlas, const double place[2], float share, float sum[4])
 {
@@ -64,7 +55,7 @@ struct job {
     double *errors; /* by row of blocks */
 };
 
-/* A texel of half the side: the four below it; of an apron, what the sphere has there, at four places of it. */
+/* A texel of half the side: the four below it; where it repeats another chart, what that has, at four places of it. */
 static void halve_rows(void *context, size_t begin, size_t end, unsigned worker)
 {
     const struct job *job = context;
@@ -73,11 +64,10 @@ static void halve_rows(void *context, size_t begin, size_t end, unsigned worker)
     for (uint32_t y = (uint32_t)begin; y < end; y++)
         for (uint32_t x = 0; x < to->width; x++) {
             float *out = to->texels[(size_t)y * to->width + x];
-            uint32_t left;
             memset(out, 0, sizeof *to->texels);
-            if (is_proper(to, x, y, &left)) {
-                uint32_t fx = left / (to->side + 2 * apron) * (from->side + 2 * apron) + apron + 2 * (x - left - apron),
-                         fy = apron + 2 * (y - apron);
+            if (spl_polar_is_proper(to->side, apron, x, y)) {
+                uint32_t cap = to->side + 2 * apron, chart = x < cap ? 0 : x < 2 * cap ? 1 : 2;
+                uint32_t fx = 2 * x - (2 * chart + 1) * apron, fy = 2 * y - apron; /* charts begin at multiples of both */
                 for (uint32_t k = 0; k < 4; k++)
                     for (int c = 0; c < 4; c++)
                         out[c] += 0.25f * from->texels[(size_t)(fy + k / 2) * from->width + fx + k % 2][c];
@@ -154,11 +144,32 @@ static void even_weights(struct spl_atlas *atlas)
     }
 }
 
+/* What repeats another chart and is empty takes the texel there. */
+static void repeat_rows(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct job *job = context;
+    struct spl_atlas *to = job->to;
+    (void)worker;
+    for (uint32_t y = (uint32_t)begin; y < end; y++)
+        for (uint32_t x = 0; x < to->width; x++) {
+            float *out = to->texels[(size_t)y * to->width + x];
+            double d[3], place[2];
+            if (out[3] > 0 || spl_polar_is_proper(to->side, apron, x, y))
+                continue;
+            spl_polar_direction(to->side, apron, (double[2]){x + 0.5, y + 0.5}, d);
+            spl_polar_place(to->side, apron, d, place);
+            if (spl_polar_is_proper(to->side, apron, (uint32_t)place[0], (uint32_t)place[1]))
+                memcpy(out, to->texels[(size_t)place[1] * to->width + (size_t)place[0]], sizeof *to->texels);
+        }
+}
+
 int spl_atlas_fill(struct spl_atlas *atlas, unsigned threads, struct spl_error *err)
 {
     struct spl_atlas levels[halvings_max] = {{0}};
     int last = 0, rc = SPL_OK;
+    struct job repeated = {.to = atlas};
     even_weights(atlas);
+    spl_parallel_for(threads, atlas->height, 8, repeat_rows, &repeated);
     levels[0] = *atlas;
     while (!rc && last + 1 < halvings_max && levels[last].side % 2 == 0 && levels[last].side > 4)
         if (!(rc = spl_atlas_halve(&levels[last], threads, &levels[last + 1], err)))

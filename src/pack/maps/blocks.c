@@ -1,13 +1,12 @@
-/* BC1 without its mode of three colours. Ends begin at the extremes along the main axis; then in turns texels choose
- * the nearest of the four colours and ends are put where least squares has them; at last each channel of each end goes
- * up or down by a step of its 5 or 6 bits as long as that helps, which is what even surfaces need: their colour lies
- * between the steps. */
+/* BC1 without its mode of three colours. Texels are coded by their place along the main axis; then in turns ends are put
+ * on the steps of 5, 6 and 5 bits that are best for the codes, and texels choose the nearest of the four colours. An even
+ * surface lies between the steps: one colour of two ends is nearer to it. */
 #include "pack/maps/blocks.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { axis_rounds = 6, fit_rounds = 3, step_rounds = 4 };
+enum { axis_rounds = 6, rounds = 4, around = 2 };
 static const int steps[3] = {31, 63, 31};
 
 /* Ends as steps of their channels. */
@@ -15,13 +14,22 @@ struct ends {
     int at[2][3];
 };
 
+/* The value of a channel's step, and the step nearest to a value. */
+static float level(int channel, int step)
+{
+    return (float)(channel == 1 ? step << 2 | step >> 4 : step << 3 | step >> 2);
+}
+
+static int to_step(int channel, float value)
+{
+    return (int)(fminf(fmaxf(value, 0), 255) * (float)steps[channel] / 255 + 0.5f);
+}
+
 static void expand(const struct ends *ends, float colors[4][3])
 {
-    for (int e = 0; e < 2; e++) {
-        colors[e][0] = (float)(ends->at[e][0] << 3 | ends->at[e][0] >> 2);
-        colors[e][1] = (float)(ends->at[e][1] << 2 | ends->at[e][1] >> 4);
-        colors[e][2] = (float)(ends->at[e][2] << 3 | ends->at[e][2] >> 2);
-    }
+    for (int e = 0; e < 2; e++)
+        for (int c = 0; c < 3; c++)
+            colors[e][c] = level(c, ends->at[e][c]);
     for (int c = 0; c < 3; c++) {
         colors[2][c] = colors[0][c] + (colors[1][c] - colors[0][c]) * (1.0f / 3.0f);
         colors[3][c] = colors[0][c] + (colors[1][c] - colors[0][c]) * (2.0f * (1.0f / 3.0f));
@@ -47,17 +55,11 @@ static float choose(const float texels[16][3], const struct ends *ends, uint8_t 
     return sum;
 }
 
-static void round_ends(float ends[2][3], struct ends *out)
+/* Codes by the place along the main axis. */
+static void start(const float texels[16][3], uint8_t codes[16])
 {
-    for (int e = 0; e < 2; e++)
-        for (int c = 0; c < 3; c++) {
-            int step = (int)lrintf(ends[e][c] * (float)steps[c] / 255);
-            out->at[e][c] = step < 0 ? 0 : step > steps[c] ? steps[c] : step;
-        }
-}
-
-static void start(const float texels[16][3], float ends[2][3])
-{
+    static const uint8_t code_of[4] = {0, 2, 3, 1};
+    float along[16];
     float mean[3] = {0}, axis[3] = {0.6f, 0.7f, 0.4f}, low = 0, high = 0;
     for (int i = 0; i < 16; i++)
         for (int c = 0; c < 3; c++)
@@ -65,11 +67,11 @@ static void start(const float texels[16][3], float ends[2][3])
     for (int round = 0; round < axis_rounds; round++) {
         float next[3] = {0}, norm = 0;
         for (int i = 0; i < 16; i++) {
-            float along = 0;
+            float dot = 0;
             for (int c = 0; c < 3; c++)
-                along += (texels[i][c] - mean[c]) * axis[c];
+                dot += (texels[i][c] - mean[c]) * axis[c];
             for (int c = 0; c < 3; c++)
-                next[c] += along * (texels[i][c] - mean[c]);
+                next[c] += dot * (texels[i][c] - mean[c]);
         }
         for (int c = 0; c < 3; c++)
             norm += next[c] * next[c];
@@ -79,20 +81,19 @@ static void start(const float texels[16][3], float ends[2][3])
             axis[c] = next[c] / sqrtf(norm);
     }
     for (int i = 0; i < 16; i++) {
-        float along = 0;
+        along[i] = 0;
         for (int c = 0; c < 3; c++)
-            along += (texels[i][c] - mean[c]) * axis[c];
-        low = fminf(low, along);
-        high = fmaxf(high, along);
+            along[i] += (texels[i][c] - mean[c]) * axis[c];
+        low = fminf(low, along[i]);
+        high = fmaxf(high, along[i]);
     }
-    for (int c = 0; c < 3; c++) {
-        ends[0][c] = mean[c] + low * axis[c];
-        ends[1][c] = mean[c] + high * axis[c];
-    }
+    for (int i = 0; i < 16; i++)
+        codes[i] = code_of[high > low ? (int)(3 * (along[i] - low) / (high - low) + 0.5f) : 0];
 }
 
-/* The ends that are best for these codes; false where any would do. */
-static int refine(const float texels[16][3], const uint8_t codes[16], float ends[2][3])
+/* The ends, of all steps, that are best for these codes: sums over the texels make each channel's error a quadratic of
+ * its two ends, whose best steps lie near its least. */
+static void fit(const float texels[16][3], const uint8_t codes[16], struct ends *out)
 {
     static const float share[4] = {0, 1, 1.0f / 3, 2.0f / 3};
     float aa = 0, ab = 0, bb = 0, a[3] = {0}, b[3] = {0};
@@ -107,48 +108,43 @@ static int refine(const float texels[16][3], const uint8_t codes[16], float ends
         }
     }
     float det = aa * bb - ab * ab;
-    if (!(det > 1e-3f))
-        return 0;
     for (int c = 0; c < 3; c++) {
-        ends[0][c] = (bb * a[c] - ab * b[c]) / det;
-        ends[1][c] = (aa * b[c] - ab * a[c]) / det;
+        float mean = (a[c] + b[c]) / 16, best = INFINITY; /* where one code is all there is, any pair around the mean */
+        int first = to_step(c, det > 1e-3f ? (bb * a[c] - ab * b[c]) / det : mean);
+        int second = to_step(c, det > 1e-3f ? (aa * b[c] - ab * a[c]) / det : mean);
+        for (int i = first - around; i <= first + around; i++)
+            for (int k = second - around; k <= second + around; k++) {
+                if (i < 0 || k < 0 || i > steps[c] || k > steps[c])
+                    continue;
+                float x = level(c, i), y = level(c, k);
+                float error = x * x * aa + 2 * x * y * ab + y * y * bb - 2 * (x * a[c] + y * b[c]);
+                if (error < best) {
+                    best = error;
+                    out->at[0][c] = i;
+                    out->at[1][c] = k;
+                }
+            }
     }
-    return 1;
 }
 
 double spl_map_block_encode(const float texels[16][3], uint32_t words[2])
 {
-    struct ends best, tried;
-    uint8_t codes[16], tried_codes[16];
-    float ends[2][3];
-    start(texels, ends);
-    round_ends(ends, &best);
-    float error = choose(texels, &best, codes);
-    memcpy(tried_codes, codes, sizeof codes);
-    for (int round = 0; round < fit_rounds && refine(texels, tried_codes, ends); round++) {
-        round_ends(ends, &tried);
-        float left = choose(texels, &tried, tried_codes);
-        if (!(left < error))
-            break;
-        error = left;
-        best = tried;
-        memcpy(codes, tried_codes, sizeof codes);
-    }
-    for (int round = 0, better = 1; round < step_rounds && better && error > 0; round++) {
-        better = 0;
-        for (int k = 0; k < 12; k++) {
-            tried = best;
-            int *at = &tried.at[k / 6][k / 2 % 3];
-            *at += k % 2 ? 1 : -1;
-            if (*at < 0 || *at > steps[k / 2 % 3])
-                continue;
+    struct ends best = {{{0}}}, tried;
+    uint8_t codes[16] = {0}, tried_codes[16];
+    float error = INFINITY;
+    for (int way = 0; way < 2 && error > 0; way++) { /* along the main axis; as one colour between the ends */
+        if (way == 0)
+            start(texels, tried_codes);
+        else
+            memset(tried_codes, 2, sizeof tried_codes);
+        for (int round = 0; round < (way ? 1 : rounds); round++) {
+            fit(texels, tried_codes, &tried);
             float left = choose(texels, &tried, tried_codes);
             if (!(left < error))
-                continue;
+                break;
             error = left;
             best = tried;
             memcpy(codes, tried_codes, sizeof codes);
-            better = 1;
         }
     }
     words[0] = words[1] = 0;

@@ -47,6 +47,7 @@ struct job {
     double turn[9], shift[3]; /* a point of the station's frame in the camera's: turn * p + shift */
     double axis[3], within;   /* what the picture shows lies around its axis, cosines: the station's frame */
     double texel;
+    bool shifted; /* the picture was not taken where the station stands */
     float linear[257]; /* of sRGB 0..255 */
 };
 
@@ -94,8 +95,9 @@ static void add_rows(void *context, size_t begin, size_t end, unsigned worker)
                 continue;
             for (uint32_t i = 0; i < block * block; i++) {
                 uint32_t x = left + i % block, y = (uint32_t)row * block + i / block;
-                spl_polar_direction(atlas->side, SPL_MAP_APRON, (double[2]){x + 0.5, y + 0.5}, d);
-                double inverse = spl_inverse_ranges_get(job->inverse, d);
+                if (job->shifted)
+                    spl_polar_direction(atlas->side, SPL_MAP_APRON, (double[2]){x + 0.5, y + 0.5}, d);
+                double inverse = job->shifted ? spl_inverse_ranges_get(job->inverse, d) : 0;
                 for (int k = 0; k < 4; k++)
                     add_sample(job, (double[2]){x + 0.25 + 0.5 * (k % 2), y + 0.25 + 0.5 * (k / 2)}, inverse,
                                atlas->texels[(size_t)y * atlas->width + x]);
@@ -140,6 +142,7 @@ void spl_colors_add_picture(struct spl_atlas *atlas, const struct spl_station *s
         job.axis[k] = job.turn[6 + k];
     for (int i = 0; i < 257; i++)
         job.linear[i] = spl_linear_of_srgb((float)i);
+    job.shifted = shift > 0;
     job.within = find_within(&job, sqrt(shift));
     spl_parallel_for(threads, atlas->height / block, 1, add_rows, &job);
 }

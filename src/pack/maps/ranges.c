@@ -1,7 +1,7 @@
 /* Hits to ranges. A texel's is the mean of its hits within 5 % of the nearest. Holes of up to three texels, and those
  * that the discs beside them reach over, lie between scan lines and are closed. What then has no hit is open: nothing
- * came back from there, or the scanner never looked. Below the lowest hit of each degree of azimuth stands its tripod;
- * above the highest there is sky, unless the scan ends there all around, or goes around only in part.
+ * came back from there, or the scanner never looked. Below the lowest hit of each degree of azimuth, and wherever one
+ * looks down at feet, stands its tripod; above the highest there is sky, unless the scan ends there all around, or goes around only in part.
  *
  * Works on an atlas whose aprons are wide enough to look for neighbours in; sums go by the order of hits. The caller's
  * thread; hits are placed in parallel. */
@@ -17,13 +17,14 @@
 
 enum { reach = 8, hole = 3, sectors_max = 360, side_min = 4 };
 static const double enough = 0.9, same = 1.05, beside = 1.25;
+static const double feet = -M_PI / 4; /* nothing comes back from there but where the tripod stands */
 
 static size_t texels_of(uint32_t side, uint32_t apron)
 {
     return (size_t)spl_polar_width(side, apron) * spl_polar_height(side, apron);
 }
 
-/* The texel of a chart proper that shows what texel (x, y), of an apron maybe, shows. */
+/* The texel that is hit by what texel (x, y), of an apron maybe, shows. */
 static size_t find_source(uint32_t side, uint32_t apron, uint32_t x, uint32_t y)
 {
     double d[3], place[2];
@@ -34,11 +35,10 @@ static size_t find_source(uint32_t side, uint32_t apron, uint32_t x, uint32_t y)
     return (size_t)py * width + px;
 }
 
+/* Texels that only repeat what another chart shows: aprons, and the corners of caps. */
 static bool is_apron(uint32_t side, uint32_t apron, uint32_t x, uint32_t y)
 {
-    uint32_t cap = side + 2 * apron, chart = x < cap ? 0 : x < 2 * cap ? 1 : 2;
-    x -= chart * cap;
-    return y < apron || y >= apron + side || x < apron || x >= apron + (chart == 2 ? 4 : 1) * side;
+    return !spl_polar_is_proper(side, apron, x, y);
 }
 
 static void fill_aprons(float *texels, uint32_t side, uint32_t apron)
@@ -246,7 +246,7 @@ static void judge_open(float *texels, uint32_t side)
             spl_polar_direction(side, reach, (double[2]){x + 0.5, y + 0.5}, d);
             uint32_t s = sector_of(&extent, d);
             double elevation = elevation_of(d);
-            bool looked = extent.low[s] <= extent.high[s] && elevation >= extent.low[s] &&
+            bool looked = elevation >= fmax(extent.low[s], feet) && extent.low[s] <= extent.high[s] &&
                           (elevation <= extent.high[s] || elevation <= extent.top);
             if (looked)
                 *texel = INFINITY;
