@@ -70,6 +70,9 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
             (unsigned long long)r->nodes, r->pages);
     fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
             (unsigned long long)r->leaf_splats);
+    if (r->pruned_of)
+        fprintf(stderr, "pruned: %llu of %llu leaf splats are left, one of %.1f\n", (unsigned long long)r->leaf_splats,
+                (unsigned long long)r->pruned_of, (double)r->pruned_of / (double)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++) {
         total += r->attribute_bits[a];
@@ -285,6 +288,9 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, maps.export_to)},
     {"maps", "DIR", "such a folder, whose colours are taken into the maps after they were edited",
      SPL_CMD_TEXT(struct arguments, maps.edits)},
+    {"prune", "N",
+     "about one of N splats stays for good, 2 to 1000, where a coarser one is as good; best with maps, whose colours stay "
+     "as fine as they are", .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",

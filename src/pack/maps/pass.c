@@ -14,6 +14,7 @@
 #include "pack/maps/maps.h"
 #include "pack/maps/pictures.h"
 #include "pack/maps/sees.h"
+#include "pack/prune.h"
 #include "pack/texture/photo_image.h"
 
 /* Bytes that colours and ranges of a map made from pictures may take together, a texel of colour. */
@@ -33,6 +34,8 @@ struct pass {
     struct spl_map_row *rows;
     uint32_t **codes;         /* by row: the words of its ranges */
     struct spl_chunk_stations *chunks;
+    float *seen;     /* by chunk: what share of it some map shows */
+    bool *leaf;      /* by node: as of struct spl_rewrite; NULL = nothing is pruned */
     uint32_t *words; /* of the map that is written */
     struct spl_photo_whole whole;
     struct spl_map_edits edits;
@@ -124,13 +127,25 @@ static int find_chunks(struct pass *p, struct spl_error *err)
 {
     struct spl_map_sight *maps = spl_alloc(p->count, sizeof *maps, err);
     p->chunks = spl_alloc(p->splats.chunk_count, sizeof *p->chunks, err);
-    int rc = maps && p->chunks ? SPL_OK : SPL_E_NOMEM;
+    p->seen = spl_alloc(p->splats.chunk_count, sizeof *p->seen, err);
+    int rc = maps && p->chunks && p->seen ? SPL_OK : SPL_E_NOMEM;
     for (uint32_t row = 0; !rc && row < p->count; row++)
         maps[row] = (struct spl_map_sight){&p->rows[row], p->codes[row]};
     if (!rc)
-        rc = spl_map_find_chunks(&p->splats, &p->stations, p->row_of, maps, p->count, p->stage, p->chunks, err);
+        rc = spl_map_find_chunks(&p->splats, &p->stations, p->row_of, maps, p->stage, p->chunks, p->seen, err);
     free(maps);
     return rc;
+}
+
+static int prune(struct pass *p, const struct spl_dataset *dataset, uint32_t factor, struct spl_error *err)
+{
+    const struct spl_prune_options how = {.factor = factor, .seen = p->seen};
+    struct spl_prune_report report;
+    if (factor <= 1)
+        return SPL_OK;
+    if (!(p->leaf = spl_alloc(p->splats.node_count, sizeof *p->leaf, err)))
+        return SPL_E_NOMEM;
+    return spl_prune_plan(dataset, &how, p->leaf, &report, p->stage, err);
 }
 
 /* A picture that cannot be used: handed out and left out, or the end. */
@@ -293,17 +308,18 @@ static void name_nowhere(void *context, const struct spl_named_view *view, doubl
         p->options->refused(p->options->context, &why);
 }
 
-int spl_maps_apply(const struct spl_map_options *options, const struct spl_view_list *views,
-                   const struct spl_dataset *dataset, const char *output, struct spl_stage *stage,
-                   struct spl_map_report *report, struct spl_error *err)
+int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view_list *views,
+                   const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
+                   struct spl_error *err)
 {
-    struct pass p = {.options = options, .views = views, .stage = stage, .report = report};
+    struct pass p = {.options = options->maps, .views = views, .stage = stage, .report = report};
     uint64_t begin_ns = spl_now_ns();
     json_t *about = NULL;
-    int rc = open_files(options, &p.edits, &p.out, err);
+    int rc = open_files(options->maps, &p.edits, &p.out, err);
     if (rc || (rc = spl_splats_init(&p.splats, dataset, err)) ||
         (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
-        (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)))
+        (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
+        (rc = prune(&p, dataset, options->prune, err)))
         goto done;
     about = json_pack("{s:i}", "pictures", (int)(report->pictures - report->refused));
     const struct spl_rewrite rewrite = {.from = dataset,
@@ -312,9 +328,10 @@ int spl_maps_apply(const struct spl_map_options *options, const struct spl_view_
                                         .stations = p.chunks,
                                         .get_map = get_map,
                                         .context = &p,
+                                        .leaf = p.leaf,
                                         .about_maps = about};
     spl_stage_begin(stage, "maps", NULL, p.count + views->count);
-    rc = spl_dataset_rewrite(&rewrite, output, err);
+    rc = spl_dataset_rewrite(&rewrite, options->output, err);
     spl_stage_end(stage);
     if (!rc && p.out.folder)
         rc = spl_map_export_commit(&p.out, err);
@@ -335,6 +352,8 @@ done:
     free(p.station_of);
     free(p.row_of);
     free(p.chunks);
+    free(p.seen);
+    free(p.leaf);
     free(p.words);
     spl_photo_whole_finish(&p.whole);
     spl_map_export_finish(&p.out);
