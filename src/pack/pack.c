@@ -20,6 +20,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/dataset.h"
+#include "dataset/rewrite.h"
 #include "geom/unit.h"
 #include "pack/emit.h"
 #include "pack/kept.h"
@@ -27,6 +28,7 @@
 #include "pack/maps/maps.h"
 #include "pack/median.h"
 #include "pack/part.h"
+#include "pack/prune.h"
 #include "pack/system.h"
 #include "pack/texture/pass.h"
 #include "pack/texture/photographs.h"
@@ -54,6 +56,7 @@ struct pack {
 struct passes {
     const struct spl_pack_options *options;
     struct spl_stage *stage;
+    struct spl_map_options with; /* of maps, where the scans bring pictures along */
     struct spl_view_list photographs, pictures;
     struct spl_photo_report photos;
     struct spl_map_report maps;
@@ -373,53 +376,118 @@ static int open_part(const char *path, struct spl_dataset **dataset, struct spl_
     return rc;
 }
 
+/* Geometry alone says what may go. */
+static int write_pruned(const struct spl_pack_options *o, const struct spl_dataset *dataset, struct spl_stage *stage,
+                        struct spl_error *err)
+{
+    const struct spl_prune_options how = {.factor = o->prune, .no_maps = true};
+    struct spl_prune_report report;
+    bool *leaf = spl_alloc(spl_dataset_get_info(dataset)->nodes, sizeof *leaf, err);
+    const struct spl_rewrite rewrite = {.from = dataset, .leaf = leaf};
+    int rc = leaf ? spl_prune_plan(dataset, &how, leaf, &report, stage, err) : SPL_E_NOMEM;
+    if (!rc)
+        rc = spl_dataset_rewrite(&rewrite, o->output, err);
+    free(leaf);
+    return rc;
+}
+
 static int run_passes(struct passes *p, const char *part, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
     struct spl_dataset *dataset = NULL;
+    bool more = o->maps || o->prune > 1;
     int rc = open_part(part, &dataset, err);
     if (!rc && o->photos) {
-        rc = spl_photos_apply(o->photos, &p->photographs, dataset, o->maps ? part : o->output, p->stage, &p->photos,
-                              err);
+        rc = spl_photos_apply(o->photos, &p->photographs, dataset, more ? part : o->output, p->stage, &p->photos, err);
         spl_dataset_close(dataset);
         dataset = NULL;
-        if (!rc && o->maps)
+        if (!rc && more)
             rc = open_part(part, &dataset, err);
     }
     if (!rc && o->maps)
-        rc = spl_maps_apply(o->maps, &p->pictures, dataset, o->output, p->stage, &p->maps, err);
+        rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, err);
+    else if (!rc && more)
+        rc = write_pruned(o, dataset, p->stage, err);
     spl_dataset_close(dataset);
     return rc;
 }
 
-static int pack_passes(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
-                       struct spl_pack_report *report, struct spl_error *err)
+static void warn_of_picture(void *context, const struct spl_error *why)
 {
-    struct passes p = {.options = options, .stage = stage};
+    const struct spl_pack_options *options = context;
+    if (options->warn)
+        options->warn(options->progress_context, why->message);
+}
+
+/* Options of maps and their pictures become those that the scans bring along, or none. Nobody asked for these, so what
+ * is wrong with them fails nothing. */
+static int find_pictures(struct passes *p, struct spl_pack_options *options, struct spl_error *err)
+{
+    struct spl_map_sources found;
+    struct spl_error why = {0};
+    int rc = spl_map_sources_find(options->inputs, options->input_count, &found, &why);
+    p->with = *options->maps;
+    if (!p->with.refused) {
+        p->with.refused = warn_of_picture;
+        p->with.context = options;
+    }
+    if (!rc && !found.count && (p->with.export_to || p->with.edits))
+        rc = spl_fail_field(&why, SPL_E_USAGE, "panoramas",
+                            "these scans bring no panoramas along, so there are no maps to be edited: name --panoramas "
+                            "PATH, or scan");
+    if (!rc && found.count)
+        rc = spl_maps_load(&p->with, &found, &p->pictures, &p->maps, &why);
+    options->maps = p->pictures.count ? &p->with : NULL;
+    spl_map_sources_finish(&found);
+    if (rc && rc != SPL_E_NOMEM && rc != SPL_E_USAGE) {
+        warn_of_picture(options, &why);
+        return SPL_OK;
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
+/* What the file that was written last has. */
+static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_report *report)
+{
+    memcpy(report->attribute_bits, info->attribute_bits, sizeof report->attribute_bits);
+    report->pruned_of = info->leaf_splats < report->leaf_splats ? report->leaf_splats : 0;
+    report->leaf_splats = info->leaf_splats;
+    report->splats = info->splats;
+    report->pieces = info->pieces;
+    report->levels = info->levels;
+    report->nodes = info->nodes;
+    report->chunks = info->chunks;
+    report->pages = info->pages;
+    for (uint32_t s = 0; s < report->stream_count; s++)
+        report->streams[s].bits = info->streams[s].bits;
+}
+
+static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_pack_report *report,
+                       struct spl_error *err)
+{
+    const struct spl_pack_options *options = p->options;
     struct spl_dataset *dataset = NULL;
     char *part = NULL;
     int rc = SPL_OK;
-    if (options->photos && !(rc = spl_photos_load(options->photos, &p.photographs, &p.photos, err)))
-        rc = check_kept(options, &p.photographs, err);
-    if (!rc && options->maps)
-        rc = spl_maps_load(options->maps, &p.pictures, &p.maps, err);
+    if (options->photos && !(rc = spl_photos_load(options->photos, &p->photographs, &p->photos, err)))
+        rc = check_kept(options, &p->photographs, err);
+    if (!rc && options->maps && !p->pictures.count)
+        rc = spl_maps_load(options->maps, &(struct spl_map_sources){0}, &p->pictures, &p->maps, err);
     if (!rc && asprintf(&part, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
         part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
     if (!rc)
-        rc = pack_scan(options, inputs, part, &p, stage, report, err);
+        rc = pack_scan(options, inputs, part, p, p->stage, report, err);
     if (!rc)
-        rc = run_passes(&p, part, err);
+        rc = run_passes(p, part, err);
     if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
-        memcpy(report->attribute_bits, spl_dataset_get_info(dataset)->attribute_bits, sizeof report->attribute_bits);
-        report->photos = p.photos;
-        report->maps = p.maps;
-        report->seconds += p.photos.seconds + p.maps.seconds;
+        fill_rewritten(spl_dataset_get_info(dataset), report);
+        report->photos = p->photos;
+        report->maps = p->maps;
+        report->seconds += p->photos.seconds + p->maps.seconds;
     }
     spl_dataset_close(dataset);
-    spl_view_list_finish(&p.photographs);
-    spl_view_list_finish(&p.pictures);
     free(part);
     return rc;
 }
@@ -429,7 +497,13 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
-    if (options->points_only && options->maps)
+    if (options->points_only && options->prune > 1)
+        return spl_fail_field(err, SPL_E_USAGE, "points-only",
+                              "pruning weighs discs against each other; pack without --points-only, or without --prune");
+    if (options->prune > SPL_PRUNE_FACTOR_MAX)
+        return spl_fail_field(err, SPL_E_USAGE, "prune", "%u; of so many splats about one stays, 1 to %d",
+                              options->prune, SPL_PRUNE_FACTOR_MAX);
+    if (options->points_only && options->maps && !options->maps->find)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
     struct spl_stage stage = {.callback = options->progress,
@@ -444,8 +518,16 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
         return rc;
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
-    rc = options->photos || options->maps ? pack_passes(&found, &inputs, &stage, report, err)
-                                          : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
+    struct passes p = {.options = &found, .stage = &stage};
+    if (found.maps && found.maps->find && options->points_only)
+        found.maps = NULL;
+    if (found.maps && found.maps->find && !found.maps->panoramas)
+        rc = find_pictures(&p, &found, err);
+    if (!rc)
+        rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)
+                                        : pack_scan(&found, &inputs, found.output, NULL, &stage, report, err);
+    spl_view_list_finish(&p.photographs);
+    spl_view_list_finish(&p.pictures);
     spl_inputs_finish(&inputs);
     return rc;
 }
