@@ -10,9 +10,11 @@
 #include "base/memory.h"
 #include "dataset/rewrite.h"
 #include "pack/maps/colors.h"
+#include "pack/maps/edit.h"
 #include "pack/maps/maps.h"
 #include "pack/maps/pictures.h"
 #include "pack/maps/sees.h"
+#include "pack/prune.h"
 #include "pack/texture/photo_image.h"
 
 /* Bytes that colours and ranges of a map made from pictures may take together, a texel of colour. */
@@ -32,7 +34,12 @@ struct pass {
     struct spl_map_row *rows;
     uint32_t **codes;         /* by row: the words of its ranges */
     struct spl_chunk_stations *chunks;
+    float *seen;     /* by chunk: what share of it some map shows */
+    bool *leaf;      /* by node: as of struct spl_rewrite; NULL = nothing is pruned */
     uint32_t *words; /* of the map that is written */
+    struct spl_photo_whole whole;
+    struct spl_map_edits edits;
+    struct spl_map_export out;
     double errors;   /* of blocks, squared, summed over channels; of so many texels */
     double texels;
 };
@@ -120,13 +127,25 @@ static int find_chunks(struct pass *p, struct spl_error *err)
 {
     struct spl_map_sight *maps = spl_alloc(p->count, sizeof *maps, err);
     p->chunks = spl_alloc(p->splats.chunk_count, sizeof *p->chunks, err);
-    int rc = maps && p->chunks ? SPL_OK : SPL_E_NOMEM;
+    p->seen = spl_alloc(p->splats.chunk_count, sizeof *p->seen, err);
+    int rc = maps && p->chunks && p->seen ? SPL_OK : SPL_E_NOMEM;
     for (uint32_t row = 0; !rc && row < p->count; row++)
         maps[row] = (struct spl_map_sight){&p->rows[row], p->codes[row]};
     if (!rc)
-        rc = spl_map_find_chunks(&p->splats, &p->stations, p->row_of, maps, p->count, p->stage, p->chunks, err);
+        rc = spl_map_find_chunks(&p->splats, &p->stations, p->row_of, maps, p->stage, p->chunks, p->seen, err);
     free(maps);
     return rc;
+}
+
+static int prune(struct pass *p, const struct spl_dataset *dataset, uint32_t factor, struct spl_error *err)
+{
+    const struct spl_prune_options how = {.factor = factor, .seen = p->seen};
+    struct spl_prune_report report;
+    if (factor <= 1)
+        return SPL_OK;
+    if (!(p->leaf = spl_alloc(p->splats.node_count, sizeof *p->leaf, err)))
+        return SPL_E_NOMEM;
+    return spl_prune_plan(dataset, &how, p->leaf, &report, p->stage, err);
 }
 
 /* A picture that cannot be used: handed out and left out, or the end. */
@@ -152,7 +171,7 @@ static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station
     struct spl_pyramid pixels;
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc)
-        rc = spl_photo_image_load(view, &image, err);
+        rc = spl_photo_image_load_of(&p->whole, view, &image, err);
     if (!rc && (image.width != view->camera.width || image.height != view->camera.height)) {
         rc = spl_fail_field(err, SPL_E_INPUT, "width", "%s: %u x %u pixels; its camera says %u x %u", view->photograph,
                             image.width, image.height, view->camera.width, view->camera.height);
@@ -213,6 +232,8 @@ static int get_map(void *context, uint32_t index, const uint32_t **words, struct
     int rc = p->words ? make_colors(p, index, row->side, &atlas, err) : SPL_E_NOMEM;
     if (!rc)
         memcpy(p->words, p->codes[index], spl_map_range_words(row) * sizeof *p->words);
+    if (!rc)
+        rc = spl_map_edit(&p->edits, &p->out, index, row, p->words, &atlas, err);
     for (uint32_t level = 0; level < row->levels && !rc; level++) {
         struct spl_atlas half = {0};
         p->errors += spl_atlas_encode(&atlas, p->stage->threads, p->words + spl_map_level_word(row, level));
@@ -246,17 +267,33 @@ static void refuse_picture(void *context, const struct spl_error *why)
     loading->options->refused(loading->options->context, why);
 }
 
-int spl_maps_load(const struct spl_map_options *options, struct spl_view_list *list, struct spl_map_report *report,
-                  struct spl_error *err)
+static int open_files(const struct spl_map_options *options, struct spl_map_edits *edits, struct spl_map_export *out,
+                      struct spl_error *err)
 {
+    int rc = options->edits ? spl_map_edits_init(edits, options->edits, err) : SPL_OK;
+    return rc || !options->export_to ? rc : spl_map_export_init(out, options->export_to, err);
+}
+
+int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
+                  struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err)
+{
+    struct spl_map_edits edits = {0};
+    struct spl_map_export out = {0};
     struct loading loading = {options, report};
-    const struct spl_map_picture_options how = {.paths = &options->panoramas,
-                                                .count = options->panoramas != NULL,
+    const struct spl_map_picture_options how = {.paths = found->count ? (const char *const *)found->paths
+                                                                      : &options->panoramas,
+                                                .count = found->count ? found->count : options->panoramas != NULL,
                                                 .images = options->images,
                                                 .refuse = options->refused ? refuse_picture : NULL,
                                                 .context = &loading};
-    int rc = options->panoramas ? spl_map_pictures_load(&how, list, err) : SPL_OK;
+    int rc = how.count ? spl_map_pictures_load(&how, list, err) : SPL_OK;
     report->pictures = (uint32_t)list->count;
+    if (!rc) /* said now, not when packing has taken its time */
+        rc = open_files(options, &edits, &out, err);
+    spl_map_export_finish(&out);
+    spl_map_edits_finish(&edits);
+    if (rc)
+        spl_view_list_finish(list);
     return rc;
 }
 
@@ -271,16 +308,18 @@ static void name_nowhere(void *context, const struct spl_named_view *view, doubl
         p->options->refused(p->options->context, &why);
 }
 
-int spl_maps_apply(const struct spl_map_options *options, const struct spl_view_list *views,
-                   const struct spl_dataset *dataset, const char *output, struct spl_stage *stage,
-                   struct spl_map_report *report, struct spl_error *err)
+int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view_list *views,
+                   const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
+                   struct spl_error *err)
 {
-    struct pass p = {.options = options, .views = views, .stage = stage, .report = report};
+    struct pass p = {.options = options->maps, .views = views, .stage = stage, .report = report};
     uint64_t begin_ns = spl_now_ns();
     json_t *about = NULL;
-    int rc = spl_splats_init(&p.splats, dataset, err);
-    if (rc || (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
-        (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)))
+    int rc = open_files(options->maps, &p.edits, &p.out, err);
+    if (rc || (rc = spl_splats_init(&p.splats, dataset, err)) ||
+        (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
+        (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
+        (rc = prune(&p, dataset, options->prune, err)))
         goto done;
     about = json_pack("{s:i}", "pictures", (int)(report->pictures - report->refused));
     const struct spl_rewrite rewrite = {.from = dataset,
@@ -289,10 +328,14 @@ int spl_maps_apply(const struct spl_map_options *options, const struct spl_view_
                                         .stations = p.chunks,
                                         .get_map = get_map,
                                         .context = &p,
+                                        .leaf = p.leaf,
+                                        .leaf_radius = spl_prune_leaf_radius(dataset),
                                         .about_maps = about};
     spl_stage_begin(stage, "maps", NULL, p.count + views->count);
-    rc = spl_dataset_rewrite(&rewrite, output, err);
+    rc = spl_dataset_rewrite(&rewrite, options->output, err);
     spl_stage_end(stage);
+    if (!rc && p.out.folder)
+        rc = spl_map_export_commit(&p.out, err);
     report->stations = p.count;
     for (uint32_t row = 0; row < p.count; row++) {
         report->side = p.rows[row].side > report->side ? p.rows[row].side : report->side;
@@ -310,7 +353,12 @@ done:
     free(p.station_of);
     free(p.row_of);
     free(p.chunks);
+    free(p.seen);
+    free(p.leaf);
     free(p.words);
+    spl_photo_whole_finish(&p.whole);
+    spl_map_export_finish(&p.out);
+    spl_map_edits_finish(&p.edits);
     spl_stations_finish(&p.stations);
     spl_splats_finish(&p.splats);
     return rc;
