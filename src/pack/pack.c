@@ -507,7 +507,9 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     struct passes p = {.options = &found, .stage = &stage};
     if (found.maps && found.maps->find && options->points_only)
         found.maps = NULL;
-    if (found.maps && found.maps->find && !found.maps->panoramas)
+    if (found.maps)
+        rc = spl_maps_check(found.maps, err);
+    if (!rc && found.maps && found.maps->find && !found.maps->panoramas)
         rc = find_pictures(&p, &found, err);
     if (!rc)
         rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)
