@@ -68,11 +68,11 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
             output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
             (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels,
             (unsigned long long)r->nodes, r->pages);
-    if (r->pruned_of)
-        fprintf(stderr, "pruned to one of %.1f of %llu leaf splats\n", (double)r->pruned_of / (double)r->leaf_splats,
-                (unsigned long long)r->pruned_of);
     fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
             (unsigned long long)r->leaf_splats);
+    if (r->pruned_of)
+        fprintf(stderr, "pruned: %llu of %llu leaf splats are left, one of %.1f\n", (unsigned long long)r->leaf_splats,
+                (unsigned long long)r->pruned_of, (double)r->pruned_of / (double)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++) {
         total += r->attribute_bits[a];
@@ -289,8 +289,8 @@ static const struct spl_cmd_option options[] = {
     {"maps", "DIR", "such a folder, whose colours are taken into the maps after they were edited",
      SPL_CMD_TEXT(struct arguments, maps.edits)},
     {"prune", "N",
-     "keep about one of N splats, more where geometry needs them, or colours where no map shows them (1 to 1000)",
-     .otherwise = "all", SPL_CMD_REAL(struct arguments, pack.prune, 1, 1000)},
+     "about one of N splats stays for good, 2 to 1000, where a coarser one is as good; best with maps, whose colours stay "
+     "as fine as they are", .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
@@ -309,7 +309,7 @@ static const struct spl_cmd_table table = {
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep LIST]\n"
         "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
-        "                   [--max-points N] [--prune N] [--threads N]\n"
+        "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"

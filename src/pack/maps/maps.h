@@ -18,9 +18,10 @@ int spl_maps_check(const struct spl_map_options *options, struct spl_error *err)
 int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
                   struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err);
 
-/* Writes `output` from `dataset`, which keeps all its tables, with a map of each station. Blocks; adds to *report. */
-int spl_maps_apply(const struct spl_map_options *options, const struct spl_view_list *views,
-                   const struct spl_dataset *dataset, const char *output, struct spl_stage *stage,
-                   struct spl_map_report *report, struct spl_error *err);
+/* Writes options->output from `dataset`, which keeps all its tables, with a map of each station as options->maps says,
+ * pruned as options->prune does. Blocks; adds to *report. */
+int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view_list *views,
+                   const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
+                   struct spl_error *err);
 
 #endif
