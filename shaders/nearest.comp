@@ -1,12 +1,14 @@
 /* Method nearest: each sample keeps the disc whose depth, bent into a cone by as much of the blend margin as the sample
  * lies off the disc's centre, is the least; the least payload among equals. So discs of one surface meet where their
  * cones do, in the middle between their centres, without sums. The payload (constant 0) is what the requested layer
- * needs: colour, octahedral normal, id, or the depth that was not bent. */
+ * needs: colour, octahedral normal, id, the depth that was not bent, or for maps colour and how far it was. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
+#include "common/bend.glsl"
 #include "common/clip.glsl"
+#include "common/trim.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
@@ -15,7 +17,7 @@ void draw(splat_run run, splat s)
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
     uint payload = run.chunk.first_id + s.index;
-    if (GROUP == SPL_SUMS_COLOR) {
+    if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
         uvec3 c = load_color(run.chunk, s.index);
         payload = c.x | c.y << 8 | c.z << 16;
     } else if (GROUP == SPL_SUMS_NORMAL) {
@@ -23,16 +25,20 @@ void draw(splat_run run, splat s)
     }
     disc d = make_disc(s, run.low, run.high);
     clip_line line = load_clip(run.chunk, s);
+    trim_rule rule = load_trim(s);
     ivec2 sample_at = d.first;
     for (;;) { /* the end is asked for at the end: see splat_depth.comp */
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
+        distance = trim(rule, sample_at, z, distance);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             precise float bent = z + d.margin * distance;
             uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
             if (wins(at, bits))
-                put(at, bits, GROUP == SPL_SUMS_DEPTH ? floatBitsToUint(z) : payload);
+                put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
+                              : GROUP == SPL_SUMS_MAPPED ? payload | bend_code(z, bent) << 24
+                                                         : payload);
         }
         next_sample(d, sample_at);
         if (sample_at.y > d.last.y)

@@ -8,42 +8,18 @@
  *   coverage  float, share of the samples that hold something */
 #version 450
 #extension GL_GOOGLE_include_directive : require
-#include "common/frame.glsl"
+#include "common/samples.glsl"
 #include "common/octahedral.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
 layout(constant_id = 1) const uint RESOLVED = SPL_RESOLVED_SUMS;
 
-SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics payload, depth of the nearest */
-SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) sums_texels;
 layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 
-uint depth_word(uint at)
-{
-#ifdef SPL_ATOMICS_64
-    return imageLoad(depth_texels, int(2u * at + 1u)).x;
-#else
-    return imageLoad(depth_texels, int(at)).x;
-#endif
-}
-
-uint payload(uint at)
-{
-#ifdef SPL_ATOMICS_64
-    return imageLoad(depth_texels, int(2u * at)).x;
-#else
-    return imageLoad(id_texels, int(at)).x;
-#endif
-}
-
-uvec4 load_sums(uint at)
-{
-    int word = 4 * int(at);
-    return uvec4(imageLoad(sums_texels, word).x, imageLoad(sums_texels, word + 1).x, imageLoad(sums_texels, word + 2).x,
-                 imageLoad(sums_texels, word + 3).x);
-}
+/* Sums have specks; colours that maps were added to are sums of floats. */
+const bool SUMMED = RESOLVED == SPL_RESOLVED_SUMS || RESOLVED == SPL_RESOLVED_MAPPED;
+const bool MAPPED = RESOLVED == SPL_RESOLVED_MAPPED || RESOLVED == SPL_RESOLVED_MAPPED_BENT;
 
 /* View depth of a covered sample. */
 float sample_depth(uint at)
@@ -51,10 +27,7 @@ float sample_depth(uint at)
     float first = uintBitsToFloat(RESOLVED == SPL_RESOLVED_BENT ? payload(at) : depth_word(at));
     if (RESOLVED != SPL_RESOLVED_SUMS)
         return first;
-    uvec4 sum = load_sums(at);
-    precise float offset = (float(sum.y) * 512.0 + float(sum.x)) / float(sum.w);
-    precise float z = first - first * (offset * (1.0 / 262144.0));
-    return z;
+    return summed_depth(at, first);
 }
 
 vec3 sample_normal(uint at)
@@ -65,24 +38,14 @@ vec3 sample_normal(uint at)
     return normalize(vec3(sum.xyz) / float(sum.w) - 127.5);
 }
 
-uvec3 unpack_color(uint word)
-{
-    return (uvec3(word) >> uvec3(0u, 8u, 16u)) & 255u;
-}
-
 uvec3 sample_color(uint at)
 {
-    if (RESOLVED != SPL_RESOLVED_SUMS)
+    if (!SUMMED && !MAPPED)
         return unpack_color(payload(at));
     uvec4 sum = load_sums(at);
+    if (MAPPED)
+        return uvec3(uintBitsToFloat(sum.xyz) / uintBitsToFloat(sum.w) + 0.5);
     return uvec3(vec3(sum.xyz) / float(sum.w) + 0.5); /* no integer division: software drivers do it lane by lane */
-}
-
-/* The i-th of the 3 x 3 samples around `at`; outside of the tile `at` itself. */
-uint sample_beside(ivec2 at, int i)
-{
-    ivec2 beside = at + ivec2(i % 3 - 1, i / 3 - 1);
-    return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
 }
 
 /* What stands for sample `at`: itself, or, where it is a speck (empty, and at least seven of the eight around it are
@@ -90,7 +53,7 @@ uint sample_beside(ivec2 at, int i)
 uint standing_for(ivec2 at)
 {
     uint own = sample_index(at), found = own;
-    if (RESOLVED != SPL_RESOLVED_SUMS || depth_word(own) != SPL_NOTHING)
+    if (!SUMMED || depth_word(own) != SPL_NOTHING)
         return own;
     precise float sum = 0.0;
     float covered = 0.0, closest = 3.4e38;
@@ -111,24 +74,6 @@ uint standing_for(ivec2 at)
             break;
     }
     return found;
-}
-
-/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. */
-uvec3 smooth_color(ivec2 at, uint own)
-{
-    float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
-    vec3 sum = vec3(0.0);
-    for (int i = 0;;) {
-        uint beside = sample_beside(at, i);
-        float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
-        float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
-        weight = abs(z - first) <= SPL_SMOOTH_SHARE * first ? weight : 0.0;
-        sum += weight * vec3(unpack_color(payload(beside)));
-        weights += weight;
-        if (++i >= 9)
-            break;
-    }
-    return uvec3(sum / weights + 0.5);
 }
 
 /* The i-th sample, row by row, of the pixel whose first is `corner`; a side is a power of two. */
@@ -158,7 +103,7 @@ void main()
         if (bits != SPL_NOTHING) {
             covered++;
             if (LAYER == SPL_RESOLVE_COLOR)
-                color += RESOLVED == SPL_RESOLVED_BENT ? smooth_color(pixel_place(corner, i), at) : sample_color(at);
+                color += RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
             if (LAYER == SPL_RESOLVE_NORMAL)
                 normal += sample_normal(at);
             if (LAYER == SPL_RESOLVE_ID && bits <= nearest)

@@ -36,6 +36,7 @@
 #define SPL_SUMS_NORMAL 2
 #define SPL_SUMS_ID 3
 #define SPL_SUMS_COUNT 4
+#define SPL_SUMS_MAPPED 4 /* method nearest alone: colours for maps to add to, and how far the depth was bent */
 
 /* Layers of the resolve pass, the values of enum spl_layer. */
 #define SPL_RESOLVE_COLOR 0
@@ -49,6 +50,8 @@
 #define SPL_RESOLVED_SUMS 0    /* sums over fragments, as the shade pass leaves them */
 #define SPL_RESOLVED_NEAREST 1 /* the nearest one's depth and payload */
 #define SPL_RESOLVED_BENT 2    /* the same, but the depth only orders: that of layers is the payload; colours are smoothed */
+#define SPL_RESOLVED_MAPPED 3      /* as SUMS, but colours are sums of floats that maps added to */
+#define SPL_RESOLVED_MAPPED_BENT 4 /* as NEAREST, but the same */
 /* Samples of one surface that are smoothed differ in depth by this share at most. */
 #define SPL_SMOOTH_SHARE 0.01f
 
@@ -127,6 +130,17 @@
 /* frame.map_sides: colour side / SPL_MAP_SIDE_STEP 0..7, levels 8..11, side of ranges 12..31 */
 #define SPL_MAP_SIDES_LEVELS 8
 #define SPL_MAP_SIDES_RANGE 12
+
+/* Ranges of a surface differ by this share of a disc's radius, since discs stand for what is not flat; and no surface is
+ * taken to slant by more than 80 degrees. */
+#define SPL_MAP_TOLERANCE 0.35f
+#define SPL_MAP_FACING_MIN 0.17364818f
+/* Maps give their colours to the image in cells of this many samples a side. */
+#define SPL_MAP_CELL 8
+/* The weight of the splats' own colours beside those of maps: a power of two, less than any of these. */
+#define SPL_MAP_BASE 1.2037062152420224e-35f
+/* A map's weight is the eighth power of a share that stays within this and one over it. */
+#define SPL_MAP_SHARE_MIN 2.44140625e-4f
 
 /* Polynomials for arc functions (src/geom/polar.c says of what), each to 1e-7. */
 #define SPL_POLAR_EDGE 0.70710678f

@@ -2,6 +2,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/clip.glsl"
+#include "common/trim.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
@@ -14,14 +15,15 @@ void draw(splat_run run, splat s)
         return;
     disc d = make_disc(s, run.low, run.high);
     clip_line line = load_clip(run.chunk, s);
+    trim_rule rule = load_trim(s);
     ivec2 at = d.first;
     /* The end is asked for at the end, here and in main(): software drivers leave a loop only there, so that a question
      * at its start costs every group of lanes another round, with all of them off. */
     for (;;) {
         float z;
         vec3 offset;
-        float distance = disc_sample(d, at, z, offset);
-        if (clip(line, offset, distance) < 1.0 && at.y <= d.last.y) {
+        float distance = clip(line, offset, disc_sample(d, at, z, offset));
+        if (trim(rule, at, z, distance) < 1.0 && at.y <= d.last.y) {
             precise float pushed = z + d.margin;
             uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
             if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */

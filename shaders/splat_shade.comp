@@ -18,6 +18,7 @@
 #else
 #include "common/clip.glsl"
 #endif
+#include "common/trim.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 #ifdef SPL_TEXTURED
@@ -82,6 +83,7 @@ void draw(splat_run run, splat s)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s, run.low, run.high);
     clip_line line = load_clip(run.chunk, s);
+    trim_rule rule = load_trim(s);
 #ifdef SPL_TEXTURED
     splat_texture t = load_texture(run.chunk, s, value);
     lay_texture(t, run.chunk, s, gl_GlobalInvocationID.x / SPL_LANES * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);
@@ -91,6 +93,7 @@ void draw(splat_run run, splat s)
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
+        distance = trim(rule, sample_at, z, distance);
         uint at = image_sample_index(sample_at);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);

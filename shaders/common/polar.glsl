@@ -42,6 +42,48 @@ vec3 map_point(vec3 p)
     return g;
 }
 
+/* A direction of view space there. */
+vec3 map_direction(vec3 v)
+{
+    precise vec3 g = vec3(frame.map_pose[0] * v.x + frame.map_pose[1] * v.y + frame.map_pose[2] * v.z,
+                          frame.map_pose[4] * v.x + frame.map_pose[5] * v.y + frame.map_pose[6] * v.z,
+                          frame.map_pose[8] * v.x + frame.map_pose[9] * v.y + frame.map_pose[10] * v.z);
+    return g;
+}
+
+/* The point of view space at depth z of sample `at` of the image. */
+vec3 view_point(ivec2 at, float z)
+{
+    precise vec2 ray = vec2((float(at.x) + 0.5 - frame.cx) * frame.inverse_fx,
+                            (float(at.y) + 0.5 - frame.cy) * frame.inverse_fy);
+    precise vec2 p = ray * z;
+    return vec3(p, z);
+}
+
+/* The unit direction of a point of the station's frame, and its range. */
+vec3 map_look(vec3 g, out float range)
+{
+    precise float length_squared = g.x * g.x + g.y * g.y + g.z * g.z;
+    precise float r = sqrt(length_squared);
+    precise vec3 d = g * (1.0 / max(r, 1e-20));
+    range = r;
+    return d;
+}
+
+/* The cosine of the angle between a surface of unit normal `normal` and direction d, of 80 degrees at most. */
+float map_facing(vec3 normal, vec3 d)
+{
+    precise float c = normal.x * d.x + normal.y * d.y + normal.z * d.z;
+    return clamp(abs(c), SPL_MAP_FACING_MIN, 1.0);
+}
+
+/* How far apart ranges are of the surface in texels of the ranges side by side. */
+float map_slant(float facing, float range)
+{
+    precise float slant = range * (1.57079633 / map_range_side()) * (sqrt(1.0 - facing * facing) / facing);
+    return slant;
+}
+
 /* Which chart has unit direction d, 0 to 2, and where in it, as shares of a side from the chart's proper corner: the
  * band's x goes to 4. spl_polar_place_f() without side and apron. */
 vec3 polar_chart(vec3 d)

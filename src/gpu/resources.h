@@ -12,12 +12,14 @@ enum spl_resource {
     SPL_RESOURCE_PAGE,      /* uint[], one page of the dataset as it lies in the file */
     SPL_RESOURCE_TEXTURES,  /* uint[], one page's section TEXP as it lies in the file */
     SPL_RESOURCE_ATOMS,     /* uint[], the dictionary, expanded (src/dataset/dictionary.h) */
+    SPL_RESOURCE_MAP,       /* uint[], the map of a station as it lies in the file */
     SPL_RESOURCE_DEPTH,     /* uint[] or uint64[], one a sample */
-    SPL_RESOURCE_SUMS,      /* uint[], four words a sample, see splat_shade.comp */
+    SPL_RESOURCE_SUMS,      /* uint[], four words a sample, see splat_shade.comp; floats where maps were added */
     SPL_RESOURCE_PLANES,    /* uint[], of the screen-space filter, see fill.c */
     SPL_RESOURCE_IDS,       /* uint[], id or payload of the nearest splat, one a sample */
     SPL_RESOURCE_OCCLUDERS, /* uint[], greatest depth word of every tile of SPL_OCCLUSION_TILE samples a side */
     SPL_RESOURCE_SUMMED,    /* uint[], sums of atoms, texels as in the dictionary */
+    SPL_RESOURCE_SURFACE,   /* float[], view depth of the surface, one a sample */
     SPL_RESOURCE_OUTPUT,    /* uint[], requested layers one after the other, one word a pixel */
     SPL_RESOURCE_COUNT
 };

@@ -33,10 +33,11 @@ static uint32_t runs(const struct spl_draw_chunk *chunk)
 }
 
 /* Phases are told when all chunks are there. */
-static struct spl_draw_key key_of(uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk)
+static struct spl_draw_key key_of(const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk)
 {
-    return (struct spl_draw_key){.page = page,
-                                 .kind = (uint8_t)kind,
+    return (struct spl_draw_key){.page = origin->page,
+                                 .kind = (uint8_t)origin->kind,
+                                 .trims = origin->trims,
                                  .planes = (uint8_t)(chunk->texture >> SPL_CHUNK_TEXTURE_PLANES),
                                  .smooth = chunk->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1,
                                  .apart = chunk->color_bits >> SPL_COLOR_CLIP};
@@ -44,24 +45,33 @@ static struct spl_draw_key key_of(uint32_t page, uint32_t kind, const struct spl
 
 static uint64_t word_of(const struct spl_draw_key *key)
 {
-    return (uint64_t)key->page << 32 | (uint32_t)key->kind << 16 | (uint32_t)key->planes << 8 |
-           (uint32_t)key->smooth << 2 | (uint32_t)key->apart << 1 | key->back;
+    return (uint64_t)key->page << 32 | (uint32_t)key->trims << 16 | (uint32_t)key->kind << 8 |
+           (uint32_t)key->planes << 3 | (uint32_t)key->smooth << 2 | (uint32_t)key->apart << 1 | key->back;
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
-    list->chunk_count = list->entry_count = list->batch_count = list->first_back_chunk = 0;
+    list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
     list->splats = list->listed_splats = list->sample_splats = 0;
     list->nodes = 0;
     list->complete = true;
 }
 
-int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk,
-                      const struct spl_chunk_bounds *bounds, struct spl_error *err)
+static int check_entries(const struct spl_draw_list *list, uint32_t more, struct spl_error *err)
 {
-    if (list->entry_count + runs(chunk) > ENTRIES_MAX)
+    if (list->entry_count + more > ENTRIES_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "lod", "this view needs more than %u runs of splats; raise lod",
                               ENTRIES_MAX);
+    return SPL_OK;
+}
+
+int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
+                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds,
+                      struct spl_error *err)
+{
+    int rc = check_entries(list, runs(chunk), err);
+    if (rc)
+        return rc;
     if (list->chunk_count == list->chunk_capacity) {
         size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a;
         if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
@@ -72,9 +82,9 @@ int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, 
     }
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
-    list->key_of_chunk[list->chunk_count++] = key_of(page, kind, chunk);
+    list->key_of_chunk[list->chunk_count++] = key_of(origin, chunk);
     list->entry_count += runs(chunk);
-    list->listed_splats += kind == SPL_CHUNK_DISCS ? splats(chunk) : 0;
+    list->listed_splats += origin->kind == SPL_CHUNK_DISCS ? splats(chunk) : 0;
     return SPL_OK;
 }
 
@@ -171,6 +181,17 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
     return rc;
 }
 
+int spl_draw_list_add_map(struct spl_draw_list *list, uint32_t station, uint32_t cells, struct spl_error *err)
+{
+    int rc = check_entries(list, cells, err);
+    rc = rc ? rc : grow((void **)&list->maps, &list->map_capacity, list->map_count + 1, sizeof *list->maps, err);
+    rc = rc ? rc : grow((void **)&list->entries, &list->entry_capacity, list->entry_count + cells,
+                        sizeof *list->entries, err);
+    if (!rc)
+        list->maps[list->map_count++] = (struct spl_draw_map){station, (uint32_t)list->entry_count, cells};
+    return rc;
+}
+
 uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
                                     uint64_t most_lines)
 {
@@ -192,6 +213,7 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->bounds);
     free(list->entries);
     free(list->batches);
+    free(list->maps);
     free(list->key_of_chunk);
     *list = (struct spl_draw_list){0};
 }

@@ -19,6 +19,7 @@ struct spl_draw_key {
     bool smooth;    /* texels are interpolated, of sums */
     bool apart;     /* chunks with clip lines */
     bool back;
+    uint16_t trims; /* the station whose map trims them, plus 1; 0 = none does */
 };
 
 /* The draw-list entries of one key. */
@@ -28,14 +29,21 @@ struct spl_draw_batch {
     uint32_t first_round, round_entries; /* a round draws so many entries, the last the rest */
 };
 
+/* Cells of the image that take colours from the map of a station. */
+struct spl_draw_map {
+    uint32_t station, first_entry, cells;
+};
+
 struct spl_draw_list {
     struct spl_draw_chunk *chunks;   /* visible chunks, roughly front to back */
     struct spl_chunk_bounds *bounds; /* parallel to chunks */
-    uint32_t *entries;               /* chunk index << SPL_RUN_BITS | run, batch after batch */
+    uint32_t *entries;               /* chunk index << SPL_RUN_BITS | run, batch after batch; then column | row << 16
+                                        of cells, map after map */
     struct spl_draw_batch *batches;  /* in the order in which their pages were first met */
+    struct spl_draw_map *maps;       /* by rising station */
     size_t first_back_chunk;         /* chunks from here on are of the back phase */
-    size_t chunk_count, entry_count, batch_count;
-    size_t chunk_capacity, entry_capacity, batch_capacity;
+    size_t chunk_count, entry_count, batch_count, map_count;
+    size_t chunk_capacity, entry_capacity, batch_capacity, map_capacity;
     struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
     uint64_t splats;                   /* that are drawn */
     uint64_t listed_splats;            /* the same, once for every window that they are drawn in */
@@ -47,13 +55,23 @@ struct spl_draw_list {
 /* Empties the list and keeps its memory. */
 void spl_draw_list_clear(struct spl_draw_list *list);
 
-/* Appends a chunk of `kind` (enum spl_chunk_kind) of page `page`; of lines `count` are vertices. SPL_E_NOMEM;
- * SPL_E_LIMIT above 2^28 entries. */
-int spl_draw_list_add(struct spl_draw_list *list, uint32_t page, uint32_t kind, const struct spl_draw_chunk *chunk,
-                      const struct spl_chunk_bounds *bounds, struct spl_error *err);
+/* Where a chunk comes from. */
+struct spl_draw_origin {
+    uint32_t page, kind; /* enum spl_chunk_kind; of lines `count` are vertices */
+    uint16_t trims;      /* as in spl_draw_key */
+};
+
+/* Appends a chunk. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
+int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
+                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds,
+                      struct spl_error *err);
 
 /* Lays out entries and batches of all chunks added. SPL_E_NOMEM. */
 int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err);
+
+/* Then: appends a station's map, of a higher station than the last, with room for `cells` entries behind the others,
+ * which the caller appends. SPL_E_NOMEM, SPL_E_LIMIT. */
+int spl_draw_list_add_map(struct spl_draw_list *list, uint32_t station, uint32_t cells, struct spl_error *err);
 
 /* Cuts every batch into rounds, each a dispatch with parameters of its own, of `most` entries at most, of `most_summed`
  * where texels are interpolated, of `most_lines` of lines (all 1 and more), and returns how many there are. All passes

@@ -8,6 +8,7 @@
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/slot.h"
+#include "render/map_cells.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -50,6 +51,12 @@ static enum spl_select_answer ask_textures(void *context, uint32_t page)
     return dictionary == SPL_SELECT_YES ? textures : dictionary;
 }
 
+static enum spl_select_answer ask_map(void *context, uint32_t station)
+{
+    struct spl_frame_job *job = context;
+    return ask_slot(job, spl_slot_of_map(job->resident->dataset, station));
+}
+
 /* The same of tables, which a walk cannot do without: what is on its way is not there. */
 static enum spl_select_answer ask_tables(void *context, uint32_t page, const struct spl_tables **tables)
 {
@@ -74,17 +81,21 @@ static int end_walk(struct spl_frame_job *job, struct spl_error *err)
 struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const struct spl_camera *camera)
 {
     const struct spl_method_row *method = spl_method_row(job->view->method);
+    uint32_t maps = spl_dataset_get_info(job->resident->dataset)->maps ? spl_view_get_maps(job->view) : 0;
+    bool textured = spl_view_is_textured(job->view) && !maps;
     return (struct spl_select_params){
         .dataset = job->resident->dataset,
         .camera = camera,
         .lod = job->view->lod,
-        .low_pass = SPL_LOW_PASS,
+        .low_pass = SPL_LOW_PASS + (maps & SPL_MAP_COLORS ? SPL_MAP_CELLS_PAD : 0),
         .discs = method->discs,
         .lines = method->lines,
         .tables = ask_tables,
         .resident = ask_page,
-        .atoms = spl_view_is_textured(job->view) ? job->view->disc.atoms : 0,
+        .atoms = textured ? job->view->disc.atoms : 0,
         .textured = ask_textures,
+        .maps = maps,
+        .mapped = ask_map,
         .context = job,
     };
 }
@@ -111,6 +122,8 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
     struct spl_renderer *r = job->renderer;
     const struct spl_method_row *method = spl_method_row(job->view->method);
     struct spl_select_params params = spl_frame_selection(job, &tile->camera);
+    params.corner[0] = tile->params.tile_x;
+    params.corner[1] = tile->params.tile_y;
     spl_residency_begin_walk(&r->residency, &job->hold);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
     int rc = spl_select(&params, &r->list, &why), waits = end_walk(job, err);

@@ -15,6 +15,7 @@ struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */
     bool wide;                                /* its variant with 64 bit atomics where the device has them */
     uint32_t constants[SPL_KERNEL_CONSTANTS]; /* as the shader numbers them; those that it does not declare are 0 */
+    bool trims;                               /* its variant NAME_trim, for chunks that a map trims */
 };
 
 struct spl_kernels {

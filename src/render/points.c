@@ -11,17 +11,17 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     for (uint32_t pass = 0; pass < (wide ? 1u : 2u); pass++) {
-        struct spl_gpu_kernel *kernel;
+        struct spl_disc_kernels kernel = {0};
         struct spl_kernel_key key = {"points", true, {group, pass, filled}};
-        int rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernel, err);
+        int rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernel.of[0], err);
         if (rc)
             return rc;
-        spl_tile_dispatch_splats(tile, kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
+        spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
         struct spl_kernel_key lines = {"fill_lines", true, {group, pass}};
-        if (filled && (rc = spl_kernels_get(&r->kernels, r->gpu, &lines, &kernel, err)))
+        if (filled && (rc = spl_kernels_get(&r->kernels, r->gpu, &lines, &kernel.of[0], err)))
             return rc;
         if (filled)
-            spl_tile_dispatch_splats(tile, kernel,
+            spl_tile_dispatch_splats(tile, &kernel,
                                      &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);

@@ -35,6 +35,7 @@ enum spl_area {
     SPL_AREA_IDS,       /* small, until the group's layers are resolved */
     SPL_AREA_OCCLUDERS, /* small, between two dispatches */
     SPL_AREA_SUMMED,    /* small, between two dispatches */
+    SPL_AREA_SURFACE,   /* small, between two dispatches */
     SPL_AREA_COUNT
 };
 
@@ -57,7 +58,8 @@ struct spl_tile {
     struct spl_fill_plan fill;    /* of methods that fill */
     uint32_t x, y, width, height; /* in the image, pixels */
     uint64_t samples;
-    struct spl_frame_params params;              /* common to all dispatches of the tile */
+    struct spl_frame_params params;              /* common to all dispatches of the tile, but for map_* */
+    struct spl_gpu_buffer *map;                  /* that map_* are of; NULL = none so far */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
     uint32_t stamps;                             /* timestamps written */
@@ -86,13 +88,19 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
  * SPL_E_LIMIT. */
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 
-/* The kernel of `key`, and where chunks are drawn that have clip lines the one of theirs (constant 2,
- * common/clip.glsl); else NULL. */
-int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_gpu_kernel **plain,
-                              struct spl_gpu_kernel **clipped, struct spl_error *err);
+/* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), or both; NULL = as
+ * those that have neither. */
+enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_COUNT = 4 };
+struct spl_disc_kernels {
+    struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
+};
+
+/* Those of `key` that the tile's chunks need, and the first. */
+int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
+                              struct spl_error *err);
 
 enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
-/* Records `kernel` once per page of the draw list (and per the device's largest dispatch), for the given phases and
+/* Records the kernel of each chunk once per page of the draw list (and per the device's largest dispatch), for the given phases and
  * chunks. */
 struct spl_dispatch {
     enum spl_phase phases;
@@ -100,10 +108,9 @@ struct spl_dispatch {
     bool by_texture; /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
-    struct spl_gpu_kernel *clipped; /* for chunks with clip lines; NULL = as the others */
-    struct spl_gpu_kernel *sum;     /* runs before, to sum textures into SPL_AREA_SUMMED; NULL = none */
+    struct spl_gpu_kernel *sum; /* runs before, to sum textures into SPL_AREA_SUMMED; NULL = none */
 };
-void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
+void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
                               const struct spl_dispatch *what);
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides; `wide`: of words of 64 bits.
  */
@@ -111,6 +118,14 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool 
 /* Records a kernel, one invocation for each of `items`, and a barrier. */
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,
                             const struct spl_frame_params *params, uint32_t items, struct spl_error *err);
+/* The same for each sample of the tile, of which frame.entries says how many there are. */
+int spl_tile_dispatch_samples(struct spl_tile *tile, const struct spl_kernel_key *key, struct spl_error *err);
+/* tile_maps.c: tells dispatches to come of a station's map, which must be on the device. */
+void spl_tile_set_map(struct spl_tile *tile, uint32_t station);
+/* Do layers of `group` take colours from maps? */
+bool spl_tile_has_map_colors(const struct spl_tile *tile, uint32_t group);
+/* Records them, and a barrier: the group's sums (of method nearest payloads) become sums of floats. */
+int spl_tile_dispatch_maps(struct spl_tile *tile, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */

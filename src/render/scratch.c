@@ -22,6 +22,7 @@ static const struct {
     [SPL_AREA_IDS] = {false, LIFE_GROUP, SPL_RESOURCE_IDS},
     [SPL_AREA_OCCLUDERS] = {false, LIFE_DISPATCHES, SPL_RESOURCE_OCCLUDERS},
     [SPL_AREA_SUMMED] = {false, LIFE_DISPATCHES, SPL_RESOURCE_SUMMED},
+    [SPL_AREA_SURFACE] = {false, LIFE_DISPATCHES, SPL_RESOURCE_SURFACE},
 };
 
 struct spl_gpu_buffer *spl_tile_begin_area(struct spl_tile *tile, enum spl_area area)
@@ -47,6 +48,7 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_CHUNKS].buffer = scratch->chunks;
     bindings[SPL_RESOURCE_BOUNDS].buffer = scratch->bounds;
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
+    bindings[SPL_RESOURCE_MAP].buffer = tile->map;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
     for (int area = 0; area < SPL_AREA_COUNT; area++)
         if (tile->areas >> area & 1)

@@ -9,6 +9,7 @@
 #include "render/children.h"
 #include "render/frustum.h"
 #include "render/occupancy.h"
+#include "render/map_cells.h"
 
 enum { stack_max = 8 * 64 };
 
@@ -23,6 +24,7 @@ struct walk {
     const struct spl_tables *tables; /* of the node being drawn */
     double focal;             /* larger of fx, fy */
     struct spl_occupancy occupancy;
+    struct spl_map_cells stations;
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
 };
 
@@ -73,8 +75,8 @@ static double disc_side(const struct spl_camera *camera, double radius, double n
 }
 
 /* Lists the chunk once for every window of the tile that samples [low, high] reach into. */
-static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chunk *chunk, const double low[2],
-                       const double high[2], double near, struct spl_error *err)
+static int add_windows(struct walk *w, const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk,
+                       const double low[2], const double high[2], double near, struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
     double size[2] = {camera->width, camera->height};
@@ -91,7 +93,7 @@ static int add_windows(struct walk *w, uint32_t page, const struct spl_draw_chun
             struct spl_draw_chunk part = *chunk;
             struct spl_chunk_bounds bounds = occlusion_bounds(camera, from, to, near);
             part.count |= (x + 1) << SPL_COUNT_BITS | y << (SPL_COUNT_BITS + SPL_WINDOW_BITS);
-            rc = spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &part, &bounds, err);
+            rc = spl_draw_list_add(w->list, origin, &part, &bounds, err);
         }
     }
     return rc;
@@ -187,7 +189,8 @@ static int draw_lines(struct walk *w, const double node_to_eye[3], const struct 
     if (w->covered || !w->params->lines || !spl_view_box_visible(w->params->camera, &box, w->params->low_pass))
         return SPL_OK;
     struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
-    return spl_draw_list_add(w->list, page, SPL_CHUNK_LINES, &out, &(struct spl_chunk_bounds){0}, err);
+    return spl_draw_list_add(w->list, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_LINES}, &out,
+                             &(struct spl_chunk_bounds){0}, err);
 }
 
 static int draw_discs(struct walk *w, const double node_to_eye[3], const struct spl_chunk *chunk, uint32_t page,
@@ -228,10 +231,16 @@ static int draw_discs(struct walk *w, const double node_to_eye[3], const struct 
     out.texture = drawn_texture(w, chunk, page, near);
     out.texture_scale = (float)scale;
     w->list->splats += count;
+    int trims = 0;
+    if (w->stations.count)
+        trims = spl_map_cells_add(&w->stations, &w->tables->stations[chunk - w->tables->chunks], &box, w->list, err);
+    if (trims < 0)
+        return trims;
+    const struct spl_draw_origin from = {.page = page, .kind = SPL_CHUNK_DISCS, .trims = (uint16_t)trims};
     if (w->params->discs && disc_side(camera, radius, near) > SPL_WINDOW)
-        return add_windows(w, page, &out, low, high, near, err);
+        return add_windows(w, &from, &out, low, high, near, err);
     struct spl_chunk_bounds bounds = occlusion_bounds(camera, low, high, near);
-    return spl_draw_list_add(w->list, page, SPL_CHUNK_DISCS, &out, &bounds, err);
+    return spl_draw_list_add(w->list, &from, &out, &bounds, err);
 }
 
 static int draw_node(struct walk *w, const struct spl_found_node *found, struct spl_error *err)
@@ -391,10 +400,15 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
     int rc = spl_occupancy_init(&w.occupancy, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;
-    rc = walk_tree(&w, err);
+    rc = spl_map_cells_init(&w.stations, params, err);
+    if (!rc)
+        rc = walk_tree(&w, err);
     if (!rc)
         rc = spl_draw_list_lay_out(list, err);
+    if (!rc)
+        rc = spl_map_cells_lay_out(&w.stations, list, err);
     list->sample_splats = spl_occupancy_bound(&w.occupancy);
     spl_occupancy_finish(&w.occupancy);
+    spl_map_cells_finish(&w.stations);
     return rc;
 }

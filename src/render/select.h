@@ -26,7 +26,7 @@ struct spl_select_params {
     const struct spl_dataset *dataset;
     const struct spl_camera *camera;                /* of the tile, in samples */
     double lod;                                     /* samples; 0 = leaves in full */
-    double low_pass;                                /* samples */
+    double low_pass;                                /* samples around the image whose chunks are drawn, too */
     bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
     bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
     /* Tables of a page that the dataset does not keep: of YES in *tables, valid until the selection ends. May ask for
@@ -36,13 +36,26 @@ struct spl_select_params {
     uint32_t atoms;                                 /* of a splat's texture at most; 0 = none */
     enum spl_select_answer (*textured)(void *context, uint32_t page); /* may its textures be drawn? may ask for them;
                                                                          may be NULL where atoms is 0 */
+    uint32_t maps;      /* SPL_MAP_*: what maps of stations are drawn for, where the dataset has any; 0 = nothing */
+    uint32_t corner[2]; /* samples: where the camera's image begins in the whole, of which cells are counted */
+    enum spl_select_answer (*mapped)(void *context, uint32_t station); /* may its map be drawn? may ask for it; may be
+                                                                          NULL where maps is 0 */
     void *context;
 };
+enum { SPL_MAP_TRIMS = 1, SPL_MAP_COLORS = 2 };
 
 /* Does the view draw textures where there are any: colours, by splats, with atoms? */
 static inline bool spl_view_is_textured(const struct spl_view *view)
 {
     return spl_method_has_textures(view->method) && view->disc.atoms && view->layers >> SPL_LAYER_COLOR & 1;
+}
+
+/* What a view draws maps for, where the dataset has any: SPL_MAP_*. */
+static inline uint32_t spl_view_get_maps(const struct spl_view *view)
+{
+    if (!(spl_method_get_params(view->method) & SPL_PARAM_BIT(maps)) || view->maps != SPL_MAPS_ON)
+        return 0;
+    return SPL_MAP_TRIMS | (view->layers >> SPL_LAYER_COLOR & 1 ? SPL_MAP_COLORS : 0);
 }
 
 /* Refills `list` (zeroed before first use; its arrays are reused). SPL_E_NOMEM, SPL_E_LIMIT above 2^28 entries;

@@ -6,10 +6,15 @@
 
 #include "dataset/dictionary.h"
 
-uint32_t spl_slot_count_resident(const struct spl_dataset *dataset)
+uint32_t spl_slot_of_map(const struct spl_dataset *dataset, uint32_t map)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    return info->atoms ? 2 * info->pages + 1 : info->pages;
+    return (info->atoms ? 2 * info->pages + 1 : info->pages) + map;
+}
+
+uint32_t spl_slot_count_resident(const struct spl_dataset *dataset)
+{
+    return spl_slot_of_map(dataset, spl_dataset_get_info(dataset)->maps);
 }
 
 uint32_t spl_slot_of_tables(const struct spl_dataset *dataset, uint32_t page)
@@ -33,6 +38,8 @@ size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot)
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     if (spl_slot_is_tables(dataset, slot))
         return spl_dataset_get_tables_bytes(dataset, slot - spl_slot_of_tables(dataset, 0));
+    if (slot >= spl_slot_of_map(dataset, 0))
+        return spl_dataset_get_map_bytes(dataset, slot - spl_slot_of_map(dataset, 0));
     if (slot >= 2 * info->pages)
         return info->dictionary_bytes;
     if (slot >= info->pages)
@@ -46,6 +53,8 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
     uint32_t pages = spl_dataset_get_info(dataset)->pages;
     if (spl_slot_is_tables(dataset, slot))
         return spl_dataset_read_tables(dataset, slot - spl_slot_of_tables(dataset, 0), out, err);
+    if (slot >= spl_slot_of_map(dataset, 0))
+        return spl_dataset_read_map(dataset, slot - spl_slot_of_map(dataset, 0), out, err);
     if (slot < pages) {
         memset((char *)out + spl_slot_get_bytes(dataset, slot) - 4, 0, 4);
         return spl_dataset_read_page(dataset, slot, out, err);

@@ -1,6 +1,6 @@
 /* What of a dataset is read for frames, in slots: its pages; where it has textures, as many of their codes by page, and
- * one of the dictionary; where it does not keep all tables, those by page, which stay on the host. Pure but for
- * reading; any thread. */
+ * one of the dictionary; the maps of its stations; where it does not keep all tables, those by page, which stay on the
+ * host. Pure but for reading; any thread. */
 #ifndef SPL_RENDER_SLOT_H
 #define SPL_RENDER_SLOT_H
 
@@ -19,8 +19,9 @@ uint32_t spl_slot_count(const struct spl_dataset *dataset);
 /* Are they a page's tables? They lie behind all others. */
 bool spl_slot_is_tables(const struct spl_dataset *dataset, uint32_t slot);
 
-/* How many slots are for the device, and the slot of a page's tables. */
+/* How many slots are for the device, the slot of a station's map, and that of a page's tables. */
 uint32_t spl_slot_count_resident(const struct spl_dataset *dataset);
+uint32_t spl_slot_of_map(const struct spl_dataset *dataset, uint32_t map);
 uint32_t spl_slot_of_tables(const struct spl_dataset *dataset, uint32_t page);
 
 /* What the device takes for it, or of tables the host. */

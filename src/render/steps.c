@@ -111,7 +111,8 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     struct spl_frame_job *job = &steps->job;
     const struct spl_view *view = &steps->view;
     const struct spl_method_row *method = spl_method_row(view->method);
-    job->tiling.reach = (struct spl_reach){.align = 1, .apron = method->apron};
+    bool mapped = spl_dataset_get_info(steps->dataset)->maps && spl_view_get_maps(view) & SPL_MAP_COLORS;
+    job->tiling.reach = (struct spl_reach){.align = 1, .apron = method->apron + (mapped ? 1 : 0)}; // normals look so far
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);

@@ -4,18 +4,28 @@
 #include "render/method.h"
 #include "render/renderer.h"
 
-int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_gpu_kernel **plain,
-                              struct spl_gpu_kernel **clipped, struct spl_error *err)
+static uint32_t ends_of(const struct spl_draw_key *key)
+{
+    return (key->apart ? SPL_ENDS_CLIPPED : 0) | (key->trims ? SPL_ENDS_TRIMMED : 0);
+}
+
+int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
+                              struct spl_error *err)
 {
     enum { clipped_constant = 2 };
     struct spl_renderer *r = tile->renderer;
-    bool any = false;
+    uint32_t needed = 1;
+    int rc = SPL_OK;
     for (size_t i = 0; i < r->list.batch_count; i++)
-        any |= r->list.batches[i].key.apart;
-    *clipped = NULL;
-    int rc = spl_kernels_get(&r->kernels, r->gpu, &key, plain, err);
-    key.constants[clipped_constant] = 1;
-    return rc || !any ? rc : spl_kernels_get(&r->kernels, r->gpu, &key, clipped, err);
+        needed |= 1u << ends_of(&r->list.batches[i].key);
+    *out = (struct spl_disc_kernels){0};
+    for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
+        key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
+        key.trims = ends & SPL_ENDS_TRIMMED;
+        if (needed >> ends & 1)
+            rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
+    }
+    return rc;
 }
 
 static int too_many(struct spl_error *err)
@@ -71,7 +81,7 @@ static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *ke
     spl_gpu_barrier(tile->renderer->gpu);
 }
 
-void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
+void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
                               const struct spl_dispatch *what)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
@@ -90,6 +100,11 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_RESOURCE_TEXTURES].buffer = resident->pages[textures].buffer;
             bindings[SPL_RESOURCE_ATOMS].buffer = resident->pages[spl_dictionary_slot(resident)].buffer;
         }
+        if (batch->key.trims) {
+            spl_tile_set_map(tile, batch->key.trims - 1u);
+            bindings[SPL_RESOURCE_MAP].buffer = tile->map;
+        }
+        struct spl_gpu_kernel *kernel = kernels->of[ends_of(&batch->key)];
         uint32_t round = batch->first_round;
         for (uint32_t done = 0; done < batch->entries; done += batch->round_entries) {
             uint32_t left = batch->entries - done;
@@ -99,7 +114,7 @@ void spl_tile_dispatch_splats(const struct spl_tile *tile, struct spl_gpu_kernel
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
-            spl_gpu_dispatch(tile->renderer->gpu, batch->key.apart && what->clipped ? what->clipped : kernel, bindings,
+            spl_gpu_dispatch(tile->renderer->gpu, kernel ? kernel : kernels->of[0], bindings,
                              (params.entries + per_workgroup - 1) / per_workgroup);
         }
     }
@@ -151,8 +166,10 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool 
 
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)
 {
-    uint32_t resolved = spl_method_row(tile->view->method)->resolve;
-    struct spl_kernel_key key = {"resolve", resolved != SPL_RESOLVED_SUMS, {layer, resolved}};
+    const struct spl_method_row *method = spl_method_row(tile->view->method);
+    bool mapped = layer == SPL_LAYER_COLOR && spl_tile_has_map_colors(tile, SPL_SUMS_COLOR);
+    uint32_t resolved = !mapped ? method->resolve : method->sums ? SPL_RESOLVED_MAPPED : SPL_RESOLVED_MAPPED_BENT;
+    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
     return spl_tile_dispatch_items(tile, &key, &params, tile->width * tile->height, err);

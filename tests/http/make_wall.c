@@ -26,7 +26,7 @@ static void look(const double d[3], uint8_t color[3], double *range)
         *range = (0.2 * sin(y) - station[0]) * length / d[0];
         y = *range * d[1] / length;
     }
-    bool odd = (int)floor(16 * fmin(fmax(y, -9), 9)) & 1;
+    bool odd = (int)floor(2 * fmin(fmax(y, -9), 9)) & 1;
     memcpy(color, odd ? (uint8_t[]){240, 30, 200} : (uint8_t[]){20, 200, 30}, 3);
     if (y > 0.5)
         *range = INFINITY;

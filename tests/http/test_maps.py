@@ -1,11 +1,27 @@
 """Maps of stations over HTTP: what a dataset says of them, maps=on|off in views, picks, and batches, what is kept under
 which ETag, and a memory limit that has no room for them. The wall's map has other colours than its
 splats, and its station saw through it from y = 0.5 on (make_wall.c)."""
+import contextlib
 import pathlib
+import struct
 
-from harness import FAKE, MAPPED, WALL, Daemon, run
+from harness import FAKE, MAPPED, REAL, WALL, Daemon, run
 
 NAME = pathlib.Path(MAPPED).stem
+VIEW = f"/v1/datasets/{NAME}/view"
+LOOK = "eye=3,0.2,1&target=0,0.2,1&up=0,0,1&fov=60&width=64&height=48"
+SEEN, THROUGH = (24, 24), (42, 24)  # pixels on the wall: y < 0.5, y > 0.5
+
+
+def pixels(reply):
+    """Rows of (r, g, b, a)."""
+    assert reply.status == 200, reply.body
+    flat = list(struct.iter_unpack("4B", reply.body))
+    return [flat[64 * y:64 * y + 64] for y in range(48)]
+
+
+def at(rows, place):
+    return rows[place[1]][place[0]]
 
 
 def test_a_dataset_says_what_maps_it_has():
@@ -17,6 +33,36 @@ def test_a_dataset_says_what_maps_it_has():
         table = {p["name"]: p for p in d.ask("/v1/methods").json()["parameters"]}
         assert [name for name, p in table.items() if p["maps"]] == ["maps"]
         assert table["maps"]["enum"] == ["on", "off"] and table["maps"]["default"] == "on"
+
+
+def test_maps_are_drawn_where_there_are_any():
+    with Daemon(REAL, datasets=[MAPPED]) as d:
+        usual, on, off = (d.ask(f"{VIEW}?{LOOK}&format=raw{more}") for more in ("", "&maps=on", "&maps=off"))
+        assert usual.body == on.body and usual.headers["ETag"] == on.headers["ETag"] != off.headers["ETag"]
+        drawn, plain = pixels(on), pixels(off)
+        red, green, blue, _ = at(drawn, SEEN)
+        assert (red > 180 and blue > 140 and green < 90) or (green > 150 and red < 80 and blue < 80), at(drawn, SEEN)
+        assert 70 < at(plain, SEEN)[2] < 110, at(plain, SEEN)  # the splats' own
+        assert at(drawn, THROUGH)[:3] == (0, 0, 0) != at(plain, THROUGH)[:3], (at(drawn, THROUGH), at(plain, THROUGH))
+        for layer in "depth", "range", "normal", "id", "coverage":
+            one, other = (d.ask(f"{VIEW}?{LOOK}&layer={layer}&format=raw&maps={maps}") for maps in ("on", "off"))
+            assert one.body != other.body and one.headers["ETag"] != other.headers["ETag"], layer
+        body = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0.2, 1], "up": [0, 0, 1], "fov": 60}, "width": 64, "height": 48,
+                "format": "raw", "maps": "off"}
+        assert d.post(body, VIEW).body == off.body
+        batch = d.post({**body, "views": [{}, {"maps": "on"}], "container": "multipart"}, VIEW + "s")
+        assert batch.status == 200 and off.body in batch.body and on.body in batch.body
+        nearest = [d.ask(f"{VIEW}?{LOOK}&method=nearest&format=raw&maps={maps}").body for maps in ("on", "off")]
+        assert nearest[0] != nearest[1]
+
+
+def test_picks_see_what_views_show():
+    with Daemon(REAL, datasets=[MAPPED]) as d:
+        def pick(place, maps):
+            return d.ask(f"/v1/datasets/{NAME}/pick?x={place[0] + 0.5}&y={place[1] + 0.5}&{LOOK}{maps}").json()
+        assert pick(SEEN, "")["splat"] == pick(SEEN, "&maps=off")["splat"] is not None
+        assert pick(SEEN, "&maps=on")["color"] != pick(SEEN, "&maps=off")["color"]
+        assert pick(THROUGH, "")["splat"] is None and pick(THROUGH, "&maps=off")["splat"] is not None
 
 
 def test_what_changes_nothing_makes_no_other_etag():
@@ -38,6 +84,29 @@ def test_what_maps_may_be():
             reply = d.post({"maps": value})
             assert reply.status == 400 and reply.json()["field"] == "maps", reply.body
         assert d.ask("/v1/datasets/wall/pick?x=1&y=1&maps=no").json()["field"] == "maps"
+
+
+@contextlib.contextmanager
+def without_room_for_maps():
+    with Daemon(REAL, datasets=[MAPPED]) as d:
+        maps = d.ask(f"/v1/datasets/{NAME}").json()["maps"]["bytes"]
+        d.ask(f"{VIEW}?{LOOK}")
+        limit = d.status()["memory"]["device_bytes"] - maps // 2
+    with Daemon(REAL, "--memory-limit", str(limit), datasets=[MAPPED]) as d:
+        yield d
+
+
+def test_maps_without_room_are_left_out_and_that_is_said():
+    with without_room_for_maps() as d:
+        for _ in range(2):
+            reply = d.ask(f"{VIEW}?{LOOK}&format=raw")
+            assert reply.status == 200 and reply.headers["Splatd-Complete"] == "false", reply.headers
+            assert reply.headers["Splatd-Pending"] == "false" and reply.headers["Cache-Control"] == "no-store"
+            assert "ETag" not in reply.headers and reply.headers["Splatd-Cache"] == "miss"
+        plain = d.ask(f"{VIEW}?{LOOK}&format=raw&maps=off")
+        assert plain.headers["Splatd-Complete"] == "true" and "ETag" in plain.headers
+        assert 70 < at(pixels(reply), SEEN)[2] < 110, "the splats' own colours"
+        assert plain.body == reply.body
 
 
 run(globals())

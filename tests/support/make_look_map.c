@@ -34,18 +34,29 @@ static void make_ranges(const struct spl_map_row *row, make_look *look, uint32_t
         }
 }
 
+static uint32_t pack(const uint8_t color[3])
+{
+    return (uint32_t)(color[0] >> 3) << 11 | (uint32_t)(color[1] >> 2) << 5 | color[2] >> 3;
+}
+
+/* Texels of a block have the colour of its first one, or that of the first that has another. */
 static void make_colors(uint32_t side, make_look *look, uint32_t *block)
 {
     uint32_t width = spl_polar_width(side, SPL_MAP_APRON), height = spl_polar_height(side, SPL_MAP_APRON);
     for (uint32_t y = 0; y < height; y += 4)
-        for (uint32_t x = 0; x < width; x += 4, block += 2) {
-            double direction[3], range;
-            uint8_t color[3];
-            spl_polar_direction(side, SPL_MAP_APRON, (double[]){x + 2, y + 2}, direction);
-            look(direction, color, &range);
-            uint32_t packed = (uint32_t)(color[0] >> 3) << 11 | (uint32_t)(color[1] >> 2) << 5 | color[2] >> 3;
-            block[0] = packed << 16 | packed;
-        }
+        for (uint32_t x = 0; x < width; x += 4, block += 2)
+            for (uint32_t t = 0; t < 16; t++) {
+                double direction[3], range;
+                uint8_t color[3];
+                spl_polar_direction(side, SPL_MAP_APRON, (double[]){x + t % 4 + 0.5, y + t / 4 + 0.5}, direction);
+                look(direction, color, &range);
+                uint32_t packed = pack(color);
+                if (!t)
+                    block[0] = packed << 16 | packed;
+                else if (!block[1] && packed != (block[0] & 0xffff))
+                    block[0] = packed << 16 | (block[0] & 0xffff);
+                block[1] |= (packed != (block[0] & 0xffff) ? 1u : 0) << 2 * t;
+            }
 }
 
 uint32_t *make_look_words(const struct spl_map_row *row, make_look *look)

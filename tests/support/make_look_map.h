@@ -15,7 +15,7 @@ typedef void make_look(const double direction[3], uint8_t color[3], double *rang
 /* An upright station with all levels that its side has. */
 struct spl_map_row make_look_row(const double position[3], uint32_t side, uint32_t range_side);
 
-/* The words of its map, spl_map_words() of them, each block of colours of one colour; the caller frees them. */
+/* The words of its map, spl_map_words() of them, each block of two colours at most; the caller frees them. */
 uint32_t *make_look_words(const struct spl_map_row *row, make_look *look);
 
 /* Writes `from` with that map to `path`: every chunk is the station's own and trimmed by it. */

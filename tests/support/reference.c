@@ -15,6 +15,7 @@
 #include "geom/tangent.h"
 #include "support/naive_select.h"
 #include "support/reference_fill.h"
+#include "support/reference_maps.h"
 
 struct sample {
     float first;   /* pushed depth, INFINITY = nothing */
@@ -26,6 +27,7 @@ struct sample {
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
+    float mapped[3]; /* colour with those of maps */
 };
 
 struct scene {
@@ -43,6 +45,8 @@ struct scene {
     uint32_t textures_page;
     const struct spl_chunk *coded; /* whose codes `code` has; NULL = none */
     struct spl_chunk_code code;
+    struct reference_map *maps; /* NULL = none is drawn */
+    bool colored;               /* they give colours */
 };
 
 struct disc {
@@ -55,6 +59,7 @@ struct disc {
     uint32_t planes;               /* atoms that are drawn at most; 0 = plain */
     const struct spl_chunk_code *code;
     const struct spl_splat_code *atoms; /* its own, of `code` */
+    const struct reference_map *trims;  /* may be NULL */
 };
 
 /* Are discs drawn, and are they summed up? Else the nearest wins. */
@@ -119,6 +124,14 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     if (qx * d->line[0] + qy * d->line[1] + fall * d->line[2] >= d->end)
         return 1;
     return distance < near_center ? distance : near_center;
+}
+
+/* The point of view space at depth z of sample (x, y). */
+static void view_point(const struct scene *s, int64_t x, int64_t y, float z, float p[3])
+{
+    p[0] = ((float)x + 0.5f - (float)s->camera.cx) * (1 / (float)s->camera.fx) * z;
+    p[1] = ((float)y + 0.5f - (float)s->camera.cy) * (1 / (float)s->camera.fy) * z;
+    p[2] = z;
 }
 
 /* A channel of an atom's texel, + 128, at the level of `side` texels. */
@@ -209,6 +222,10 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
         for (int x = first[0]; x <= last[0]; x++) {
             float distance = coverage(s, d, center, x, y, &z, from_center);
             if (!(distance < 1))
+                continue;
+            float p[3];
+            view_point(s, x, y, z, p);
+            if (d->trims && reference_map_trims(d->trims, p, d->n, d->radius))
                 continue;
             struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
             float pushed = z + margin;
@@ -368,6 +385,10 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
         d->code = &s->code;
         d->atoms = &s->code.splat[index];
     }
+    if (s->maps) {
+        uint16_t own = spl_dataset_get_chunk_stations(s->dataset)[drawn->chunk].seen_by[0];
+        d->trims = own & SPL_STATION_TRIMS ? &s->maps[(own & SPL_STATION_ROW) - 1] : NULL;
+    }
     to_view(&s->camera, splat.position, d->p);
     to_view(&s->camera, splat.normal, d->n);
     for (int i = 0; i < 3; i++) {
@@ -465,13 +486,9 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     return found;
 }
 
-/* Channel `c` of what a sample contributes: of method nearest the mean over those around on its surface, 4 : 1 : 1/2. */
-static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
+/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2. */
+static float smooth_color(const struct scene *s, const struct sample *at, int c)
 {
-    if (sums(s))
-        return (at->color[c] + at->weight / 2) / at->weight;
-    if (s->view->method != SPL_METHOD_NEAREST)
-        return at->payload >> 8 * c & 255;
     int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
     double sum = 0, weights = 0;
     for (int64_t j = -1; j <= 1; j++)
@@ -484,7 +501,80 @@ static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
             sum += weight * (beside->payload >> 8 * c & 255);
             weights += weight;
         }
-    return (uint64_t)(sum / weights + 0.5);
+    return (float)(sum / weights);
+}
+
+/* Channel `c` of what a sample contributes. */
+static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
+{
+    if (s->colored)
+        return (uint64_t)(at->mapped[c] + 0.5f);
+    if (sums(s))
+        return (at->color[c] + at->weight / 2) / at->weight;
+    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c) + 0.5f) : at->payload >> 8 * c & 255;
+}
+
+/* Method nearest keeps how far a depth was bent as a share of it, a float of four bits behind its first. */
+static float surface_of(const struct scene *s, const struct sample *at)
+{
+    if (at->first == INFINITY)
+        return 0;
+    if (sums(s))
+        return depth_of(s, at);
+    int exponent;
+    double share = ((double)at->first - (double)at->own) / (double)at->first, mantissa = frexp(share, &exponent);
+    return share < 1 / 65536.0 ? at->first : (float)(at->first * (1 - ldexp(round(mantissa * 32) / 32, exponent)));
+}
+
+/* How far the surface goes from (x, y) to the next sample along an axis: by the means of both sides, each weighted by
+ * how far off the other one's depth is; at the same depth where a side holds nothing. */
+static void surface_step(const struct scene *s, const float *depths, int64_t x, int64_t y, int axis, float step[3])
+{
+    int64_t width = s->camera.width, height = s->camera.height;
+    float z = depths[y * width + x], p[3], off[2], side[2][3];
+    view_point(s, x, y, z, p);
+    for (int i = 0; i < 2; i++) {
+        int64_t bx = x + (axis ? 0 : 2 * i - 1), by = y + (axis ? 2 * i - 1 : 0);
+        float beside = bx >= 0 && bx < width && by >= 0 && by < height ? depths[by * width + bx] : 0, q[3];
+        view_point(s, bx, by, beside > 0 ? beside : z, q);
+        off[i] = beside > 0 ? fabsf(beside - z) + 1e-6f * z : 1e30f;
+        for (int c = 0; c < 3; c++)
+            side[i][c] = i ? q[c] - p[c] : p[c] - q[c];
+    }
+    for (int c = 0; c < 3; c++)
+        step[c] = side[1][c] + (side[0][c] - side[1][c]) * (off[1] / (off[0] + off[1]));
+}
+
+/* Colours of every sample, of all stations: who asks for this has each chunk seen by all there are. */
+static void add_maps(struct scene *s)
+{
+    int64_t width = s->camera.width, count = width * s->camera.height;
+    float *depths = spl_alloc((size_t)count, sizeof *depths, NULL);
+    uint32_t maps = spl_dataset_get_info(s->dataset)->maps;
+    for (int64_t i = 0; i < count; i++)
+        depths[i] = surface_of(s, &s->samples[i]);
+    for (int64_t i = 0; i < count; i++) {
+        struct sample *at = &s->samples[i];
+        if (!(depths[i] > 0))
+            continue;
+        struct reference_sample sample = {.radius = fmaxf(at->first - depths[i], 0) / fmaxf(s->margin, 1e-6f)};
+        float weights = SPL_MAP_BASE, sum[3];
+        for (int c = 0; c < 3; c++)
+            sum[c] = SPL_MAP_BASE * (sums(s) ? (float)at->color[c] / (float)at->weight : smooth_color(s, at, c));
+        view_point(s, i % width, i / width, depths[i], sample.p);
+        surface_step(s, depths, i % width, i / width, 0, sample.right);
+        surface_step(s, depths, i % width, i / width, 1, sample.down);
+        for (uint32_t m = 0; m < maps; m++) {
+            float color[3], weight = reference_map_color(&s->maps[m], &sample, color);
+            weights += weight;
+            for (int c = 0; c < 3; c++)
+                sum[c] += weight * color[c];
+        }
+        for (int c = 0; c < 3; c++)
+            at->mapped[c] = sum[c] / weights;
+    }
+    free(depths);
+    s->colored = true;
 }
 
 static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
@@ -594,10 +684,12 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
     s.margin = (float)view->disc.margin;
+    const bool mapped =
+        spl_dataset_get_info(dataset)->maps && view->maps == SPL_MAPS_ON && draws_discs(view);
     const struct naive_options options = {.dataset = dataset,
                                           .camera = &s.camera,
                                           .lod = view->lod,
-                                          .atoms = view->method == SPL_METHOD_SPLAT ? view->disc.atoms : 0};
+                                          .atoms = view->method == SPL_METHOD_SPLAT && !mapped ? view->disc.atoms : 0};
     struct fill_plan plan = {0};
     int rc = SPL_OK;
     if (view->method == SPL_METHOD_FILL) {
@@ -610,6 +702,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         s.camera.cx += plan.guard;
         s.camera.cy += plan.guard;
     }
+    s.maps = mapped ? reference_maps(dataset, &s.camera) : NULL;
     s.chunks = naive_select(&options, &s.chunk_count);
     size_t count = (size_t)s.camera.width * s.camera.height;
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
@@ -637,10 +730,15 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
             fill(&s, &plan);
+        if (mapped && view->layers >> SPL_LAYER_COLOR & 1)
+            add_maps(&s);
         for (uint32_t y = 0; y < view->camera.height; y++)
             for (uint32_t x = 0; x < view->camera.width; x++)
                 resolve_pixel(&s, x, y, frame);
     }
+    for (uint32_t m = 0; mapped && m < spl_dataset_get_info(dataset)->maps; m++)
+        free(s.maps[m].words);
+    free(s.maps);
     free(s.chunks);
     free(s.samples);
     free(s.textures);

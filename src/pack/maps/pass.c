@@ -383,11 +383,19 @@ static int open_files(const struct spl_map_options *options, struct spl_map_edit
     return rc || !options->export_to ? rc : spl_map_export_init(out, options->export_to, err);
 }
 
-int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
-                  struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err)
+int spl_maps_check(const struct spl_map_options *options, struct spl_error *err)
 {
     struct spl_map_edits edits = {0};
     struct spl_map_export out = {0};
+    int rc = open_files(options, &edits, &out, err);
+    spl_map_export_finish(&out);
+    spl_map_edits_finish(&edits);
+    return rc;
+}
+
+int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
+                  struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err)
+{
     struct loading loading = {options, report};
     const struct spl_map_picture_options how = {.paths = found->count ? (const char *const *)found->paths
                                                                       : &options->panoramas,
@@ -397,12 +405,6 @@ int spl_maps_load(const struct spl_map_options *options, const struct spl_map_so
                                                 .context = &loading};
     int rc = how.count ? spl_map_pictures_load(&how, list, err) : SPL_OK;
     report->pictures = (uint32_t)list->count;
-    if (!rc) /* said now, not when packing has taken its time */
-        rc = open_files(options, &edits, &out, err);
-    spl_map_export_finish(&out);
-    spl_map_edits_finish(&edits);
-    if (rc)
-        spl_view_list_finish(list);
     return rc;
 }
 
@@ -440,6 +442,7 @@ int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view
                                         .get_map = get_map,
                                         .context = &p,
                                         .leaf = p.leaf,
+                                        .leaf_radius = spl_prune_leaf_radius(dataset),
                                         .about_maps = about};
     spl_stage_begin(stage, "maps", NULL, p.count + views->count);
     rc = spl_dataset_rewrite(&rewrite, options->output, err);

@@ -8,13 +8,12 @@
 static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_phase phases, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    struct spl_gpu_kernel *kernel;
-    struct spl_dispatch what = {.phases = phases};
+    struct spl_disc_kernels kernels;
     struct spl_kernel_key key = {"nearest", true, {group, pass}};
-    int rc = spl_tile_get_disc_kernels(tile, key, &kernel, &what.clipped, err);
+    int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
     if (rc)
         return rc;
-    spl_tile_dispatch_splats(tile, kernel, &what);
+    spl_tile_dispatch_splats(tile, &kernels, &(struct spl_dispatch){.phases = phases});
     spl_gpu_barrier(r->gpu);
     return SPL_OK;
 }
@@ -23,7 +22,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 {
     (void)first; /* the payload of another group shares the word with the depth: every group starts anew */
     struct spl_renderer *r = tile->renderer;
-    bool wide = spl_gpu_get_limits(r->gpu)->atomics_64;
+    bool wide = spl_gpu_get_limits(r->gpu)->atomics_64, mapped = spl_tile_has_map_colors(tile, group);
+    group = mapped ? SPL_SUMS_MAPPED : group;
     spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * (wide ? 8 : 4), SPL_NOTHING);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
@@ -31,13 +31,18 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, wide, err);
     rc = rc ? rc : draw(tile, group, 0, SPL_PHASE_BACK, err);
     spl_tile_stamp(tile, SPL_STAGE_DEPTH);
-    if (rc || wide)
-        return rc;
-    rc = spl_tile_dispatch_occlusion(tile, 0, wide, err);
-    spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
-    spl_gpu_barrier(r->gpu);
-    rc = rc ? rc : draw(tile, group, 1, SPL_PHASE_BOTH, err);
-    spl_tile_stamp(tile, SPL_STAGE_SHADE);
+    if (!rc && !wide) {
+        rc = spl_tile_dispatch_occlusion(tile, 0, wide, err);
+        spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
+        spl_gpu_barrier(r->gpu);
+        rc = rc ? rc : draw(tile, group, 1, SPL_PHASE_BOTH, err);
+    }
+    if (!rc && mapped) {
+        spl_tile_begin_area(tile, SPL_AREA_SUMS);
+        rc = spl_tile_dispatch_maps(tile, err);
+    }
+    if (!wide || mapped)
+        spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;
 }
 

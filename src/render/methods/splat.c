@@ -7,70 +7,83 @@
 static int record_depth(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    struct spl_gpu_kernel *depth;
+    struct spl_disc_kernels depth;
     struct spl_dispatch what = {.phases = SPL_PHASE_FRONT};
-    int rc =
-        spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, &what.clipped, err);
+    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, err);
     if (rc)
         return rc;
-    spl_tile_dispatch_splats(tile, depth, &what);
+    spl_tile_dispatch_splats(tile, &depth, &what);
     spl_gpu_barrier(r->gpu);
     rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, false, err);
     what.phases = SPL_PHASE_BACK;
-    spl_tile_dispatch_splats(tile, depth, &what);
+    spl_tile_dispatch_splats(tile, &depth, &what);
     spl_gpu_barrier(r->gpu);
     return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, false, err);
 }
 
 /* The kernels of `what`, by its number of planes. */
-static int get_texture_kernels(struct spl_tile *tile, struct spl_dispatch *what, struct spl_gpu_kernel **kernel,
+static int get_texture_kernels(struct spl_tile *tile, struct spl_dispatch *what, struct spl_disc_kernels *kernels,
                                struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     what->sum = NULL;
     struct spl_kernel_key key = {"splat_texture", true, {what->planes}}, sum = {"splat_sum", false, {what->planes}};
     if (!what->smooth)
-        return spl_tile_get_disc_kernels(tile, key, kernel, &what->clipped, err);
+        return spl_tile_get_disc_kernels(tile, key, kernels, err);
     int rc = spl_kernels_get(&r->kernels, r->gpu, &sum, &what->sum, err);
-    return rc ? rc
-              : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_summed", true, {0}}, kernel,
-                                          &what->clipped, err);
+    return rc ? rc : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_summed", .wide = true}, kernels, err);
 }
 
 /* Colours: chunks with atoms by the kernels of their number of planes, the others by the one that knows none. */
-static int shade_colors(struct spl_tile *tile, struct spl_gpu_kernel *plain, struct spl_gpu_kernel *clipped,
-                        struct spl_error *err)
+static int shade_colors(struct spl_tile *tile, const struct spl_disc_kernels *plain, struct spl_error *err)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     uint64_t seen = 0;
     for (size_t i = 0; i < list->batch_count; i++)
         seen |= 1ull << (2 * list->batches[i].key.planes + list->batches[i].key.smooth);
-    struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true, .clipped = clipped};
+    struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true};
     spl_tile_dispatch_splats(tile, plain, &what);
     int rc = SPL_OK;
     for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1); kind++) {
-        struct spl_gpu_kernel *kernel;
+        struct spl_disc_kernels kernels;
         if (!(seen >> kind & 1))
             continue;
         what.planes = kind / 2;
         what.smooth = kind % 2;
-        if ((rc = get_texture_kernels(tile, &what, &kernel, err)))
+        if ((rc = get_texture_kernels(tile, &what, &kernels, err)))
             break;
         if (what.smooth)
             spl_tile_begin_area(tile, SPL_AREA_SUMMED);
-        spl_tile_dispatch_splats(tile, kernel, &what);
+        spl_tile_dispatch_splats(tile, &kernels, &what);
         if (what.smooth)
             spl_tile_end_area(tile, SPL_AREA_SUMMED);
     }
     return rc;
 }
 
+/* Sums of depths become the surface that maps are asked for; the sums are cleared for colours. */
+static int find_surface(struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_gpu *gpu = tile->renderer->gpu;
+    struct spl_disc_kernels shade;
+    struct spl_kernel_key key = {"splat_shade", true, {SPL_SUMS_DEPTH}};
+    int rc = spl_tile_get_disc_kernels(tile, key, &shade, err);
+    if (rc)
+        return rc;
+    spl_tile_dispatch_splats(tile, &shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
+    spl_gpu_barrier(gpu);
+    rc = spl_tile_dispatch_samples(tile, &(struct spl_kernel_key){.name = "map_surface"}, err);
+    spl_gpu_fill(gpu, tile->renderer->scratch.large, 0, tile->samples * 16, 0);
+    spl_gpu_barrier(gpu);
+    return rc;
+}
+
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    struct spl_gpu_kernel *shade, *clipped;
-    int rc =
-        spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, &clipped, err);
+    struct spl_disc_kernels shade;
+    bool mapped = spl_tile_has_map_colors(tile, group);
+    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, err);
     if (rc)
         return rc;
     if (first)
@@ -87,11 +100,19 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
         spl_gpu_barrier(r->gpu);
     }
+    if (mapped)
+        spl_tile_begin_area(tile, SPL_AREA_SURFACE);
+    if (!rc && mapped)
+        rc = find_surface(tile, err);
     if (group == SPL_SUMS_COLOR)
-        rc = rc ? rc : shade_colors(tile, shade, clipped, err);
+        rc = rc ? rc : shade_colors(tile, &shade, err);
     else
-        spl_tile_dispatch_splats(tile, shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .clipped = clipped});
+        spl_tile_dispatch_splats(tile, &shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
     spl_gpu_barrier(r->gpu);
+    if (!rc && mapped)
+        rc = spl_tile_dispatch_maps(tile, err);
+    if (mapped)
+        spl_tile_end_area(tile, SPL_AREA_SURFACE);
     spl_tile_stamp(tile, SPL_STAGE_SHADE);
     return rc;
 }

@@ -223,6 +223,7 @@ FORGE(slack_nan, rows[1].slack = NAN)
 FORGE(reserved, rows[1].reserved[2] = 1)
 FORGE(too_large, (rows[1].side = rows[1].range_side = SPL_MAP_SIDE_MAX, rows[1].levels = SPL_MAP_LEVELS_MAX))
 FORGE(another_length, rows[1].range_side++)
+FORGE(a_level_less, rows[2].levels--)
 FORGE(rows_swapped, (rows[2] = rows[0], rows[0] = rows[1], rows[1] = rows[2]))
 FORGE(no_such_station, stations[1].seen_by[0] = 4)
 FORGE(no_such_second, (stations[1].seen_by[0] = 1, stations[1].seen_by[1] = 4))
@@ -271,6 +272,7 @@ static void what_is_wrong_is_refused(void **state)
         {reserved, "section PANO: station 1 has a reserved field"},
         {too_large, "section PANO: station 1 is larger than 96 MiB"},
         {another_length, "section PANO: station 1 has a PMAP of another length"},
+        {a_level_less, "section PANO: station 2 has a PMAP of another length"},
         {rows_swapped, "section PANO: station 0 has a PMAP of another length"},
         {no_such_station, "section HEAD 0: chunk 1 names a station that PANO does not have"},
         {no_such_second, "section HEAD 0: chunk 1 names a station that PANO does not have"},

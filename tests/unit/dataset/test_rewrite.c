@@ -13,10 +13,12 @@
 
 #include <splatd/pack.h>
 
+#include "base/memory.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "dataset/rewrite.h"
 #include "dataset/texture.h"
+#include "dataset/writer.h"
 #include "support/make_dataset.h"
 #include "support/make_maps.h"
 #include "support/make_textures.h"
@@ -359,6 +361,69 @@ static void new_colors_and_codes_go_by_old_numbers(void **state)
     free(leaf);
 }
 
+/* Whatever allocation fails: an error, and nothing left of the file. */
+static void refused_memory_leaves_nothing(void **state)
+{
+    struct spl_dataset *from = *state;
+    bool *leaf = calloc(spl_dataset_get_info(from)->nodes, 1);
+    leaf[take_side(from).nodes[0].first_child] = true;
+    const struct spl_rewrite what = {.from = from, .leaf = leaf, .page_bytes = 60000};
+    long n = 1;
+    unlink(path);
+    for (;; n++) {
+        struct spl_error err = {0};
+        spl_memory_fail_after(n);
+        int rc = spl_dataset_rewrite(&what, path, &err);
+        spl_memory_fail_after(0);
+        if (!rc)
+            break;
+        assert_int_equal(rc, SPL_E_NOMEM);
+        assert_int_equal(access(path, F_OK), -1);
+    }
+    assert_true(n > 20);
+    free(leaf);
+}
+
+/* A root of wires alone, over a child of discs: there must be a splat left. */
+static void what_has_lines_alone_is_no_dataset(void **state)
+{
+    (void)state;
+    struct spl_node nodes[2] = {{.size = 4, .spacing = 1, .chunk_count = 1, .child_count = 1, .first_child = 1},
+                                {.size = 2, .spacing = 1, .chunk_count = 1, .depth = 1, .first_chunk = 1}};
+    struct spl_chunk chunks[2] = {0};
+    struct spl_dataset_writer *writer;
+    assert_int_equal(spl_dataset_writer_create(path, &writer, NULL), SPL_OK);
+    for (int n = 0; n < 2; n++) {
+        struct spl_splat splats[4] = {0};
+        double position[4][3] = {{0}};
+        uint32_t words[SPL_CHUNK_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
+        const struct spl_chunk_options how = {0.016, 0.02, 0.05, n ? SPL_CHUNK_DISCS : SPL_CHUNK_LINES};
+        for (int i = 0; i < 4; i++) {
+            splats[i] = (struct spl_splat){.normal = {0, 0, 1}, .radius = 1, .linear = !n && i < 3};
+            position[i][0] = i;
+        }
+        uint32_t used = spl_chunk_encode(splats, (const double(*)[3])position, 4, &how, &chunks[n], words, NULL);
+        assert_int_equal(spl_dataset_writer_add_node(writer, words, used, &chunks[n], 1, &nodes[n].page, NULL), SPL_OK);
+        for (int a = 0; a < 3; a++)
+            nodes[n].box_max[a] = 5;
+    }
+    json_t *meta = json_deep_copy(spl_dataset_get_meta(*state));
+    json_object_set_new(meta, "leaf_splats", json_integer(4));
+    json_object_set_new(meta, "levels", json_integer(2));
+    assert_int_equal(spl_dataset_writer_finish(writer, nodes, 2, chunks, 2, meta, NULL), SPL_OK);
+    spl_dataset_writer_destroy(writer);
+    json_decref(meta);
+    struct spl_dataset *from = open_it(UINT64_MAX);
+    assert_true(spl_dataset_get_info(from)->pieces == 3 && spl_dataset_get_info(from)->splats == 4);
+    const struct spl_rewrite what = {.from = from, .leaf = (const bool[]){true, false}};
+    struct spl_error err = {0};
+    unlink(path);
+    assert_int_equal(spl_dataset_rewrite(&what, path, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "some: no splat would be left of it"));
+    assert_int_equal(access(path, F_OK), -1);
+    spl_dataset_close(from);
+}
+
 static int set_up(void **state)
 {
     make_folder(folder);
@@ -380,6 +445,8 @@ int main(void)
         cmocka_unit_test(what_stays_is_what_it_was),
         cmocka_unit_test(nothing_dropped_is_nothing_changed),
         cmocka_unit_test(new_colors_and_codes_go_by_old_numbers),
+        cmocka_unit_test(refused_memory_leaves_nothing),
+        cmocka_unit_test(what_has_lines_alone_is_no_dataset),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -13,13 +13,15 @@ static void add(struct spl_draw_list *list, uint32_t page, uint32_t splats, uint
 {
     const struct spl_draw_chunk chunk = {
         .count = splats, .texture = texture, .color_bits = clipped ? 1u << SPL_COLOR_CLIP : 0};
-    assert_int_equal(spl_draw_list_add(list, page, SPL_CHUNK_DISCS, &chunk, &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+    assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, SPL_CHUNK_DISCS, 0}, &chunk,
+                                       &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
 }
 
 static void add_lines(struct spl_draw_list *list, uint32_t page, uint32_t vertices)
 {
     const struct spl_draw_chunk chunk = {.count = vertices};
-    assert_int_equal(spl_draw_list_add(list, page, SPL_CHUNK_LINES, &chunk, &(struct spl_chunk_bounds){0}, NULL),
+    assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, SPL_CHUNK_LINES, 0}, &chunk,
+                                       &(struct spl_chunk_bounds){0}, NULL),
                      SPL_OK);
 }
 

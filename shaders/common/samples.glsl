@@ -1,0 +1,75 @@
+/* What the passes over discs left in the samples of a tile: depth words, payloads, sums. */
+#ifndef SPL_SAMPLES_GLSL
+#define SPL_SAMPLES_GLSL
+
+#include "common/frame.glsl"
+
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics payload, depth of the nearest */
+SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) sums_texels;
+
+uint depth_word(uint at)
+{
+#ifdef SPL_ATOMICS_64
+    return imageLoad(depth_texels, int(2u * at + 1u)).x;
+#else
+    return imageLoad(depth_texels, int(at)).x;
+#endif
+}
+
+uint payload(uint at)
+{
+#ifdef SPL_ATOMICS_64
+    return imageLoad(depth_texels, int(2u * at)).x;
+#else
+    return imageLoad(id_texels, int(at)).x;
+#endif
+}
+
+uvec4 load_sums(uint at)
+{
+    int word = 4 * int(at);
+    return uvec4(imageLoad(sums_texels, word).x, imageLoad(sums_texels, word + 1).x, imageLoad(sums_texels, word + 2).x,
+                 imageLoad(sums_texels, word + 3).x);
+}
+
+/* View depth of sums of SPL_SUMS_DEPTH behind pushed depth `first`. */
+float summed_depth(uint at, float first)
+{
+    uvec4 sum = load_sums(at);
+    precise float offset = (float(sum.y) * 512.0 + float(sum.x)) / float(sum.w);
+    precise float z = first - first * (offset * (1.0 / 262144.0));
+    return z;
+}
+
+uvec3 unpack_color(uint word)
+{
+    return (uvec3(word) >> uvec3(0u, 8u, 16u)) & 255u;
+}
+
+/* The i-th of the 3 x 3 samples around `at`; outside of the tile `at` itself. */
+uint sample_beside(ivec2 at, int i)
+{
+    ivec2 beside = at + ivec2(i % 3 - 1, i / 3 - 1);
+    return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
+}
+
+/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. */
+vec3 smooth_color(ivec2 at, uint own)
+{
+    float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
+    vec3 sum = vec3(0.0);
+    for (int i = 0;;) {
+        uint beside = sample_beside(at, i);
+        float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
+        float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
+        weight = abs(z - first) <= SPL_SMOOTH_SHARE * first ? weight : 0.0;
+        sum += weight * vec3(unpack_color(payload(beside)));
+        weights += weight;
+        if (++i >= 9)
+            break;
+    }
+    return sum / weights;
+}
+
+#endif
