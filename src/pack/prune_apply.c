@@ -1,4 +1,4 @@
-/* The last pass of spl_pack() with --prune: a packed dataset, with its maps or without, written anew without what a plan
+/* The last pass of spl_pack() with --prune: a packed dataset, with maps or without, written anew without what a plan
  * drops. The caller's thread. */
 #include "pack/prune.h"
 
