@@ -81,6 +81,11 @@ struct spl_map_options {
     /* Each picture that cannot be used, and why: the others are still taken. NULL: the first one fails all. */
     void (*refused)(void *context, const struct spl_error *why);
     void *context;
+    const char *export_to; /* a new or empty folder for the maps as PNG (api/photographs.md); NULL = none */
+    const char *edits;     /* such a folder, whose colours are taken after they were edited; NULL = none */
+    /* Where `panoramas` is NULL: those that the scans bring along, an E57 file's own and the folder panoramas beside a
+     * scan; maps are made only where there are any, and what is wrong with them is warned of, not refused. */
+    bool find;
 };
 
 static inline void spl_map_options_init(struct spl_map_options *options)
@@ -134,9 +139,9 @@ struct spl_pack_options {
     /* What is up there, of any length; 0, 0, 0 = z, or as photographs without a crs have it. */
     double up[3];
     const struct spl_map_options *maps; /* NULL = none are made */
-    /* About one of so many splats stays, more where geometry needs them, or colours where no map shows them; up to
-     * 1000. 0 or 1 = all. */
-    double prune;
+    /* About one of so many leaf splats stays, where maps show their colours and surfaces are plain; more of them where
+     * splats of a coarser level lose shape. 2..1000; 0 and 1 = all stay. */
+    uint32_t prune;
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
@@ -159,7 +164,7 @@ struct spl_pack_report {
     struct spl_photo_report photos;
     uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
     struct spl_map_report maps;
-    uint64_t pruned_of; /* leaf splats before options->prune; 0 = it was not asked for */
+    uint64_t pruned_of; /* leaf splats of which leaf_splats are left; 0 = all are */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,

@@ -68,11 +68,11 @@ static void print_summary(const char *output, const struct spl_pack_report *r)
             output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
             (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels,
             (unsigned long long)r->nodes, r->pages);
-    if (r->pruned_of)
-        fprintf(stderr, "pruned to one of %.1f of %llu leaf splats\n", (double)r->pruned_of / (double)r->leaf_splats,
-                (unsigned long long)r->pruned_of);
     fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
             (unsigned long long)r->leaf_splats);
+    if (r->pruned_of)
+        fprintf(stderr, "pruned: %llu of %llu leaf splats are left, one of %.1f\n", (unsigned long long)r->leaf_splats,
+                (unsigned long long)r->pruned_of, (double)r->pruned_of / (double)r->leaf_splats);
     fprintf(stderr, "bytes a splat:");
     for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++) {
         total += r->attribute_bits[a];
@@ -176,7 +176,7 @@ struct arguments {
     struct spl_pack_options pack;
     struct spl_photo_options photos;
     struct spl_map_options maps;
-    bool wants_maps;
+    bool wants_maps, no_panoramas;
     int textures;        /* enum spl_texture_coding; -1 = not given */
     const char *quality; // may be NULL
     bool keep_going, skip_broken;
@@ -280,10 +280,17 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, photos.keep_textures)},
     {"panoramas", "PATH",
      "maps of stations, whose colours come from panoramas: a panorama's JSON or its folder, an E57 file, photographs on "
-     "tripods with poses as of --cameras; 'scan': from the scan's own colours", .take = take_panoramas},
+     "tripods with poses as of --cameras; 'scan': from the scan's own colours",
+     .otherwise = "images of an E57 scan, DIR/panoramas of a scan in DIR, where there are any", .take = take_panoramas},
+    {"no-panoramas", NULL, "no maps of stations, even where a scan has panoramas",
+     SPL_CMD_FLAG(struct arguments, no_panoramas)},
+    {"export-maps", "DIR", "a new folder for the maps as PNG, for whoever edits them",
+     SPL_CMD_TEXT(struct arguments, maps.export_to)},
+    {"maps", "DIR", "such a folder, whose colours are taken into the maps after they were edited",
+     SPL_CMD_TEXT(struct arguments, maps.edits)},
     {"prune", "N",
-     "keep about one of N splats, more where geometry needs them, or colours where no map shows them (1 to 1000)",
-     .otherwise = "all", SPL_CMD_REAL(struct arguments, pack.prune, 1, 1000)},
+     "about one of N splats stays for good, 2 to 1000, where a coarser one is as good; best with maps, whose colours stay "
+     "as fine as they are", .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
@@ -302,7 +309,7 @@ static const struct spl_cmd_table table = {
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep LIST]\n"
         "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
-        "                   [--max-points N] [--prune N] [--threads N]\n"
+        "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
@@ -345,6 +352,10 @@ static const char *find_contradiction(const struct arguments *a)
         return "--keep-textures with --textures none keeps nothing: leave one of them out";
     if (a->quality && a->textures == SPL_TEXTURES_NONE)
         return "--texture-quality with --textures none codes nothing: leave one of them out";
+    if (a->no_panoramas && (a->wants_maps || a->maps.export_to || a->maps.edits))
+        return "--no-panoramas makes no maps: leave it out, or --panoramas, --export-maps and --maps";
+    if (!a->wants_maps && (photos->cameras || o->points_only) && (a->maps.export_to || a->maps.edits))
+        return "--export-maps and --maps need maps: name --panoramas PATH, or scan";
     if (o->points_only && (o->neighbours || o->normal_error > 0 || o->no_clip_lines))
         return "--points-only makes no normals, radii and clip lines: leave out --neighbours, --normal-error and "
                "--no-clip-lines, or it";
@@ -394,7 +405,8 @@ int spl_cmd_pack(int argc, char **argv)
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
     a.maps.refused = a.keep_going ? name_refused : NULL;
     a.maps.context = &listener;
-    a.pack.maps = a.wants_maps ? &a.maps : NULL;
+    a.maps.find = !a.wants_maps;
+    a.pack.maps = a.no_panoramas || (a.maps.find && (a.pack.photos || a.pack.points_only)) ? NULL : &a.maps;
     catch_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);

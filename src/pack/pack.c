@@ -20,6 +20,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/dataset.h"
+#include "dataset/rewrite.h"
 #include "geom/unit.h"
 #include "pack/emit.h"
 #include "pack/kept.h"
@@ -55,10 +56,10 @@ struct pack {
 struct passes {
     const struct spl_pack_options *options;
     struct spl_stage *stage;
+    struct spl_map_options with; /* of maps, where the scans bring pictures along */
     struct spl_view_list photographs, pictures;
     struct spl_photo_report photos;
     struct spl_map_report maps;
-    struct spl_prune_report pruned;
 };
 
 static int check_options(struct pack *p, struct spl_error *err)
@@ -228,8 +229,6 @@ static void plan(const struct pack *p, const struct passes *later)
                         (uint64_t)(1.33 * (double)points), 0);
     if (p->options->maps)
         spl_maps_plan(p->stage, later ? (uint32_t)later->pictures.count : 0, points);
-    if (p->options->prune > 1)
-        spl_stage_plan(p->stage, "pruning", 0.8e-6 * (double)points, 0);
 }
 
 static int join_wires(struct pack *p, struct spl_error *err)
@@ -313,8 +312,7 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
                                   : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
     if (!rc)
         rc = join_wires(&p, err);
-    if (!rc)
-        p.tree.for_pruning = options->prune > 1;
+    p.tree.for_pruning = options->prune > 1;
     if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
@@ -379,120 +377,121 @@ static int open_part(const char *path, struct spl_dataset **dataset, struct spl_
     return rc;
 }
 
-enum pass { PASS_PHOTOS, PASS_MAPS, PASS_PRUNE, PASSES };
-
-static bool has_pass(const struct spl_pack_options *options, enum pass pass)
-{
-    return pass == PASS_PHOTOS ? options->photos != NULL
-                               : pass == PASS_MAPS ? options->maps != NULL : options->prune > 1;
-}
-
-static int run_pass(struct passes *p, enum pass pass, const struct spl_dataset *dataset, const char *output,
-                    struct spl_error *err)
-{
-    const struct spl_pack_options *o = p->options;
-    switch (pass) {
-    case PASS_PHOTOS:
-        return spl_photos_apply(o->photos, &p->photographs, dataset, output, p->stage, &p->photos, err);
-    case PASS_MAPS:
-        return spl_maps_apply(o->maps, &p->pictures, dataset, output, p->stage, &p->maps, err);
-    default:
-        return spl_prune_apply(dataset, o->prune, output, &p->pruned, p->stage, err);
-    }
-}
-
-/* Each reads what the one before wrote; the last writes the dataset. */
 static int run_passes(struct passes *p, const char *part, struct spl_error *err)
 {
-    int last = PASSES - 1, rc = SPL_OK;
-    while (!has_pass(p->options, last))
-        last--;
-    for (int pass = 0; pass <= last && !rc; pass++) {
-        struct spl_dataset *dataset = NULL;
-        if (!has_pass(p->options, pass))
-            continue;
-        rc = open_part(part, &dataset, err);
-        if (!rc)
-            rc = run_pass(p, pass, dataset, pass == last ? p->options->output : part, err);
+    const struct spl_pack_options *o = p->options;
+    struct spl_dataset *dataset = NULL;
+    bool more = o->maps || o->prune > 1;
+    int rc = open_part(part, &dataset, err);
+    if (!rc && o->photos) {
+        rc = spl_photos_apply(o->photos, &p->photographs, dataset, more ? part : o->output, p->stage, &p->photos, err);
         spl_dataset_close(dataset);
+        dataset = NULL;
+        if (!rc && more)
+            rc = open_part(part, &dataset, err);
     }
+    if (!rc && o->maps)
+        rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, err);
+    else if (!rc && more)
+        rc = spl_prune_apply(dataset, o->prune, o->output, NULL, p->stage, err);
+    spl_dataset_close(dataset);
     return rc;
 }
 
-/* Of the dataset that was written, where pack_scan() speaks of the one that passes began with. */
-static void fill_passes(const struct passes *p, const struct spl_dataset_info *info, struct spl_pack_report *report)
+static void warn_of_picture(void *context, const struct spl_error *why)
+{
+    const struct spl_pack_options *options = context;
+    if (options->warn)
+        options->warn(options->progress_context, why->message);
+}
+
+/* Options of maps and their pictures become those that the scans bring along, or none. Nobody asked for these, so what
+ * is wrong with them fails nothing. */
+static int find_pictures(struct passes *p, struct spl_pack_options *options, struct spl_error *err)
+{
+    struct spl_map_sources found;
+    struct spl_error why = {0};
+    int rc = spl_map_sources_find(options->inputs, options->input_count, &found, &why);
+    p->with = *options->maps;
+    if (!p->with.refused) {
+        p->with.refused = warn_of_picture;
+        p->with.context = options;
+    }
+    if (!rc && !found.count && (p->with.export_to || p->with.edits))
+        rc = spl_fail_field(&why, SPL_E_USAGE, "panoramas",
+                            "these scans bring no panoramas along, so there are no maps to be edited: name --panoramas "
+                            "PATH, or scan");
+    if (!rc && found.count)
+        rc = spl_maps_load(&p->with, &found, &p->pictures, &p->maps, &why);
+    options->maps = p->pictures.count ? &p->with : NULL;
+    spl_map_sources_finish(&found);
+    if (rc && rc != SPL_E_NOMEM && rc != SPL_E_USAGE) {
+        warn_of_picture(options, &why);
+        return SPL_OK;
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
+/* What the file that was written last has. */
+static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_report *report)
 {
     memcpy(report->attribute_bits, info->attribute_bits, sizeof report->attribute_bits);
-    report->photos = p->photos;
-    report->maps = p->maps;
-    report->seconds += p->photos.seconds + p->maps.seconds + p->pruned.seconds;
-    if (!p->pruned.before)
-        return;
-    report->pruned_of = p->pruned.before;
+    report->pruned_of = info->leaf_splats < report->leaf_splats ? report->leaf_splats : 0;
     report->leaf_splats = info->leaf_splats;
     report->splats = info->splats;
     report->pieces = info->pieces;
     report->levels = info->levels;
-    report->pages = info->pages;
     report->nodes = info->nodes;
     report->chunks = info->chunks;
+    report->pages = info->pages;
     for (uint32_t s = 0; s < report->stream_count; s++)
         report->streams[s].bits = info->streams[s].bits;
 }
 
-static int pack_passes(const struct spl_pack_options *options, struct spl_inputs *inputs, struct spl_stage *stage,
-                       struct spl_pack_report *report, struct spl_error *err)
+static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_pack_report *report,
+                       struct spl_error *err)
 {
-    struct passes p = {.options = options, .stage = stage};
+    const struct spl_pack_options *options = p->options;
     struct spl_dataset *dataset = NULL;
     char *part = NULL;
     int rc = SPL_OK;
-    if (options->photos && !(rc = spl_photos_load(options->photos, &p.photographs, &p.photos, err)))
-        rc = check_kept(options, &p.photographs, err);
-    if (!rc && options->maps)
-        rc = spl_maps_load(options->maps, &p.pictures, &p.maps, err);
+    if (options->photos && !(rc = spl_photos_load(options->photos, &p->photographs, &p->photos, err)))
+        rc = check_kept(options, &p->photographs, err);
+    if (!rc && options->maps && !p->pictures.count)
+        rc = spl_maps_load(options->maps, &(struct spl_map_sources){0}, &p->pictures, &p->maps, err);
     if (!rc && asprintf(&part, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
         part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
     if (!rc)
-        rc = pack_scan(options, inputs, part, &p, stage, report, err);
+        rc = pack_scan(options, inputs, part, p, p->stage, report, err);
     if (!rc)
-        rc = run_passes(&p, part, err);
-    if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err)))
-        fill_passes(&p, spl_dataset_get_info(dataset), report);
+        rc = run_passes(p, part, err);
+    if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
+        fill_rewritten(spl_dataset_get_info(dataset), report);
+        report->photos = p->photos;
+        report->maps = p->maps;
+        report->seconds += p->photos.seconds + p->maps.seconds;
+    }
     spl_dataset_close(dataset);
-    spl_view_list_finish(&p.photographs);
-    spl_view_list_finish(&p.pictures);
     free(part);
     return rc;
 }
 
-static int check_passes(const struct spl_pack_options *options, struct spl_error *err)
+static int pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
     if (options->points_only && options->photos)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
-    if (options->points_only && options->maps)
-        return spl_fail_field(err, SPL_E_USAGE, "points-only",
-                              "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
-    if (options->prune != 0 && !(options->prune >= 1 && options->prune <= SPL_PRUNE_FACTOR_MAX))
-        return spl_fail_field(err, SPL_E_USAGE, "prune", "%g; about one of so many splats stays, 1 to %d",
-                              options->prune, SPL_PRUNE_FACTOR_MAX);
     if (options->points_only && options->prune > 1)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
-                              "what pruning loses is told by discs; pack without --points-only, or without --prune");
-    if (options->prune > 1 && !options->maps && options->warn)
-        options->warn(options->progress_context, "without maps of stations (--panoramas) pruning drops colours with "
-                                                 "the splats that have them");
-    return SPL_OK;
-}
-
-static int pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
-{
-    int rc = check_passes(options, err);
-    if (rc)
-        return rc;
+                              "pruning weighs discs against each other; pack without --points-only, or without --prune");
+    if (options->prune > SPL_PRUNE_FACTOR_MAX)
+        return spl_fail_field(err, SPL_E_USAGE, "prune", "%u; of so many splats about one stays, 1 to %d",
+                              options->prune, SPL_PRUNE_FACTOR_MAX);
+    if (options->points_only && options->maps && !options->maps->find)
+        return spl_fail_field(err, SPL_E_USAGE, "points-only",
+                              "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
                               .threads = spl_thread_count(options->threads),
@@ -500,14 +499,23 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     const struct spl_inputs_listener listener = {options->warn, options->left_out, options->progress_context};
     struct spl_pack_options found = *options;
     struct spl_inputs inputs;
-    rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
+    int rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
     if (rc)
         return rc;
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
-    rc = options->photos || options->maps || options->prune > 1
-             ? pack_passes(&found, &inputs, &stage, report, err)
-             : pack_scan(&found, &inputs, options->output, NULL, &stage, report, err);
+    struct passes p = {.options = &found, .stage = &stage};
+    if (found.maps && found.maps->find && options->points_only)
+        found.maps = NULL;
+    if (found.maps)
+        rc = spl_maps_check(found.maps, err);
+    if (!rc && found.maps && found.maps->find && !found.maps->panoramas)
+        rc = find_pictures(&p, &found, err);
+    if (!rc)
+        rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)
+                                        : pack_scan(&found, &inputs, found.output, NULL, &stage, report, err);
+    spl_view_list_finish(&p.photographs);
+    spl_view_list_finish(&p.pictures);
     spl_inputs_finish(&inputs);
     return rc;
 }

@@ -47,10 +47,12 @@ struct spl_prune_report {
 int spl_prune_plan(const struct spl_dataset *dataset, const struct spl_prune_options *options, bool *leaf,
                    struct spl_prune_report *report, struct spl_stage *stage, struct spl_error *err);
 
-/* Writes `output`, `dataset` without what is dropped: its maps stay, and say by their chunks' stations what they show.
- * Discs that are the finest from now on are drawn smaller than they were made: those of a level reach over each other
- * as scanned points must, which lie at random, while clusters lie evenly. `report` may be NULL. As spl_prune_plan() and
- * spl_dataset_rewrite(). */
+/* What the radii of discs that are the finest from now on are multiplied by (spl_rewrite.leaf_radius): those of a level
+ * reach over each other as scanned points must, which lie at random, while clusters lie evenly. */
+float spl_prune_leaf_radius(const struct spl_dataset *dataset);
+
+/* Writes `output`, `dataset` without what is dropped where no maps show colours. `report` may be NULL. As
+ * spl_prune_plan() and spl_dataset_rewrite(). */
 int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char *output,
                     struct spl_prune_report *report, struct spl_stage *stage, struct spl_error *err);
 

@@ -1,4 +1,4 @@
-/* The last pass of spl_pack() with --prune: a packed dataset, with maps or without, written anew without what a plan
+/* The last pass of spl_pack() with --prune: a packed dataset, without maps, written anew without what a plan
  * drops. The caller's thread. */
 #include "pack/prune.h"
 
@@ -12,15 +12,11 @@
  * courtyard's splats: 1 is 22.6 dB, 0.8 is 23.3, 0.7 is 23.5 with as many holes as all its points. */
 static const float cluster_radius_share = 0.7f;
 
-/* What maps show, by chunk: all of it or nothing. */
-static float *find_seen(const struct spl_dataset *dataset, struct spl_error *err)
+float spl_prune_leaf_radius(const struct spl_dataset *dataset)
 {
-    const struct spl_chunk_stations *stations = spl_dataset_get_chunk_stations(dataset);
-    uint64_t count = spl_dataset_get_info(dataset)->chunks;
-    float *seen = spl_alloc_raw(count, sizeof *seen, err);
-    for (uint64_t c = 0; seen && c < count; c++)
-        seen[c] = stations && stations[c].seen_by[0] & SPL_STATION_ROW ? 1 : 0;
-    return seen;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    /* Textures are as large as the discs that they are for; bare points' radii are their spacing. */
+    return info->atoms || !info->has_surface ? 1 : cluster_radius_share;
 }
 
 int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char *output,
@@ -30,18 +26,14 @@ int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char
     struct spl_prune_report own;
     uint64_t begin_ns = spl_now_ns();
     bool *leaf = spl_alloc(info->nodes, sizeof *leaf, err);
-    float *seen = find_seen(dataset, err);
-    const struct spl_prune_options options = {.factor = factor, .seen = seen};
-    int rc = leaf && seen ? spl_prune_plan(dataset, &options, leaf, report ? report : &own, stage, err) : SPL_E_NOMEM;
-    /* Textures are as large as the discs that they are for; bare points' radii are their spacing. */
-    bool fixed = info->atoms || !info->has_surface;
+    const struct spl_prune_options options = {.factor = factor, .no_maps = true};
+    int rc = leaf ? spl_prune_plan(dataset, &options, leaf, report ? report : &own, stage, err) : SPL_E_NOMEM;
     const struct spl_rewrite rewrite = {
-        .from = dataset, .leaf = leaf, .leaf_radius = fixed ? 1 : cluster_radius_share};
+        .from = dataset, .leaf = leaf, .leaf_radius = spl_prune_leaf_radius(dataset)};
     if (!rc)
         rc = spl_dataset_rewrite(&rewrite, output, err);
     if (!rc && report)
         report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     free(leaf);
-    free(seen);
     return rc;
 }

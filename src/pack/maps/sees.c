@@ -1,7 +1,7 @@
 /* Which stations see a chunk, and whether its own trims it. A chunk's own station is that of most of its splats: the
  * first; the next three are those that see its splats best, by cosine over distance. It trims where a disc, drawn up to
- * twice as large as levels are scaled, reaches a place that is dropped; but not where that is the place of a splat that
- * another station saw: what stood there was gone when the own one looked.
+ * twice as large as levels are scaled, reaches a place that is dropped: splats of other stations among its own too, for at
+ * silhouettes most chunks have some, and fringes cost more than what is gone with them.
  *
  * Each chunk is one thread's, so threads change nothing. */
 #include "pack/maps/sees.h"
@@ -65,9 +65,9 @@ struct pass {
     const struct spl_stations *stations;
     const uint16_t *row_of;
     const struct spl_map_sight *maps;
-    uint32_t count;
     struct spl_stage *stage;
     struct spl_chunk_stations *out;
+    float *seen;
 };
 
 static double cosine_of(const struct spl_station *station, const struct spl_world_splat *s, double *range)
@@ -118,22 +118,14 @@ static bool reaches_through(const struct spl_map_sight *map, const struct spl_st
     return false;
 }
 
-static bool find_trims(const struct spl_station *station, uint32_t station_index, const struct spl_map_sight *map,
-                       const struct spl_world_splat *list, const uint16_t *of, uint32_t count)
+static bool find_trims(const struct spl_station *station, const struct spl_map_sight *map,
+                       const struct spl_world_splat *list, uint32_t count)
 {
-    uint32_t gone = 0;
+    double range;
     bool trims = false;
-    double range, own[3];
-    for (uint32_t i = 0; i < count; i++) {
-        double cosine = cosine_of(station, &list[i], &range);
-        if (!trims)
-            trims = reaches_through(map, station, &list[i], cosine);
-        if (of[i] == station_index)
-            continue;
-        spl_station_to_own(station, list[i].position, own);
-        gone += spl_map_drops(map, own, (double)list[i].splat.radius, cosine);
-    }
-    return trims && 20 * gone <= count;
+    for (uint32_t i = 0; !trims && i < count; i++)
+        trims = reaches_through(map, station, &list[i], cosine_of(station, &list[i], &range));
+    return trims;
 }
 
 /* Keeps the best, of equal ones the first. */
@@ -158,7 +150,7 @@ static void judge_chunk(const struct pass *p, uint32_t c)
     uint32_t count = spl_splats_get(p->splats, c, list), step = (count + asked - 1) / asked, used = 0;
     bool discs = spl_splats_is_discs(p->splats, c);
     uint16_t own = discs ? find_own(p, of, count) : 0, rows[SPL_CHUNK_STATIONS] = {0};
-    double best[SPL_CHUNK_STATIONS] = {0}, extent = 0;
+    double best[SPL_CHUNK_STATIONS] = {0}, extent = 0, shown[asked] = {0}, all = 0;
     const int last = SPL_CHUNK_STATIONS - 1;
     *out = (struct spl_chunk_stations){0};
     for (uint32_t i = 0; i < count; i++)
@@ -169,25 +161,31 @@ static void judge_chunk(const struct pass *p, uint32_t c)
         const struct spl_station *station = &p->stations->list[s];
         uint16_t row = p->row_of[s];
         double score = 0, range, at[3];
+        uint32_t k = 0;
         if (!row)
             continue;
         if (row == own) {
-            bool trims = find_trims(station, s, &p->maps[row - 1], list, of, count);
+            bool trims = find_trims(station, &p->maps[row - 1], list, count);
             out->seen_by[used++] = (uint16_t)(own | (trims ? SPL_STATION_TRIMS : 0));
-            continue;
         }
         cosine_of(station, &list[0], &range);
-        if ((double)((count + step - 1) / step) <= best[last] * (range - extent))
+        if (row != own && (double)((count + step - 1) / step) <= best[last] * (range - extent))
             continue; /* too far away, however squarely it is seen */
-        for (uint32_t i = 0; i < count; i += step) {
+        for (uint32_t i = 0; i < count; i += step, k++) {
             double cosine = cosine_of(station, &list[i], &range);
             if (!(range > 0))
                 continue;
             spl_station_to_own(station, list[i].position, at);
-            score += cosine / range * spl_map_shows(&p->maps[row - 1], at, (double)list[i].splat.radius, cosine);
+            double shows = spl_map_shows(&p->maps[row - 1], at, (double)list[i].splat.radius, cosine);
+            shown[k] = fmax(shown[k], shows);
+            score += cosine / range * shows;
         }
-        keep_best(score, row, best, rows);
+        if (row != own)
+            keep_best(score, row, best, rows);
     }
+    for (int k = 0; k < asked; k++)
+        all += shown[k];
+    p->seen[c] = (float)(all / ((count + step - 1) / step));
     for (int k = 0; k < SPL_CHUNK_STATIONS && rows[k] && used < SPL_CHUNK_STATIONS; k++)
         out->seen_by[used++] = rows[k];
 }
@@ -202,10 +200,10 @@ static void judge_chunks(void *context, size_t begin, size_t end, unsigned worke
 }
 
 int spl_map_find_chunks(const struct spl_splats *splats, const struct spl_stations *stations, const uint16_t *row_of,
-                        const struct spl_map_sight *maps, uint32_t count, struct spl_stage *stage,
-                        struct spl_chunk_stations *out, struct spl_error *err)
+                        const struct spl_map_sight *maps, struct spl_stage *stage, struct spl_chunk_stations *out,
+                        float *seen, struct spl_error *err)
 {
-    struct pass p = {splats, stations, row_of, maps, count, stage, out};
+    struct pass p = {splats, stations, row_of, maps, stage, out, seen};
     spl_stage_begin(stage, "stations of chunks", NULL, splats->chunk_count);
     spl_parallel_for(stage->threads, splats->chunk_count, 8, judge_chunks, &p);
     spl_stage_end(stage);

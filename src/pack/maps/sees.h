@@ -20,9 +20,10 @@ bool spl_map_drops(const struct spl_map_sight *map, const double own[3], double 
 /* What share of the four texels around it says that the point is what the station saw. */
 double spl_map_shows(const struct spl_map_sight *map, const double own[3], double radius, double cosine);
 
-/* The stations of each chunk. `row_of` each station's row + 1, 0 = it has no map; `maps` by row. Parallel. */
+/* The stations of each chunk, and what share of it some map shows. `row_of` each station's row + 1, 0 = it has no map;
+ * `maps` by row. Parallel. */
 int spl_map_find_chunks(const struct spl_splats *splats, const struct spl_stations *stations, const uint16_t *row_of,
-                        const struct spl_map_sight *maps, uint32_t count, struct spl_stage *stage,
-                        struct spl_chunk_stations *out, struct spl_error *err);
+                        const struct spl_map_sight *maps, struct spl_stage *stage, struct spl_chunk_stations *out,
+                        float *seen, struct spl_error *err);
 
 #endif

@@ -307,6 +307,8 @@ static void write_room(const char *path)
     assert_int_equal(fclose(f), 0);
 }
 
+static uint32_t prune;
+
 static int pack_room(const char *input, const char *output, const struct spl_map_options *maps, unsigned threads,
                      struct spl_pack_report *report, struct spl_error *err)
 {
@@ -315,7 +317,8 @@ static int pack_room(const char *input, const char *output, const struct spl_map
                                              .input_count = 1,
                                              .output = output,
                                              .threads = threads,
-                                             .maps = maps};
+                                             .maps = maps,
+                                             .prune = prune};
     return spl_pack(&options, report, err);
 }
 
@@ -432,6 +435,38 @@ static void colors_of_the_map_are_those_of_the_points(void **state)
     spl_dataset_close(dataset);
 }
 
+static void a_pruned_room_has_the_same_map(void **state)
+{
+    (void)state;
+    const struct spl_map_options maps = {.size = sizeof maps};
+    struct spl_pack_report report = {0};
+    struct spl_error err = {0};
+    uint32_t count, other_count;
+    prune = 1001;
+    assert_int_equal(pack_room(path_of("room.ptx"), path_of("none.spld"), &maps, 2, &report, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "prune");
+    for (int with = 0; with < 2; with++) {
+        struct spl_dataset *dataset, *whole;
+        err = (struct spl_error){0};
+        prune = 10;
+        if (pack_room(path_of("room.ptx"), path_of("pruned.spld"), with ? &maps : NULL, 2, &report, &err) ||
+            spl_dataset_open_whole(path_of("pruned.spld"), true, &dataset, &err) ||
+            spl_dataset_open_whole(path_of("room.spld"), true, &whole, &err))
+            fail_msg("%s", err.message);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        assert_true(report.pruned_of > 2 * report.leaf_splats);
+        assert_true(info->leaf_splats == report.leaf_splats && info->points == spl_dataset_get_info(whole)->points);
+        assert_int_equal(info->maps, with);
+        const struct spl_map_row *row = spl_dataset_get_maps(dataset, &count);
+        const struct spl_map_row *other = spl_dataset_get_maps(whole, &other_count);
+        if (with)
+            assert_memory_equal(row, other, sizeof *row);
+        spl_dataset_close(dataset);
+        spl_dataset_close(whole);
+    }
+    prune = 0;
+}
+
 int main(void)
 {
     make_folder(folder);
@@ -444,6 +479,7 @@ int main(void)
         cmocka_unit_test(few_hits_make_a_map_all_the_same),
         cmocka_unit_test(a_scan_without_stations_needs_panoramas),
         cmocka_unit_test(a_room_becomes_a_map),
+        cmocka_unit_test(a_pruned_room_has_the_same_map),
         cmocka_unit_test(colors_of_the_map_are_those_of_the_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
