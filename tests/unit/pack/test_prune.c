@@ -479,17 +479,13 @@ static void a_packed_file_is_pruned(void **state)
 static void a_pack_that_cannot_be_pruned_is_refused(void **state)
 {
     (void)state;
-    const double factors[] = {0.5, -1, NAN, INFINITY, SPL_PRUNE_FACTOR_MAX + 1};
     char packed[300];
     struct spl_error err = {0};
     snprintf(packed, sizeof packed, "%s/none.spld", folder);
     struct spl_pack_options options = pack_options(packed);
-    for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) {
-        err = (struct spl_error){0};
-        options.prune = factors[i];
-        assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_USAGE);
-        assert_string_equal(err.field, "prune");
-    }
+    options.prune = SPL_PRUNE_FACTOR_MAX + 1;
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "prune");
     options.prune = 10;
     options.points_only = true;
     err = (struct spl_error){0};
