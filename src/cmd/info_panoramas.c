@@ -60,8 +60,8 @@ void spl_info_print_panoramas(const json_t *panoramas)
         printf("  %-14s%lld", i ? "" : "panoramas", (long long)whole);
         if (loose)
             printf(" and %lld photographs", (long long)loose);
-        printf(", for maps of stations: --panoramas ");
+        printf(" of ");
         spl_cmd_put_text(stdout, json_string_value(json_object_get(source, "path")), 0);
-        putchar('\n');
+        printf(", which become maps of stations\n");
     }
 }

@@ -63,6 +63,9 @@ def test_picks_see_what_views_show():
         assert pick(SEEN, "")["splat"] == pick(SEEN, "&maps=off")["splat"] is not None
         assert pick(SEEN, "&maps=on")["color"] != pick(SEEN, "&maps=off")["color"]
         assert pick(THROUGH, "")["splat"] is None and pick(THROUGH, "&maps=off")["splat"] is not None
+        camera = {"eye": [3, 0.2, 1], "target": [0, 0.2, 1], "up": [0, 0, 1], "fov": 60, "width": 64, "height": 48}
+        body = {"x": SEEN[0] + 0.5, "y": SEEN[1] + 0.5, "camera": camera, "maps": "off"}
+        assert d.post(body, f"/v1/datasets/{NAME}/pick").json() == pick(SEEN, "&maps=off")
 
 
 def test_what_changes_nothing_makes_no_other_etag():

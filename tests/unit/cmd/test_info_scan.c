@@ -236,11 +236,11 @@ static void test_panoramas(void **state)
     json_decref(json);
     write_text("yard/panoramas/station-2.color.png", "");
     assert_int_equal(run("info yard/courtyard.ply", output, sizeof output), 0);
-    assert_non_null(strstr(output, "\n  panoramas     3, for maps of stations: --panoramas yard/panoramas\n"));
+    assert_non_null(strstr(output, "\n  panoramas     3 of yard/panoramas, which become maps of stations\n"));
     assert_non_null(strstr(strstr(output, "\n  warnings"), "station-2"));
     write_text("yard/second.ply", ply); /* two beside one folder */
     assert_int_equal(run("info yard/courtyard.ply yard/second.ply", output, sizeof output), 0);
-    assert_non_null(strstr(strstr(output, "2 scans together"), "\n  panoramas     3, "));
+    assert_non_null(strstr(strstr(output, "2 scans together"), "\n  panoramas     3 of "));
     assert_null(strstr(strstr(output, "\n  panoramas") + 1, "\n  panoramas"));
     write_text("yard/panoramas/panoramas.json", "{\"panoramas\": 7}");
     json = json_of("yard/second.ply");
