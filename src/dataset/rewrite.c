@@ -99,6 +99,15 @@ static int get_code(struct pass *p, uint64_t index, uint32_t splats, struct spl_
     return SPL_OK;
 }
 
+/* Discs of a node that is a leaf from now on. */
+static void scale_radii(const struct pass *p, struct spl_chunk *chunk)
+{
+    if (spl_chunk_kind(chunk) != SPL_CHUNK_DISCS || !(p->what->leaf_radius > 0))
+        return;
+    chunk->radius_min *= p->what->leaf_radius;
+    chunk->radius_step *= p->what->leaf_radius;
+}
+
 /* A leaf's splats, whose words are still the node's. */
 static void count_leaf(struct pass *p, const struct spl_chunk *chunks, uint32_t chunk_count)
 {
@@ -126,6 +135,8 @@ static int write_node(struct pass *p, const struct spl_node *old, bool leaf, str
     for (uint32_t i = 0; i < node->chunk_count && !rc; i++) {
         uint32_t count = copy_chunk(p, old->first_chunk + i, &chunks[i], p->words + used);
         copy_tables(p, old->first_chunk + i, node->first_chunk + i);
+        if (leaf)
+            scale_radii(p, &chunks[i]);
         chunks[i].geometry_word = (uint32_t)used;
         used += count;
         if (!p->what->dictionary)

@@ -36,6 +36,8 @@ struct spl_rewrite {
      * Nodes, chunks and ids of the new file are numbered without what is dropped. META then says "pruned", its radius
      * is that of the new leaves; bounds and view stay those of the scan. */
     const bool *leaf;
+    float leaf_radius; /* radii of those nodes' discs are multiplied by it, what selection takes for their spacing is
+                        * not; 0 = 1 */
 };
 
 /* Writes `path` (temporary file, sync, rename): geometry and optional attributes are copied bit for bit. Blocks on

@@ -4,10 +4,16 @@
  * as it must be for the node to hold about a quarter of its children's splats, which is what doubling the spacing of a
  * surface means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts,
  * reaches over them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
+ *
+ * Where inner nodes are drawn for good, a mean of two surfaces is drawn for good too, and maps put the wrong texels onto
+ * it. There a cell gives a splat for each surface in it, told apart by their normals and by how far off one another's
+ * plane they lie. On an exact courtyard with exact maps 1/100 of the splats gains 0.5 dB by it at the same number.
+ *
  * Nodes of one depth are done in parallel; each is done by one worker in the order of its children, so the result does
  * not depend on the number of threads. */
 #include "pack/tree.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,11 +26,16 @@
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
  */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
-enum { attempts = 6, inner_most = 12288 };
+enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
+
+/* Surfaces of a cell: their normals differ by more than so much (cosine), or their planes by such a share of the
+ * cell. The fourth takes what faces its way at all. */
+static const double same_facing = 0.6, same_plane = 0.15;
+enum { surfaces_most = 4 };
 
 struct cluster {
     uint64_t cell;
-    uint32_t other; /* the cell's second cluster, 0 = none */
+    uint32_t other; /* the cell's next cluster, 0 = none */
     uint32_t votes; /* of `classification`, majority by pairing off */
     uint8_t classification;
     float largest;
@@ -121,8 +132,60 @@ static void add_to(struct cluster *k, const struct spl_inner_splat *s)
     k->votes += k->classification == classification ? 1 : -1u;
 }
 
-/* Clusters `count` splats; gives up once there are more than `limit` clusters. Cluster 0 is unused. */
-static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit)
+static struct cluster *add_cluster(struct scratch *w, size_t *clusters, uint64_t cell)
+{
+    struct cluster *k = &w->clusters[(*clusters)++];
+    *k = (struct cluster){.cell = cell};
+    return k;
+}
+
+/* The one of a cell's clusters, `first` and maybe another, that faces as the splat does, or a new one. */
+static struct cluster *find_side(struct scratch *w, size_t *clusters, struct cluster *first,
+                                 const struct spl_inner_splat *s)
+{
+    struct cluster *other = &w->clusters[first->other];
+    if (!(dot(first->normal, s->normal) < 0))
+        return first;
+    if (first->other)
+        return dot(other->normal, s->normal) > dot(first->normal, s->normal) ? other : first;
+    first->other = (uint32_t)*clusters;
+    return add_cluster(w, clusters, UINT64_MAX);
+}
+
+/* The one of a cell's clusters whose surface the splat lies on, or a new one. */
+static struct cluster *find_surface(struct scratch *w, size_t *clusters, struct cluster *first, double cell,
+                                    const struct spl_inner_splat *s)
+{
+    struct cluster *same = NULL, *alike = NULL, *last = NULL;
+    double same_cosine = 0, alike_cosine = 0;
+    unsigned count = 0;
+    for (uint32_t at = (uint32_t)(first - w->clusters); at; at = last->other, count++) {
+        double length = 0, off = 0, cosine;
+        last = &w->clusters[at];
+        for (int c = 0; c < 3; c++) {
+            length += last->normal[c] * last->normal[c];
+            off += last->normal[c] * (s->position[c] - last->position[c] / last->weight);
+        }
+        length = fmax(sqrt(length), DBL_MIN);
+        cosine = dot(last->normal, s->normal) / length;
+        if (cosine >= same_facing && fabs(off) <= same_plane * cell * length && (!same || cosine > same_cosine)) {
+            same = last;
+            same_cosine = cosine;
+        }
+        if (!alike || cosine > alike_cosine) {
+            alike = last;
+            alike_cosine = cosine;
+        }
+    }
+    if (same || (count >= surfaces_most && alike_cosine >= 0))
+        return same ? same : alike;
+    last->other = (uint32_t)*clusters;
+    return add_cluster(w, clusters, UINT64_MAX);
+}
+
+/* Clusters `count` splats, by sides or by surfaces; gives up once there are more than `limit` clusters. Cluster 0 is
+ * unused. */
+static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit, bool surfaces)
 {
     size_t clusters = 1, mask = w->table_size - 1;
     double inverse = 1 / cell;
@@ -134,19 +197,11 @@ static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit
         while (w->table[slot] && w->clusters[w->table[slot]].cell != key)
             slot = (slot + 1) & mask;
         struct cluster *k = &w->clusters[w->table[slot]];
-        if (w->table[slot] && dot(k->normal, s->normal) < 0) {
-            struct cluster *other = &w->clusters[k->other];
-            if (!k->other) {
-                k->other = (uint32_t)clusters;
-                k = &w->clusters[clusters++];
-                *k = (struct cluster){.cell = UINT64_MAX};
-            } else if (dot(other->normal, s->normal) > dot(k->normal, s->normal)) {
-                k = other;
-            }
-        } else if (!w->table[slot]) {
+        if (!w->table[slot]) {
             w->table[slot] = (uint32_t)clusters;
-            k = &w->clusters[clusters++];
-            *k = (struct cluster){.cell = key};
+            k = add_cluster(w, &clusters, key);
+        } else {
+            k = surfaces ? find_surface(w, &clusters, k, cell, s) : find_side(w, &clusters, k, s);
         }
         add_to(k, s);
         w->of[i] = (uint32_t)(k - w->clusters);
@@ -211,11 +266,13 @@ static bool build_node(struct levels *l, struct scratch *w, struct spl_tree_node
     for (uint32_t c = 0; c < node->child_count; c++)
         at += take_child(l->points, node, &children[c], w->input + at);
 
-    double base = fmin((double)count, inner_most / most);
+    bool surfaces = l->tree->for_pruning;
+    double base = fmin((double)count, (surfaces ? pruned_inner_most : inner_most) / most);
     size_t limit = base * most > 2 ? (size_t)(base * most) : 2; /* two opposed splats never become one */
     double cell = 2 * median_radius(w->input, count, radii) / 1.128379, too_fine = 0;
     for (int attempt = 0;; attempt++) {
-        clusters = cluster(w, count, cell, limit);
+        /* In a large enough cell there are two sides, but as many surfaces as there are normals. */
+        clusters = cluster(w, count, cell, limit, surfaces && attempt <= attempts);
         double share = (double)clusters / base;
         if (clusters > limit) {
             too_fine = cell;

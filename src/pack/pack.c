@@ -312,6 +312,7 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
                                   : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
     if (!rc)
         rc = join_wires(&p, err);
+    p.tree.for_pruning = options->prune > 1;
     if (!rc)
         rc = spl_tree_build(&p.tree, &p.points, err);
     if (!rc)
@@ -376,21 +377,6 @@ static int open_part(const char *path, struct spl_dataset **dataset, struct spl_
     return rc;
 }
 
-/* Geometry alone says what may go. */
-static int write_pruned(const struct spl_pack_options *o, const struct spl_dataset *dataset, struct spl_stage *stage,
-                        struct spl_error *err)
-{
-    const struct spl_prune_options how = {.factor = o->prune, .no_maps = true};
-    struct spl_prune_report report;
-    bool *leaf = spl_alloc(spl_dataset_get_info(dataset)->nodes, sizeof *leaf, err);
-    const struct spl_rewrite rewrite = {.from = dataset, .leaf = leaf};
-    int rc = leaf ? spl_prune_plan(dataset, &how, leaf, &report, stage, err) : SPL_E_NOMEM;
-    if (!rc)
-        rc = spl_dataset_rewrite(&rewrite, o->output, err);
-    free(leaf);
-    return rc;
-}
-
 static int run_passes(struct passes *p, const char *part, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
@@ -407,7 +393,7 @@ static int run_passes(struct passes *p, const char *part, struct spl_error *err)
     if (!rc && o->maps)
         rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, err);
     else if (!rc && more)
-        rc = write_pruned(o, dataset, p->stage, err);
+        rc = spl_prune_apply(dataset, o->prune, o->output, NULL, p->stage, err);
     spl_dataset_close(dataset);
     return rc;
 }
@@ -521,7 +507,9 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     struct passes p = {.options = &found, .stage = &stage};
     if (found.maps && found.maps->find && options->points_only)
         found.maps = NULL;
-    if (found.maps && found.maps->find && !found.maps->panoramas)
+    if (found.maps)
+        rc = spl_maps_check(found.maps, err);
+    if (!rc && found.maps && found.maps->find && !found.maps->panoramas)
         rc = find_pictures(&p, &found, err);
     if (!rc)
         rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)

@@ -38,6 +38,7 @@ struct spl_prune_report {
     uint64_t dense;                    /* of those after: in nodes that keep more than twice 1 / factor */
     double slope;                      /* w that a splat saved costs, at the cut's edge; 0 = nothing was dropped */
     double lost;                       /* sum of w / leaf splats before, 0..1 */
+    double seconds;                    /* of spl_prune_apply() */
 };
 
 /* Sets leaf[node] of each node that stays and loses its children; `leaf` has room for info.nodes. The number of splats
@@ -45,5 +46,14 @@ struct spl_prune_report {
  * `dataset` keeps all its tables. SPL_E_USAGE, SPL_E_NOMEM, SPL_E_CANCELLED. */
 int spl_prune_plan(const struct spl_dataset *dataset, const struct spl_prune_options *options, bool *leaf,
                    struct spl_prune_report *report, struct spl_stage *stage, struct spl_error *err);
+
+/* What the radii of discs that are the finest from now on are multiplied by (spl_rewrite.leaf_radius): those of a level
+ * reach over each other as scanned points must, which lie at random, while clusters lie evenly. */
+float spl_prune_leaf_radius(const struct spl_dataset *dataset);
+
+/* Writes `output`, `dataset` without what is dropped where no maps show colours. `report` may be NULL. As
+ * spl_prune_plan() and spl_dataset_rewrite(). */
+int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char *output,
+                    struct spl_prune_report *report, struct spl_stage *stage, struct spl_error *err);
 
 #endif

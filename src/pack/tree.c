@@ -94,7 +94,7 @@ static int add_node(struct spl_tree *tree, size_t *capacity, const struct spl_tr
 
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err)
 {
-    size_t capacity = 0;
+    size_t capacity = 0, most = tree->for_pruning ? SPL_PRUNED_LEAF_POINTS : SPL_LEAF_POINTS;
     struct spl_tree_node root = {.end = points->count, .frame_size = points->cube_size};
     for (int c = 0; c < 3; c++)
         root.frame_low[c] = points->bounds_min[c];
@@ -103,7 +103,7 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
         struct spl_tree_node node = tree->nodes[i];
         unsigned shift = shrink_cube(&node, i ? &tree->nodes[node.parent] : NULL, points);
         size_t count = node.end - node.begin, at = node.begin;
-        if (count > SPL_LEAF_POINTS || (count > 1 && too_wide(&node, points))) {
+        if (count > most || (count > 1 && too_wide(&node, points))) {
             struct spl_tree_node child = {.parent = i, .depth = node.depth + 1, .frame_size = node.frame_size};
             for (int c = 0; c < 3; c++)
                 child.frame_low[c] = node.frame_low[c];

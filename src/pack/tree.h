@@ -4,7 +4,8 @@
 
 #include "pack/points.h"
 
-enum { SPL_LEAF_POINTS = 8192 };
+/* Most points of a leaf, and of one where nodes are what pruning chooses among: there are enough of them to choose. */
+enum { SPL_LEAF_POINTS = 8192, SPL_PRUNED_LEAF_POINTS = 512 };
 
 /* A splat of an inner node; position relative to the node's origin. */
 struct spl_inner_splat {
@@ -30,10 +31,11 @@ struct spl_tree_node {
 struct spl_tree {
     struct spl_tree_node *nodes; /* breadth first, siblings consecutive */
     uint32_t count, levels;
+    bool for_pruning; /* said before it is built: inner nodes are drawn for good, see levels.c */
 };
 
-/* Splits until no leaf has more than SPL_LEAF_POINTS points or is too wide for floats. `points` are sorted, with radii.
- */
+/* Splits until no leaf has more than SPL_LEAF_POINTS points, for pruning SPL_PRUNED_LEAF_POINTS, or is too wide for
+ * floats. `points` are sorted, with radii. */
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err);
 
 /* Fills the inner nodes, deepest first: clusters of their children's splats, at most about 28 % as many. */

@@ -10,8 +10,11 @@
 /* Plans what spl_maps_apply() will do. */
 void spl_maps_plan(struct spl_stage *stage, uint32_t pictures, uint64_t points);
 
+/* What is wrong with the folders of exported and edited maps, said before packing takes its time. */
+int spl_maps_check(const struct spl_map_options *options, struct spl_error *err);
+
 /* The pictures that `options` name, or `found` where that is not empty; none where they name none. Fills `list` on
- * success. Also says what is wrong with the folders of exported and edited maps, before anything is packed. */
+ * success. */
 int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
                   struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err);
 

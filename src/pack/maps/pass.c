@@ -3,12 +3,16 @@
  * after the other, from pictures that are read one at a time. Memory: 16 bytes a texel of one map, a picture, 36 bytes
  * a splat of one station. The caller's thread. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
 #include "dataset/rewrite.h"
+#include "geom/unit.h"
+#include "pack/maps/agree.h"
 #include "pack/maps/colors.h"
 #include "pack/maps/edit.h"
 #include "pack/maps/maps.h"
@@ -21,13 +25,15 @@
 static const double bytes_a_texel = 0.75;
 
 struct pass {
-    const struct spl_map_options *options;
+    const struct spl_pack_options *pack;
+    const struct spl_map_options *options; /* the pack's */
     const struct spl_view_list *views;
     struct spl_stage *stage;
     struct spl_map_report *report;
     struct spl_splats splats;
     struct spl_stations stations;
     double slack;             /* of all rows */
+    double metre;             /* metres a unit; 1 where nobody knows */
     uint32_t count;           /* of maps: */
     uint32_t *station_of;     /* by row */
     uint16_t *row_of;         /* by station: row + 1; 0 = it has no map */
@@ -208,8 +214,10 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
         struct spl_error why = {0};
         if (p->stations.of_view[v] != station || !p->views->views[v].photograph)
             continue;
-        rc = add_picture(p, atlas, station, &inverse, &p->views->views[v], &why);
-        rc = refuse(p, rc, &why, err);
+        if ((rc = add_picture(p, atlas, station, &inverse, &p->views->views[v], &why))) {
+            p->stations.of_view[v] = UINT32_MAX;
+            rc = refuse(p, rc, &why, err);
+        }
         spl_stage_add(p->stage, 1, 0);
         if (!rc)
             rc = spl_stage_check(p->stage, err);
@@ -218,6 +226,93 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
         rc = spl_atlas_fill(atlas, p->stage->threads, err);
     spl_inverse_ranges_finish(&inverse);
     spl_ranges_finish(&ranges);
+    return rc;
+}
+
+/* The station's first picture; NULL without. */
+static const struct spl_named_view *find_picture(const struct pass *p, uint32_t station)
+{
+    for (size_t v = 0; v < p->views->count; v++)
+        if (p->stations.of_view[v] == station && p->views->views[v].photograph)
+            return &p->views->views[v];
+    return NULL;
+}
+
+static void warn(const struct pass *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void warn(const struct pass *p, const char *format, ...)
+{
+    char text[1024];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    if (p->pack->warn)
+        p->pack->warn(p->pack->progress_context, text);
+}
+
+/* What pictures that do not fit their station are told, or warned of; 0, or below it where they are not to be used. */
+static int judge(struct pass *p, const char *name, const struct spl_agreement *a, struct spl_error *why)
+{
+    char cause[160] = "is its pose another's, or of another system of coordinates?";
+    double length = sqrt(a->shift[0] * a->shift[0] + a->shift[1] * a->shift[1] + a->shift[2] * a->shift[2]);
+    bool other = a->other > 0.5 && a->other > a->correlation + 0.25;
+    if (a->shared < SPL_AGREEMENT_LEAST || isnan(a->correlation))
+        return SPL_OK;
+    if (other)
+        snprintf(cause, sizeof cause, "%s%s%.0f degrees around the vertical it would be %.2f",
+                 a->mirrored ? "mirrored" : "", a->mirrored ? " and turned by " : "turned by ", a->turned, a->other);
+    if (a->correlation < 0.25 || other)
+        return spl_fail_field(why, SPL_E_INPUT, "panoramas",
+                              "%s: its colours are not those of the splats that it shows (correlation %.2f of %zu): %s",
+                              name, a->correlation, a->shared, cause);
+    if (a->correlation < 0.6) {
+        warn(p, "%s: its colours hardly are those of the splats that it shows (correlation %.2f of %zu)", name,
+             a->correlation, a->shared);
+        return SPL_OK;
+    }
+    if (length * p->metre > 0.007 && length > 4 * a->shift_error)
+        warn(p, "%s: its edges fit the splats' where it stands %.1f mm (+- %.1f) from where its pose says, towards %.4f, "
+                "%.4f, %.4f",
+             name, 1000 * length * p->metre, 2000 * a->shift_error * p->metre, a->shift[0], a->shift[1], a->shift[2]);
+    if (a->turn > 0.0015 && a->turn > 4 * a->turn_error)
+        warn(p, "%s: its edges fit the splats' where it is turned by %.2f degrees (+- %.2f)", name, a->turn * 180 / M_PI,
+             2 * a->turn_error * 180 / M_PI);
+    return SPL_OK;
+}
+
+/* Each station's pictures against its splats, at a side that is enough for it. */
+static int check_pictures(struct pass *p, struct spl_error *err)
+{
+    enum { side_enough = 512, samples_most = 300000 };
+    struct spl_samples samples;
+    int rc = spl_samples_init(&samples, &p->splats, &p->stations, samples_most, err);
+    if (rc)
+        return rc;
+    spl_stage_begin(p->stage, "checking maps", NULL, p->count);
+    for (uint32_t row = 0; !rc && row < p->count && samples.colored; row++) {
+        uint32_t station = p->station_of[row], side = p->rows[row].side;
+        const struct spl_named_view *picture = find_picture(p, station);
+        const struct spl_map_sight map = {&p->rows[row], p->codes[row]};
+        struct spl_atlas atlas = {0};
+        struct spl_agreement agreement;
+        struct spl_error why = {0};
+        if (!picture)
+            continue;
+        rc = make_colors(p, row, side < side_enough ? side : side_enough, &atlas, err);
+        if (!rc)
+            rc = spl_agreement_find(&agreement, &atlas, &p->stations.list[station], station, p->stations.scanned, &map,
+                                    &samples, err);
+        spl_atlas_finish(&atlas);
+        if (!rc && (rc = judge(p, picture->photograph, &agreement, &why))) {
+            for (size_t v = 0; v < p->views->count; v++)
+                if (p->stations.of_view[v] == station)
+                    p->stations.of_view[v] = UINT32_MAX;
+            rc = refuse(p, rc, &why, err);
+        }
+        spl_stage_add(p->stage, 1, 0);
+    }
+    spl_stage_end(p->stage);
+    spl_samples_finish(&samples);
     return rc;
 }
 
@@ -274,11 +369,19 @@ static int open_files(const struct spl_map_options *options, struct spl_map_edit
     return rc || !options->export_to ? rc : spl_map_export_init(out, options->export_to, err);
 }
 
-int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
-                  struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err)
+int spl_maps_check(const struct spl_map_options *options, struct spl_error *err)
 {
     struct spl_map_edits edits = {0};
     struct spl_map_export out = {0};
+    int rc = open_files(options, &edits, &out, err);
+    spl_map_export_finish(&out);
+    spl_map_edits_finish(&edits);
+    return rc;
+}
+
+int spl_maps_load(const struct spl_map_options *options, const struct spl_map_sources *found,
+                  struct spl_view_list *list, struct spl_map_report *report, struct spl_error *err)
+{
     struct loading loading = {options, report};
     const struct spl_map_picture_options how = {.paths = found->count ? (const char *const *)found->paths
                                                                       : &options->panoramas,
@@ -288,12 +391,6 @@ int spl_maps_load(const struct spl_map_options *options, const struct spl_map_so
                                                 .context = &loading};
     int rc = how.count ? spl_map_pictures_load(&how, list, err) : SPL_OK;
     report->pictures = (uint32_t)list->count;
-    if (!rc) /* said now, not when packing has taken its time */
-        rc = open_files(options, &edits, &out, err);
-    spl_map_export_finish(&out);
-    spl_map_edits_finish(&edits);
-    if (rc)
-        spl_view_list_finish(list);
     return rc;
 }
 
@@ -312,14 +409,16 @@ int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view
                    const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
                    struct spl_error *err)
 {
-    struct pass p = {.options = options->maps, .views = views, .stage = stage, .report = report};
+    struct pass p = {.pack = options, .options = options->maps, .views = views, .stage = stage, .report = report};
     uint64_t begin_ns = spl_now_ns();
     json_t *about = NULL;
+    if (!spl_unit_parse(spl_dataset_get_info(dataset)->unit, &p.metre) || !(p.metre > 0))
+        p.metre = 1;
     int rc = open_files(options->maps, &p.edits, &p.out, err);
     if (rc || (rc = spl_splats_init(&p.splats, dataset, err)) ||
         (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
         (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
-        (rc = prune(&p, dataset, options->prune, err)))
+        (rc = check_pictures(&p, err)) || (rc = prune(&p, dataset, options->prune, err)))
         goto done;
     about = json_pack("{s:i}", "pictures", (int)(report->pictures - report->refused));
     const struct spl_rewrite rewrite = {.from = dataset,
@@ -329,6 +428,7 @@ int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view
                                         .get_map = get_map,
                                         .context = &p,
                                         .leaf = p.leaf,
+                                        .leaf_radius = spl_prune_leaf_radius(dataset),
                                         .about_maps = about};
     spl_stage_begin(stage, "maps", NULL, p.count + views->count);
     rc = spl_dataset_rewrite(&rewrite, options->output, err);

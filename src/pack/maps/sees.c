@@ -1,7 +1,7 @@
 /* Which stations see a chunk, and whether its own trims it. A chunk's own station is that of most of its splats: the
  * first; the next three are those that see its splats best, by cosine over distance. It trims where a disc, drawn up to
- * twice as large as levels are scaled, reaches a place that is dropped; but not where that is the place of a splat that
- * another station saw: what stood there was gone when the own one looked.
+ * twice as large as levels are scaled, reaches a place that is dropped: splats of other stations among its own too, for at
+ * silhouettes most chunks have some, and fringes cost more than what is gone with them.
  *
  * Each chunk is one thread's, so threads change nothing. */
 #include "pack/maps/sees.h"
@@ -118,22 +118,14 @@ static bool reaches_through(const struct spl_map_sight *map, const struct spl_st
     return false;
 }
 
-static bool find_trims(const struct spl_station *station, uint32_t station_index, const struct spl_map_sight *map,
-                       const struct spl_world_splat *list, const uint16_t *of, uint32_t count)
+static bool find_trims(const struct spl_station *station, const struct spl_map_sight *map,
+                       const struct spl_world_splat *list, uint32_t count)
 {
-    uint32_t gone = 0;
+    double range;
     bool trims = false;
-    double range, own[3];
-    for (uint32_t i = 0; i < count; i++) {
-        double cosine = cosine_of(station, &list[i], &range);
-        if (!trims)
-            trims = reaches_through(map, station, &list[i], cosine);
-        if (of[i] == station_index)
-            continue;
-        spl_station_to_own(station, list[i].position, own);
-        gone += spl_map_drops(map, own, (double)list[i].splat.radius, cosine);
-    }
-    return trims && 20 * gone <= count;
+    for (uint32_t i = 0; !trims && i < count; i++)
+        trims = reaches_through(map, station, &list[i], cosine_of(station, &list[i], &range));
+    return trims;
 }
 
 /* Keeps the best, of equal ones the first. */
@@ -173,7 +165,7 @@ static void judge_chunk(const struct pass *p, uint32_t c)
         if (!row)
             continue;
         if (row == own) {
-            bool trims = find_trims(station, s, &p->maps[row - 1], list, of, count);
+            bool trims = find_trims(station, &p->maps[row - 1], list, count);
             out->seen_by[used++] = (uint16_t)(own | (trims ? SPL_STATION_TRIMS : 0));
         }
         cosine_of(station, &list[0], &range);

@@ -151,6 +151,10 @@ static void a_panorama_is_read_once_for_its_faces(void **state)
         spl_image_finish(&image);
         spl_image_finish(&alone);
     }
+    /* another section of the same file is another panorama */
+    struct spl_image image;
+    list.views[0].inner->at++;
+    assert_true(spl_photo_image_load_of(&whole, &list.views[0], &image, NULL) < 0);
     spl_photo_whole_finish(&whole);
     spl_view_list_finish(&list);
 }

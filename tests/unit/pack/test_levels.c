@@ -78,6 +78,14 @@ static const struct spl_inner_splat *of_group(const struct made *made, int group
     return NULL;
 }
 
+static double dot_of(const float a[3], const float b[3])
+{
+    double sum = 0;
+    for (int c = 0; c < 3; c++)
+        sum += (double)a[c] * (double)b[c];
+    return sum;
+}
+
 static void set_colors(struct made *made, int group, const uint32_t colors[parts])
 {
     for (int i = 0; i < parts; i++)
@@ -186,12 +194,63 @@ static void a_thin_wall_keeps_both_faces(void **state)
     done(&made);
 }
 
+/* A corner, then a step: two surfaces in one cell, which one splat stands for, or one each. */
+static void a_surface_is_a_splat_of_its_own_where_inner_nodes_are_drawn_for_good(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 4; kind++) {
+        struct made made = make();
+        bool for_pruning = kind % 2, step = kind / 2;
+        made.tree.for_pruning = for_pruning;
+        for (int i = 0; i < 2; i++) { /* as much of either */
+            made.points.normal[3 * parts + i][2] = step;
+            made.points.normal[3 * parts + i][0] = !step;
+            made.points.axis[2][3 * parts + i] += (step ? 0.4 : 0) * cell_size();
+            made.points.axis[2][7 * parts + i] += 0.1 * cell_size(); /* noise */
+        }
+        build(&made, groups + for_pruning);
+        const struct spl_inner_splat *one = of_group(&made, 3, 0);
+        const struct spl_inner_splat *other = for_pruning ? of_group(&made, 3, 1) : one;
+        if (step)
+            assert_float_equal(one->position[2] - other->position[2], for_pruning ? 0.4 * cell_size() : 0, 1e-4);
+        else
+            assert_float_equal(dot_of(one->normal, other->normal), !for_pruning, 1e-4);
+        assert_float_equal(of_group(&made, 7, 0)->position[2], 0.55 * cell_size(), 1e-4);
+        done(&made);
+    }
+}
+
+/* In every direction at one place: however large a cell is, they are no single surface. */
+static void what_faces_everywhere_comes_to_an_end(void **state)
+{
+    (void)state;
+    struct made made = make();
+    uint64_t random = 5;
+    made.tree.for_pruning = true;
+    for (int i = 0; i < count; i++) {
+        double normal[3], length = 0;
+        for (int c = 0; c < 3; c++) {
+            normal[c] = uniform(&random) - 0.5;
+            length += normal[c] * normal[c];
+            made.points.axis[c][i] = 0.5 + 1e-3 * uniform(&random);
+        }
+        for (int c = 0; c < 3; c++)
+            made.points.normal[i][c] = (float)(normal[c] / sqrt(length));
+    }
+    struct spl_stage stage = quiet_stage(1);
+    assert_int_equal(spl_levels_build(&made.tree, &made.points, &stage, NULL), 0);
+    assert_true(made.tree.nodes[0].splat_count >= 1 && made.tree.nodes[0].splat_count <= count * 28 / 100);
+    done(&made);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(colours_are_rounded_means),    cmocka_unit_test(most_parts_give_class_and_linear),
         cmocka_unit_test(scalars_are_means_or_votes),   cmocka_unit_test(radii_hold_the_parts),
         cmocka_unit_test(a_thin_wall_keeps_both_faces),
+        cmocka_unit_test(a_surface_is_a_splat_of_its_own_where_inner_nodes_are_drawn_for_good),
+        cmocka_unit_test(what_faces_everywhere_comes_to_an_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

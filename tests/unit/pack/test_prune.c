@@ -23,7 +23,7 @@
 enum { places = 4, each = 40000, side = 200, wire_points = 1500 };
 enum place { GREY, COLOURED, FOLIAGE, WIRES };
 
-static char folder[256];
+static char folder[256], scan[300];
 static struct spl_dataset *scene;
 static uint64_t node_count;
 static const struct spl_node *nodes;
@@ -33,8 +33,10 @@ static void write_point(FILE *f, double x, double y, double z, unsigned char gre
 {
     double at[3] = {x, y, z};
     unsigned char color[3] = {grey, grey, grey};
+    float intensity = (float)x;
     fwrite(at, sizeof at, 1, f);
     fwrite(color, sizeof color, 1, f);
+    fwrite(&intensity, sizeof intensity, 1, f);
 }
 
 static void write_scene(const char *path)
@@ -44,7 +46,8 @@ static void write_scene(const char *path)
     assert_non_null(f);
     fprintf(f,
             "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double x\nproperty double y\n"
-            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+            "property float intensity\nend_header\n",
             3 * each + 3 * wire_points);
     for (int i = 0; i < each; i++) {
         double x = 10.0 * (i % side) / side, z = 10.0 * (i / side) / side, noise = 0.004 * (uniform(&random) - 0.5);
@@ -58,28 +61,32 @@ static void write_scene(const char *path)
     assert_int_equal(fclose(f), 0);
 }
 
+static struct spl_pack_options pack_options(const char *output)
+{
+    static const char *input = scan;
+    struct spl_pack_options options;
+    spl_pack_options_init(&options);
+    options.inputs = &input;
+    options.input_count = 1;
+    options.output = output;
+    return options;
+}
+
 static int set_up(void **state)
 {
-    char scan[300], packed[300];
-    const char *input = scan;
+    char packed[300];
     struct spl_error err = {0};
-    struct spl_pack_options options;
     (void)state;
     make_folder(folder);
     snprintf(scan, sizeof scan, "%s/scene.ply", folder);
     snprintf(packed, sizeof packed, "%s/scene.spld", folder);
     write_scene(scan);
-    spl_pack_options_init(&options);
-    options.inputs = &input;
-    options.input_count = 1;
-    options.output = packed;
+    const struct spl_pack_options options = pack_options(packed);
     if (spl_pack(&options, NULL, &err) || spl_dataset_open_whole(packed, true, &scene, &err)) {
         fprintf(stderr, "%s\n", err.message);
         return 1;
     }
-    unlink(scan);
     unlink(packed);
-    rmdir(folder);
     uint64_t chunk_count;
     nodes = spl_dataset_get_nodes(scene, &node_count);
     chunks = spl_dataset_get_chunks(scene, &chunk_count);
@@ -89,8 +96,10 @@ static int set_up(void **state)
 static int tear_down(void **state)
 {
     (void)state;
+    unlink(scan);
+    rmdir(folder); /* tests have left nothing there */
     spl_dataset_close(scene);
-    return 0;
+    return access(folder, F_OK) == 0;
 }
 
 static bool is_discs(uint64_t chunk)
@@ -376,6 +385,95 @@ static void what_cannot_be_is_refused(void **state)
     free(leaf);
 }
 
+static void count_warning(void *context, const char *text)
+{
+    assert_non_null(strstr(text, "--panoramas"));
+    ++*(int *)context;
+}
+
+/* The packed file: what it says of itself, wires, a scalar, radii; the same with any number of threads. */
+static void a_packed_file_is_pruned(void **state)
+{
+    (void)state;
+    uint64_t versions[2];
+    for (unsigned run = 0; run < 2; run++) {
+        char packed[300];
+        int warnings = 0;
+        struct spl_error err = {0};
+        struct spl_dataset *dataset;
+        struct spl_pack_report report;
+        snprintf(packed, sizeof packed, "%s/pruned.spld", folder);
+        struct spl_pack_options options = pack_options(packed);
+        options.prune = 8;
+        options.threads = 1 + 2 * run;
+        options.warn = count_warning;
+        options.progress_context = &warnings;
+        if (spl_pack(&options, &report, &err) || spl_dataset_open_whole(packed, true, &dataset, &err))
+            fail_msg("%s", err.message);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset), *all = spl_dataset_get_info(scene);
+        const json_t *pruned = json_object_get(spl_dataset_get_meta(dataset), "pruned");
+        assert_int_equal(warnings, 1);
+        assert_int_equal(json_integer_value(json_object_get(pruned, "of")), all->leaf_splats);
+        assert_int_equal(report.pruned_of, all->leaf_splats);
+        assert_true(info->leaf_splats == report.leaf_splats && info->splats == report.splats);
+        assert_true(info->nodes == report.nodes && info->chunks == report.chunks && info->points == all->points);
+        assert_in_range(info->leaf_splats, all->leaf_splats / 10, all->leaf_splats / 6);
+        assert_true(info->pieces > 0 && info->stream_count == all->stream_count);
+
+        uint64_t count, chunk_count, coarse = 0;
+        const struct spl_node *own = spl_dataset_get_nodes(dataset, &count);
+        const struct spl_chunk *list = spl_dataset_get_chunks(dataset, &chunk_count);
+        int intensity = spl_dataset_find_stream(dataset, "intensity");
+        for (uint64_t n = 0; n < count; n++) {
+            for (uint64_t c = own[n].first_chunk; c < own[n].first_chunk + own[n].chunk_count; c++) {
+                double sum = 0, value, x = 0;
+                for (uint32_t i = 0; i < list[c].count; i++) {
+                    struct spl_splat splat;
+                    size_t bytes;
+                    spl_chunk_decode(&list[c], spl_dataset_get_page(dataset, own[n].page, &bytes), i, &splat);
+                    sum += (double)splat.radius / list[c].count;
+                    x = own[n].origin[0] + (double)splat.position[0];
+                }
+                if (spl_chunk_kind(&list[c]) != SPL_CHUNK_DISCS)
+                    continue;
+                double share = sum / (double)list[c].radius_mean;
+                bool smaller = fabs(share - 0.7) < 0.03;
+                assert_true(smaller || fabs(share - 1) < 0.05);
+                coarse += smaller;
+                assert_false(smaller && own[n].child_count);
+                assert_true(spl_dataset_find_value(dataset, intensity, list[c].first_id + list[c].count - 1, &value));
+                assert_true(fabs(value - x) < 5); /* a mean around it */
+            }
+        }
+        assert_true(coarse > chunk_count / 4);
+        versions[run] = info->version;
+        spl_dataset_close(dataset);
+        assert_int_equal(unlink(packed), 0);
+    }
+    assert_true(versions[0] == versions[1]);
+}
+
+static void a_pack_that_cannot_be_pruned_is_refused(void **state)
+{
+    (void)state;
+    const double factors[] = {0.5, -1, NAN, INFINITY, SPL_PRUNE_FACTOR_MAX + 1};
+    char packed[300];
+    struct spl_error err = {0};
+    snprintf(packed, sizeof packed, "%s/none.spld", folder);
+    struct spl_pack_options options = pack_options(packed);
+    for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) {
+        err = (struct spl_error){0};
+        options.prune = factors[i];
+        assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_USAGE);
+        assert_string_equal(err.field, "prune");
+    }
+    options.prune = 10;
+    options.points_only = true;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "points-only");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -388,6 +486,8 @@ int main(void)
         cmocka_unit_test(what_no_map_shows_keeps_its_colours),
         cmocka_unit_test(no_whole_level_is_better),
         cmocka_unit_test(what_cannot_be_is_refused),
+        cmocka_unit_test(a_packed_file_is_pruned),
+        cmocka_unit_test(a_pack_that_cannot_be_pruned_is_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
