@@ -27,7 +27,7 @@ def at(rows, place):
 def test_a_dataset_says_what_maps_it_has():
     with Daemon(FAKE, datasets=[MAPPED, WALL]) as d:
         maps = d.ask(f"/v1/datasets/{NAME}").json()["maps"]
-        assert maps["stations"] == 1 and maps["texels"] == 6 * 512 * 512 and maps["methods"] == ["splat", "nearest"], maps
+        assert maps["stations"] == 1 and maps["texels"] == 6 * 256 * 256 and maps["methods"] == ["splat", "nearest"], maps
         assert maps["bytes"] / maps["texels"] < 3, maps  # ranges as many as colours: 2 bytes a texel and 0.68
         assert d.ask("/v1/datasets/wall").json()["maps"] is None
         table = {p["name"]: p for p in d.ask("/v1/methods").json()["parameters"]}
