@@ -24,7 +24,7 @@ uint32_t spl_colors_find_side(const struct spl_stations *stations, const struct 
 }
 
 void spl_colors_add_hits(struct spl_atlas *atlas, struct spl_hits *hits, const struct spl_inverse_ranges *inverse,
-                         unsigned threads)
+                         const float factors[3], unsigned threads)
 {
     spl_hits_place(hits, atlas->side, SPL_MAP_APRON, threads);
     for (size_t i = 0; i < hits->count; i++) {
@@ -34,7 +34,7 @@ void spl_colors_add_hits(struct spl_atlas *atlas, struct spl_hits *hits, const s
             continue; /* behind what the texel shows */
         float *texel = atlas->texels[hits->texel[i]];
         for (int c = 0; c < 3; c++)
-            texel[c] += splat_weight * spl_linear_of_srgb(hit->color[c]);
+            texel[c] += splat_weight * spl_linear_of_srgb(hit->color[c]) / factors[c];
         texel[3] += splat_weight;
     }
 }
