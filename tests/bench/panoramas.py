@@ -23,7 +23,7 @@ import tempfile
 
 SPLATD = os.environ.get("SPLATD_BINARY", "splatd")
 # name, options of pack: PICTURES stands for where panoramas lie
-PACKED = (("no maps", []), ("panoramas", ["--panoramas", "PICTURES"]),
+PACKED = (("no maps", ["--no-panoramas"]), ("panoramas", ["--panoramas", "PICTURES"]),
           ("panoramas, 1/10", ["--panoramas", "PICTURES", "--prune", "10"]),
           ("panoramas, 1/100", ["--panoramas", "PICTURES", "--prune", "100"]))
 SHOWN = ("wall", "plaque")  # views whose figures stand beside those of all

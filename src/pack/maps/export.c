@@ -132,11 +132,11 @@ int spl_map_export_add(struct spl_map_export *out, const struct spl_map_row *row
 int spl_map_export_commit(struct spl_map_export *out, struct spl_error *err)
 {
     static const char layout[] =
-        "NAME.color.png is 6 side x side: bottom cap, top cap, band (4 side wide). A cap's texel at (x, y) in shares of "
-        "its side, u = x - 0.5, v = y - 0.5, r = |(u, v)|, has direction (u / r sin(pi r / 2), v / r sin(pi r / 2), -+ "
-        "cos(pi r / 2)); the band's has azimuth 2 pi x / (4 side) and elevation (y - 0.5) pi / 2. p = rotation * range * "
-        "d + position. NAME.range.png: code 0 not scanned, 65535 nothing came back, else range = near / (1 - (code - 1) "
-        "/ 65533)";
+        "NAME.color.png is 6 side x side: bottom cap, top cap, band (4 side wide). (x, y) in shares of a chart, from its "
+        "upper left corner: a cap's u = x - 0.5, v = y - 0.5 (of the bottom cap 0.5 - y), r = |(u, v)| has direction d = "
+        "(u / r sin(pi r / 2), v / r sin(pi r / 2), cos(pi r / 2)), of the bottom cap -cos; the band's has azimuth 2 pi "
+        "(1 - x) and elevation (0.5 - y) pi / 2. p = rotation * range * d + position. NAME.range.png: code 0 not "
+        "scanned, 65535 nothing came back, else range = near / (1 - (code - 1) / 65533)";
     json_t *document = json_pack("{s:s, s:O}", "layout", layout, "maps", out->list);
     char *text = document ? json_dumps(document, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
     char *path = join(out->folder, list_name, err);

@@ -1,8 +1,9 @@
 /* Maps as pictures that people edit: a folder with NAME.color.png and NAME.range.png of each station, and maps.json.
  *
- * A picture is a map's atlas without aprons, 6 side x side: bottom cap, top cap, band. Colours are sRGB; ranges are the
- * codes of the map (shaders/shared.h) as 16 bit grey: 0 not scanned, 65535 nothing came back. Ranges are for looking at:
- * what is taken back is colours alone. */
+ * A picture is a map's atlas without aprons, 6 side x side: bottom cap, top cap, band, each turned so that it looks as it
+ * did from the station: the band upright (in the atlas it stands on its head), the ground not mirrored. Colours are
+ * sRGB; ranges are the codes of the map (shaders/shared.h) as 16 bit grey: 0 not scanned, 65535 nothing came back.
+ * Ranges are for looking at: what is taken back is colours alone. */
 #ifndef SPL_PACK_MAPS_EXPORT_H
 #define SPL_PACK_MAPS_EXPORT_H
 
@@ -17,8 +18,8 @@
 static inline void spl_map_picture_texel(uint32_t side, uint32_t apron, uint32_t x, uint32_t y, uint32_t at[2])
 {
     uint32_t chart = x / side < 2 ? x / side : 2;
-    at[0] = x + (2 * chart + 1) * apron;
-    at[1] = y + apron;
+    at[0] = (chart == 2 ? 8 * side - 1 - x : x) + (2 * chart + 1) * apron;
+    at[1] = (chart == 1 ? y : side - 1 - y) + apron;
 }
 
 /* A color image of 6 side x side, without pixels' values. The caller's; SPL_E_NOMEM. */

@@ -92,7 +92,7 @@ static void an_edited_texel_reaches_its_repeats(void **state)
             double d[3], place[2];
             spl_polar_direction(side, SPL_MAP_APRON, (double[2]){x + 0.5, y + 0.5}, d);
             spl_polar_place(side, SPL_MAP_APRON, d, place);
-            bool wanted = (uint32_t)place[0] == 2 * side + 5 * SPL_MAP_APRON;
+            bool wanted = (uint32_t)place[0] == 6 * side - 1 + 5 * SPL_MAP_APRON; /* the last one of the atlas */
             red += wanted;
             if (wanted)
                 assert_true(atlas.texels[t][0] == 1 && atlas.texels[t][1] == 0);
@@ -203,6 +203,31 @@ static void what_a_scan_brings_along_is_found(void **state)
     assert_int_equal(report.maps.stations, 1);
     assert_int_equal(report.maps.pictures, 6);
     assert_colored("found.spld", (const int[3]){40, 80, 200});
+}
+
+/* An image whose header is whole and whose pixels are cut off: what is found is warned of, what is named fails. */
+static void what_is_found_fails_nothing(void **state)
+{
+    struct spl_map_options maps = {.size = sizeof maps, .find = true};
+    struct spl_pack_report report;
+    struct spl_error err = {0};
+    struct stat status;
+    char list[256];
+    (void)state;
+    assert_int_equal(stat(at("panoramas/a.png"), &status), 0);
+    assert_int_equal(truncate(at("panoramas/a.png"), status.st_size - 40), 0);
+    if (pack("cut.spld", &maps, &report, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(report.maps.stations, 1); /* of the splats' own colours */
+    assert_colored("cut.spld", (const int[3]){128, 128, 128});
+    assert_non_null(strstr(warning, "a.png"));
+    snprintf(list, sizeof list, "%s", at("panoramas"));
+    maps = (struct spl_map_options){.size = sizeof maps, .panoramas = list};
+    unlink(at("cut.spld"));
+    assert_true(pack("cut.spld", &maps, &report, &err) < 0);
+    assert_non_null(strstr(err.message, "a.png"));
+    assert_int_equal(access(at("cut.spld"), F_OK), -1);
+    write_panorama("panoramas/a.png", (uint8_t[4]){40, 80, 200, 255});
 }
 
 static void edits_survive_packing(void **state)
@@ -390,6 +415,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_edited_texel_reaches_its_repeats),
         cmocka_unit_test(what_a_scan_brings_along_is_found),
+        cmocka_unit_test(what_is_found_fails_nothing),
         cmocka_unit_test(edits_survive_packing),
         cmocka_unit_test(panoramas_lie_where_they_look),
     };

@@ -109,18 +109,42 @@ static void what_is_exported_comes_back(void **state)
     spl_image_finish(&back);
 }
 
-static void texels_lie_in_their_charts(void **state)
+/* By the formulas that maps.json says. */
+static void direction_of(double x, double y, double d[3])
 {
-    double a[3], b[3];
+    int chart = x < side ? 0 : x < 2 * side ? 1 : 2;
+    if (chart == 2) {
+        double turn = 2 * M_PI * (1 - (x - 2 * side) / (4 * side)), rise = (0.5 - y / side) * M_PI / 2;
+        d[0] = cos(rise) * cos(turn);
+        d[1] = cos(rise) * sin(turn);
+        d[2] = sin(rise);
+        return;
+    }
+    double u = (x - chart * side) / side - 0.5, v = chart ? y / side - 0.5 : 0.5 - y / side, r = hypot(u, v);
+    d[0] = u / r * sin(M_PI * r / 2);
+    d[1] = v / r * sin(M_PI * r / 2);
+    d[2] = (chart ? 1 : -1) * cos(M_PI * r / 2);
+}
+
+static void texels_look_as_they_did_from_the_station(void **state)
+{
     (void)state;
     for (uint32_t y = 0; y < side; y += 7)
         for (uint32_t x = 0; x < 6 * side; x += 5) {
-            uint32_t at[2];
-            spl_map_picture_texel(side, SPL_MAP_APRON, x, y, at);
-            spl_polar_direction(side, 0, (double[2]){x + 0.5, y + 0.5}, a);
-            spl_polar_direction(side, SPL_MAP_APRON, (double[2]){at[0] + 0.5, at[1] + 0.5}, b);
-            for (int k = 0; k < 3; k++)
+            uint32_t there[2];
+            double a[3], b[3], right[3], down[3], turned = 0;
+            spl_map_picture_texel(side, SPL_MAP_APRON, x, y, there);
+            direction_of(x + 0.5, y + 0.5, a);
+            spl_polar_direction(side, SPL_MAP_APRON, (double[2]){there[0] + 0.5, there[1] + 0.5}, b);
+            direction_of(x + 0.51, y + 0.5, right);
+            direction_of(x + 0.5, y + 0.51, down);
+            for (int k = 0; k < 3; k++) { /* to the right, down and ahead are right-handed: letters can be read */
+                int i = (k + 1) % 3, j = (k + 2) % 3;
+                turned += a[k] * ((right[i] - a[i]) * (down[j] - a[j]) - (right[j] - a[j]) * (down[i] - a[i]));
                 assert_true(fabs(a[k] - b[k]) < 1e-12);
+            }
+            assert_true(turned > 0);
+            assert_true(x < 2 * side || down[2] < a[2]); /* the band stands upright */
         }
 }
 
@@ -285,7 +309,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(what_is_exported_comes_back, clean),
-        cmocka_unit_test_setup(texels_lie_in_their_charts, clean),
+        cmocka_unit_test_setup(texels_look_as_they_did_from_the_station, clean),
         cmocka_unit_test_setup(edits_that_do_not_fit_are_refused, clean),
         cmocka_unit_test_setup(nothing_is_overwritten_and_nothing_is_left, clean),
     };
