@@ -615,7 +615,9 @@ static void a_pruned_room_has_the_same_map(void **state)
         const struct spl_map_row *row = spl_dataset_get_maps(dataset, &count);
         const struct spl_map_row *other = spl_dataset_get_maps(whole, &other_count);
         if (with)
-            assert_memory_equal(row, other, sizeof *row);
+            assert_true(row->side == other->side && row->range_side == other->range_side &&
+                        !memcmp(row->position, other->position, sizeof row->position) &&
+                        fabsf(row->near / other->near - 1) < 0.1f);
         spl_dataset_close(dataset);
         spl_dataset_close(whole);
     }
