@@ -18,7 +18,7 @@ uint32_t spl_colors_find_side(const struct spl_stations *stations, const struct 
 {
     double finest = 0;
     for (size_t v = 0; v < views->count; v++)
-        if (stations->of_view[v] == station)
+        if (stations->of_view[v] == station && views->views[v].photograph)
             finest = fmax(finest, fmax(views->views[v].camera.fx, views->views[v].camera.fy));
     if (!(finest > 0))
         return 0;
