@@ -264,7 +264,7 @@ static const struct spl_cmd_option options[] = {
      "poses of photographs: COLMAP's folder, transforms.json, Open3D's trajectory, a folder of poses, an "
      "E57 file with images (the scan itself), or a list of views; in the scan's coordinates",
      SPL_CMD_TEXT(struct arguments, photos.cameras)},
-    {"images", "DIR", "where the photographs lie", .otherwise = "where MODEL says",
+    {"images", "DIR", "where the photographs lie", .otherwise = "where MODEL or PATH says",
      SPL_CMD_TEXT(struct arguments, photos.images)},
     {"textures", "HOW",
      "adaptive: as much as the photographs show; none: colours alone; D8W4, D12W4, D16W8: a fixed dictionary of 2^8, "
@@ -311,7 +311,9 @@ static const struct spl_cmd_table table = {
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
         "                   [--max-points N] [--threads N]\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
-        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n\n"
+        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n"
+        "                   [--panoramas PATH [--images DIR] [--keep-going] | --no-panoramas] [--prune N]\n"
+        "                   [--export-maps DIR] [--maps DIR]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
         "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are "
         "kept once.\n"
@@ -329,6 +331,12 @@ static const struct spl_cmd_table table = {
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"
         "  splatd pack surfels.ply --cameras sparse/0 --images images -o castle.spld\n"
+        "A tenth of the splats, under maps of what each station saw, from the panoramas beside the scan:\n"
+        "  splatd synth courtyard --panoramas 2048 --points 1e6 -o yard\n"
+        "  splatd pack yard/courtyard.ptx --prune 10 -o yard.spld\n"
+        "Those maps as pictures, and back after they were edited:\n"
+        "  splatd pack yard/courtyard.ptx --export-maps maps -o yard.spld\n"
+        "  splatd pack yard/courtyard.ptx --maps maps -o yard.spld\n"
         "Points as they are, several times faster, for the methods that need no normals and radii:\n"
         "  splatd pack street.las --points-only -o street.spld\n"
         "A first look at a large scan, a second or two where it is COPC:\n"
@@ -345,7 +353,10 @@ static const char *find_contradiction(const struct arguments *a)
 {
     const struct spl_pack_options *o = &a->pack;
     const struct spl_photo_options *photos = &a->photos;
-    if (!photos->cameras && (photos->images || a->keep_going || photos->memory_bytes || photos->device ||
+    bool poses = photos->cameras || (a->wants_maps && a->maps.panoramas);
+    if (!poses && (photos->images || a->keep_going))
+        return "photographs need their poses: --cameras MODEL, or --panoramas PATH";
+    if (!photos->cameras && (photos->memory_bytes || photos->device ||
                              photos->keep_textures || a->quality || a->textures >= 0))
         return "photographs need their poses: --cameras MODEL";
     if (photos->keep_textures && a->textures == SPL_TEXTURES_NONE)
@@ -405,6 +416,7 @@ int spl_cmd_pack(int argc, char **argv)
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
     a.maps.refused = a.keep_going ? name_refused : NULL;
     a.maps.context = &listener;
+    a.maps.images = a.photos.cameras ? NULL : a.photos.images; /* a second list's photographs lie where that says */
     a.maps.find = !a.wants_maps;
     a.pack.maps = a.no_panoramas || (a.maps.find && (a.pack.photos || a.pack.points_only)) ? NULL : &a.maps;
     catch_signals(a.pack.output);

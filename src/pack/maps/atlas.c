@@ -48,6 +48,13 @@ static void add_bilinear(const struct spl_atlas *atlas, const double place[2], f
                            (t[atlas->width][c] * (1 - u) + t[atlas->width + 1][c] * u) * v);
 }
 
+void spl_atlas_scale(struct spl_atlas *atlas, const float factors[3])
+{
+    for (size_t i = 0; i < (size_t)atlas->width * atlas->height; i++)
+        for (int c = 0; c < 3; c++)
+            atlas->texels[i][c] *= factors[c];
+}
+
 struct job {
     const struct spl_atlas *from;
     struct spl_atlas *to;

@@ -19,6 +19,9 @@ void spl_atlas_finish(struct spl_atlas *atlas);
  * An atlas that is empty becomes grey. Parallel. */
 int spl_atlas_fill(struct spl_atlas *atlas, unsigned threads, struct spl_error *err);
 
+/* Multiplies the colours. */
+void spl_atlas_scale(struct spl_atlas *atlas, const float factors[3]);
+
 /* Half the side: `half` becomes means by area, its aprons what lies there on the sphere. The caller's to finish. */
 int spl_atlas_halve(const struct spl_atlas *atlas, unsigned threads, struct spl_atlas *half, struct spl_error *err);
 

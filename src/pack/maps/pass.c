@@ -15,6 +15,7 @@
 #include "pack/maps/agree.h"
 #include "pack/maps/colors.h"
 #include "pack/maps/edit.h"
+#include "pack/maps/even.h"
 #include "pack/maps/maps.h"
 #include "pack/maps/pictures.h"
 #include "pack/maps/sees.h"
@@ -41,9 +42,9 @@ struct pass {
     uint32_t **codes;         /* by row: the words of its ranges */
     struct spl_chunk_stations *chunks;
     float *seen;     /* by chunk: what share of it some map shows */
+    float (*factors)[3]; /* by row: of colours in linear light, which even exposures out */
     bool *leaf;      /* by node: as of struct spl_rewrite; NULL = nothing is pruned */
     uint32_t *words; /* of the map that is written */
-    struct spl_photo_whole whole;
     struct spl_map_edits edits;
     struct spl_map_export out;
     double errors;   /* of blocks, squared, summed over channels; of so many texels */
@@ -168,6 +169,13 @@ static int refuse(struct pass *p, int rc, const struct spl_error *why, struct sp
     return SPL_OK;
 }
 
+/* A panorama's faces are views; the first of them stands for all. */
+static bool is_same_panorama(const struct spl_named_view *a, const struct spl_named_view *b)
+{
+    return a && a->inner && a->inner->is_panorama && b->inner && b->inner->is_panorama &&
+           a->inner->at == b->inner->at && !strcmp(a->inner->path, b->inner->path) && a->panorama == b->panorama;
+}
+
 static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station,
                        const struct spl_inverse_ranges *inverse, const struct spl_named_view *view,
                        struct spl_error *err)
@@ -175,10 +183,11 @@ static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station
     struct spl_image image = {0};
     struct spl_image_info info;
     struct spl_pyramid pixels;
+    bool panorama = view->inner && view->inner->is_panorama;
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc)
-        rc = spl_photo_image_load_of(&p->whole, view, &image, err);
-    if (!rc && (image.width != view->camera.width || image.height != view->camera.height)) {
+        rc = panorama ? spl_photo_image_load_whole(view, &image, err) : spl_photo_image_load(view, &image, err);
+    if (!rc && !panorama && (image.width != view->camera.width || image.height != view->camera.height)) {
         rc = spl_fail_field(err, SPL_E_INPUT, "width", "%s: %u x %u pixels; its camera says %u x %u", view->photograph,
                             image.width, image.height, view->camera.width, view->camera.height);
         spl_image_finish(&image);
@@ -193,8 +202,10 @@ static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station
 /* The colours of a row's station at `side`, without holes. */
 static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_atlas *atlas, struct spl_error *err)
 {
+    static const float even[3] = {1, 1, 1};
     uint32_t station = p->station_of[row];
     struct spl_ranges ranges = {.side = p->rows[row].range_side};
+    const struct spl_named_view *last = NULL;
     struct spl_inverse_ranges inverse = {0};
     struct spl_hits hits = {0};
     size_t texels = 2 * spl_map_range_words(&p->rows[row]);
@@ -208,14 +219,21 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
     if (!rc)
         rc = spl_hits_init(&hits, &p->splats, &p->stations, station, p->stage->threads, err);
     if (!rc)
-        spl_colors_add_hits(atlas, &hits, &inverse, p->stage->threads);
+        spl_colors_add_hits(atlas, &hits, &inverse, p->factors ? p->factors[row] : even, p->stage->threads);
     spl_hits_finish(&hits);
     for (size_t v = 0; v < p->views->count && !rc; v++) {
         struct spl_error why = {0};
         if (p->stations.of_view[v] != station || !p->views->views[v].photograph)
             continue;
-        if ((rc = add_picture(p, atlas, station, &inverse, &p->views->views[v], &why))) {
-            p->stations.of_view[v] = UINT32_MAX;
+        if (is_same_panorama(last, &p->views->views[v])) {
+            spl_stage_add(p->stage, 1, 0);
+            continue;
+        }
+        last = &p->views->views[v];
+        if ((rc = add_picture(p, atlas, station, &inverse, last, &why))) {
+            for (size_t face = v; face < p->views->count; face++)
+                if (face == v || is_same_panorama(last, &p->views->views[face]))
+                    p->stations.of_view[face] = UINT32_MAX;
             rc = refuse(p, rc, &why, err);
         }
         spl_stage_add(p->stage, 1, 0);
@@ -283,35 +301,44 @@ static int judge(struct pass *p, const char *name, const struct spl_agreement *a
 /* Each station's pictures against its splats, at a side that is enough for it. */
 static int check_pictures(struct pass *p, struct spl_error *err)
 {
-    enum { side_enough = 512, samples_most = 300000 };
-    struct spl_samples samples;
+    enum { side_enough = 512, samples_most = 300000, compared_most = 40000 };
+    struct spl_samples samples, compared = {0};
+    struct spl_sightings sightings = {0};
     int rc = spl_samples_init(&samples, &p->splats, &p->stations, samples_most, err);
-    if (rc)
-        return rc;
+    if (!rc)
+        rc = spl_samples_init(&compared, &p->splats, &p->stations, compared_most, err);
     spl_stage_begin(p->stage, "checking maps", NULL, p->count);
-    for (uint32_t row = 0; !rc && row < p->count && samples.colored; row++) {
+    for (uint32_t row = 0; !rc && row < p->count; row++) {
         uint32_t station = p->station_of[row], side = p->rows[row].side;
         const struct spl_named_view *picture = find_picture(p, station);
         const struct spl_map_sight map = {&p->rows[row], p->codes[row]};
         struct spl_atlas atlas = {0};
-        struct spl_agreement agreement;
+        struct spl_agreement agreement = {0};
         struct spl_error why = {0};
         if (!picture)
             continue;
         rc = make_colors(p, row, side < side_enough ? side : side_enough, &atlas, err);
-        if (!rc)
+        if (!rc && samples.colored)
             rc = spl_agreement_find(&agreement, &atlas, &p->stations.list[station], station, p->stations.scanned, &map,
                                     &samples, err);
+        int fault = rc ? SPL_OK : judge(p, picture->photograph, &agreement, &why);
+        if (!rc && !fault)
+            rc = spl_sightings_add(&sightings, &atlas, (uint16_t)row, &p->stations.list[station], &map, &compared, err);
         spl_atlas_finish(&atlas);
-        if (!rc && (rc = judge(p, picture->photograph, &agreement, &why))) {
-            for (size_t v = 0; v < p->views->count; v++)
-                if (p->stations.of_view[v] == station)
-                    p->stations.of_view[v] = UINT32_MAX;
-            rc = refuse(p, rc, &why, err);
-        }
+        for (size_t v = 0; fault && v < p->views->count; v++)
+            if (p->stations.of_view[v] == station)
+                p->stations.of_view[v] = UINT32_MAX;
+        if (fault)
+            rc = refuse(p, fault, &why, err);
         spl_stage_add(p->stage, 1, 0);
     }
     spl_stage_end(p->stage);
+    if (!rc && (p->factors = spl_alloc(p->count, sizeof *p->factors, err)))
+        rc = spl_sightings_even_out(&sightings, &compared, p->count, p->factors, err);
+    else if (!rc)
+        rc = SPL_E_NOMEM;
+    spl_sightings_finish(&sightings);
+    spl_samples_finish(&compared);
     spl_samples_finish(&samples);
     return rc;
 }
@@ -325,6 +352,8 @@ static int get_map(void *context, uint32_t index, const uint32_t **words, struct
     free(p->words);
     p->words = spl_alloc_raw(spl_map_words(row), sizeof *p->words, err);
     int rc = p->words ? make_colors(p, index, row->side, &atlas, err) : SPL_E_NOMEM;
+    if (!rc)
+        spl_atlas_scale(&atlas, p->factors[index]);
     if (!rc)
         memcpy(p->words, p->codes[index], spl_map_range_words(row) * sizeof *p->words);
     if (!rc)
@@ -453,9 +482,9 @@ done:
     free(p.row_of);
     free(p.chunks);
     free(p.seen);
+    free(p.factors);
     free(p.leaf);
     free(p.words);
-    spl_photo_whole_finish(&p.whole);
     spl_map_export_finish(&p.out);
     spl_map_edits_finish(&p.edits);
     spl_stations_finish(&p.stations);

@@ -11,10 +11,12 @@
 
 #include <splatd/pack.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 #include "dataset/dataset.h"
+#include "pack/maps/agree.h"
 #include "pack/maps/atlas.h"
 #include "pack/maps/blocks.h"
+#include "pack/maps/even.h"
 #include "pack/maps/ranges.h"
 #include "pack/maps/sees.h"
 #include "support/make_dataset.h"
@@ -267,6 +269,159 @@ static void few_hits_make_a_map_all_the_same(void **state)
     }
 }
 
+/* ---- agreement ---- */
+
+/* Brightness with edges of 5 to 30 degrees all over, not the same mirrored or turned. */
+static double pattern(const double d[3])
+{
+    return 130 + 45 * sin(11 * d[0] + 3 * d[1]) + 35 * sin(17 * d[1] * d[2] + 5 * d[0]) + 20 * sin(40 * d[2] + 7 * d[1]);
+}
+
+static double unit(const double p[3], double d[3])
+{
+    double range = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    for (int k = 0; k < 3; k++)
+        d[k] = p[k] / range;
+    return range;
+}
+
+struct scene {
+    struct spl_atlas atlas;
+    struct spl_station station;
+    struct spl_map_row row;
+    uint32_t *codes;
+    struct spl_samples samples;
+};
+
+/* A map in which all that comes back comes from 5 metres, and samples there as an eye saw them that stood `shift` away
+ * and was turned by `turn` degrees, and mirrored. */
+static void make_scene(struct scene *s, const double shift[3], double turn, bool mirrored)
+{
+    double c = cos(turn * M_PI / 180), q = sin(turn * M_PI / 180);
+    *s = (struct scene){.station = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .position = {7, 8, 9}},
+                        .row = {.side = 128, .levels = 1, .range_side = 32, .near = 1, .slack = 0.1f}};
+    assert_int_equal(spl_atlas_init(&s->atlas, s->row.side, NULL), 0);
+    for (uint32_t y = 0; y < s->atlas.height; y++)
+        for (uint32_t x = 0; x < s->atlas.width; x++) {
+            double d[3];
+            spl_polar_direction(s->row.side, SPL_MAP_APRON, (double[2]){x + 0.5, y + 0.5}, d);
+            float *texel = s->atlas.texels[(size_t)y * s->atlas.width + x];
+            for (int k = 0; k < 3; k++)
+                texel[k] = spl_linear_of_srgb((float)pattern(d));
+            texel[3] = 1;
+        }
+    size_t words = spl_map_range_words(&s->row);
+    s->codes = malloc(words * sizeof *s->codes);
+    for (size_t i = 0; i < 2 * words; i++)
+        spl_map_set_code(s->codes, i, spl_map_code_of_range(&s->row, 5));
+    s->samples = (struct spl_samples){.list = calloc(20000, sizeof *s->samples.list), .colored = true};
+    for (int i = 0; i < 20000; i++) {
+        struct spl_sample *sample = &s->samples.list[s->samples.count++];
+        double z = 1.8 * random_real() - 0.9, turned = 2 * M_PI * random_real(), flat = sqrt(1 - z * z);
+        const double d[3] = {flat * cos(turned), flat * sin(turned), z};
+        double from[3], seen[3], e[3];
+        for (int k = 0; k < 3; k++) {
+            sample->position[k] = s->station.position[k] + 5 * d[k];
+            sample->normal[k] = (float)-d[k];
+            from[k] = 5 * d[k] - shift[k];
+        }
+        unit(from, e);
+        seen[0] = c * e[0] - q * (mirrored ? -e[1] : e[1]);
+        seen[1] = q * e[0] + c * (mirrored ? -e[1] : e[1]);
+        seen[2] = e[2];
+        double noise = i % 20 ? 10 * (random_real() - 0.5) : 120 * (random_real() - 0.5); /* one in 20 is something else */
+        for (int k = 0; k < 3; k++)
+            sample->color[k] = (uint8_t)fmin(fmax(0.8 * pattern(seen) + 20 + noise, 0), 255);
+        sample->radius = 0.05f;
+    }
+}
+
+static struct spl_agreement judge_scene(const double shift[3], double turn, bool mirrored)
+{
+    struct scene s;
+    struct spl_agreement agreement;
+    make_scene(&s, shift, turn, mirrored);
+    const struct spl_map_sight map = {&s.row, s.codes};
+    assert_int_equal(spl_agreement_find(&agreement, &s.atlas, &s.station, 0, false, &map, &s.samples, NULL), 0);
+    spl_atlas_finish(&s.atlas);
+    spl_samples_finish(&s.samples);
+    free(s.codes);
+    return agreement;
+}
+
+static void a_shift_is_found_to_the_millimetre(void **state)
+{
+    (void)state;
+    const double nowhere[3] = {0};
+    struct spl_agreement a = judge_scene(nowhere, 0, false);
+    assert_true(a.shared > 15000 && a.correlation > 0.9 && a.other < a.correlation - 0.05);
+    assert_true(fabs(a.shift[0]) < 0.003 && fabs(a.shift[1]) < 0.003 && fabs(a.shift[2]) < 0.003 && a.turn < 0.001);
+    for (int axis = 0; axis < 3; axis++)
+        for (int k = 0; k < 2; k++) {
+            double shift[3] = {0};
+            shift[axis] = k ? 0.05 : -0.01;
+            a = judge_scene(shift, 0, false);
+            for (int i = 0; i < 3; i++)
+                assert_true(fabs(a.shift[i] - shift[i]) < 0.003 && a.shift_error < 0.002);
+        }
+    a = judge_scene(nowhere, 0.5, false);
+    assert_true(fabs(a.turn * 180 / M_PI - 0.5) < 0.05 && fabs(a.shift[0]) < 0.005);
+}
+
+static void what_is_turned_or_mirrored_is_called_so(void **state)
+{
+    (void)state;
+    const double nowhere[3] = {0};
+    struct spl_agreement a = judge_scene(nowhere, 90, false);
+    assert_true(a.correlation < 0.5 && a.other > 0.9 && !a.mirrored && fabs(a.turned - 90) < 1);
+    a = judge_scene(nowhere, -45, true);
+    assert_true(a.correlation < 0.5 && a.other > 0.9 && a.mirrored && fabs(a.turned + 45) < 1);
+    a = judge_scene((const double[3]){3, -2, 1}, 0, false); /* another place altogether */
+    assert_true(a.correlation < 0.5);
+}
+
+static void exposures_are_evened_out(void **state)
+{
+    (void)state;
+    const double exposures[4] = {1, 4, 0.5, 1}, tint[3] = {1, 1.2, 0.8};
+    struct spl_samples samples = {.list = calloc(4000, sizeof *samples.list), .count = 4000};
+    struct spl_sightings sightings = {0};
+    float factors[4][3];
+    for (int own = 0; own < 2; own++) {
+        samples.colored = own;
+        sightings.count = 0;
+        for (uint32_t i = 0; i < samples.count; i++) {
+            double albedo = 0.02 + 0.1 * random_real();
+            for (int c = 0; c < 3; c++)
+                samples.list[i].color[c] = (uint8_t)(spl_srgb_of_linear((float)albedo) + 0.5f);
+            for (uint16_t row = 0; row < 3; row++) { /* each two maps share a third; the last shares nothing */
+                if (i % 3 == row)
+                    continue;
+                assert_int_equal(
+                    spl_array_reserve(sightings.list, sightings.capacity, sightings.count + 1, NULL), 0);
+                struct spl_sighting *s = &sightings.list[sightings.count++];
+                *s = (struct spl_sighting){.sample = i, .row = row};
+                for (int c = 0; c < 3; c++) /* a sixth is of something that moved */
+                    s->color[c] = (float)log((i % 6 ? albedo : 0.1 * random_real() + 0.01) * exposures[row] *
+                                             (row == 1 ? tint[c] : 1) * (1 + 0.1 * (random_real() - 0.5)));
+            }
+        }
+        assert_int_equal(spl_sightings_even_out(&sightings, &samples, 4, factors, NULL), 0);
+        for (int c = 0; c < 3; c++) {
+            double first = (double)factors[0][c];
+            assert_true(fabs((double)factors[1][c] * 4 * tint[c] / first - 1) < 0.04);
+            assert_true(fabs((double)factors[2][c] * 0.5 / first - 1) < 0.04);
+            assert_true(factors[3][c] == 1);
+            if (own)
+                assert_true(fabs(first - 1) < 0.06);
+            else
+                assert_true(fabs(first * (double)factors[1][c] * (double)factors[2][c] - 1) < 0.02);
+        }
+    }
+    spl_sightings_finish(&sightings);
+    free(samples.list);
+}
+
 /* ---- whole packs ---- */
 
 static char folder[256];
@@ -477,6 +632,9 @@ int main(void)
         cmocka_unit_test(ranges_are_those_of_the_room),
         cmocka_unit_test(what_a_scan_in_part_did_not_look_at_is_not_sky),
         cmocka_unit_test(few_hits_make_a_map_all_the_same),
+        cmocka_unit_test(a_shift_is_found_to_the_millimetre),
+        cmocka_unit_test(what_is_turned_or_mirrored_is_called_so),
+        cmocka_unit_test(exposures_are_evened_out),
         cmocka_unit_test(a_scan_without_stations_needs_panoramas),
         cmocka_unit_test(a_room_becomes_a_map),
         cmocka_unit_test(a_pruned_room_has_the_same_map),
