@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "dataset/rewrite.h"
+#include "geom/size.h"
 #include "geom/unit.h"
 #include "pack/maps/agree.h"
 #include "pack/maps/colors.h"
@@ -24,6 +25,7 @@
 
 /* Bytes that colours and ranges of a map made from pictures may take together, a texel of colour. */
 static const double bytes_a_texel = 0.75;
+enum { finer_most = 4096 }; /* pixels of a face's side */
 
 struct pass {
     const struct spl_pack_options *pack;
@@ -171,12 +173,17 @@ static int refuse(struct pass *p, int rc, const struct spl_error *why, struct sp
 }
 
 static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station,
-                       const struct spl_inverse_ranges *inverse, const struct spl_named_view *view,
+                       const struct spl_inverse_ranges *inverse, const struct spl_named_view *given,
                        struct spl_error *err)
 {
     struct spl_image image = {0};
     struct spl_image_info info;
     struct spl_pyramid pixels;
+    struct spl_named_view finer = *given, *view = &finer;
+    /* Where texels are about as wide as a face's pixels, twice as many of these keep resampling from blurring it. */
+    if (given->inner && given->inner->is_panorama && given->camera.width <= finer_most &&
+        given->camera.fx * spl_polar_texel(atlas->side) < 1.5)
+        spl_camera_resize(&finer.camera, 2 * given->camera.width, 2 * given->camera.height);
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc)
         rc = spl_photo_image_load_of(&p->whole, view, &image, err);
