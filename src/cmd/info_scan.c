@@ -139,7 +139,9 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     spl_system_finish(&system);
     spl_scans_compare(&some, collect, warnings);
     /* of thousands of tiles beside one folder of panoramas it is read once */
-    json_t *panoramas = count == scans->count ? spl_info_list_panoramas(list, count, warnings) : json_array();
+    json_t *panoramas = count == scans->count
+                            ? spl_info_list_panoramas(list, count, warnings, &estimate.dataset_bytes)
+                            : json_array();
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));

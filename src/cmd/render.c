@@ -156,9 +156,12 @@ static void report(const struct spl_device_info *device, const struct spl_datase
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
     const double *low = info->bounds_min, *high = info->bounds_max;
-    fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms%s\n", device->backend, device->name,
-            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms,
-            stats->complete ? "" : "; coarser than asked for: not everything fits the memory limit");
+    fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms", device->backend, device->name,
+            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms);
+    if (!stats->complete)
+        fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
+                info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
+    fputc('\n', stderr);
     if (!stats->splats_drawn)
         fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
                 low[0], low[1], low[2], high[0], high[1], high[2]);

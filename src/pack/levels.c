@@ -5,7 +5,7 @@
  * surface means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts,
  * reaches over them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
  *
- * Where inner nodes are drawn for good, a mean of two surfaces is drawn for good too, and maps put the wrong texels onto
+ * Where inner nodes are drawn for good, a mean of two surfaces is drawn for good too, and maps put the wrong texels on
  * it. There a cell gives a splat for each surface in it, told apart by their normals and by how far off one another's
  * plane they lie. On an exact courtyard with exact maps 1/100 of the splats gains 0.5 dB by it at the same number.
  *

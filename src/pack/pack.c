@@ -511,6 +511,9 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
         rc = spl_maps_check(found.maps, err);
     if (!rc && found.maps && found.maps->find && !found.maps->panoramas)
         rc = find_pictures(&p, &found, err);
+    if (!rc && found.prune > 1 && !found.maps && found.warn)
+        found.warn(found.progress_context, "without maps of stations (--panoramas) the colours of the splats that "
+                                           "pruning drops are lost");
     if (!rc)
         rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)
                                         : pack_scan(&found, &inputs, found.output, NULL, &stage, report, err);

@@ -14,7 +14,7 @@
 #include "support/make_textures.h"
 #include "support/make_tree.h"
 
-enum { side_usual = 40, side_large = 600, map_side = 512 };
+enum { side_usual = 40, side_large = 600, map_side = 256 };
 
 static const double station[3] = {2, 0, 1};
 

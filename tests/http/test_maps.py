@@ -1,15 +1,17 @@
-"""Maps of stations over HTTP: what a dataset says of them, maps=on|off in views, picks, and batches, what is kept under
-which ETag, and a memory limit that has no room for them. The wall's map has other colours than its
-splats, and its station saw through it from y = 0.5 on (make_wall.c)."""
+"""Maps of stations over HTTP: what a dataset says of them, maps=on|off in views, picks, batches and tours, what is kept under
+which ETag, and a memory limit that has no room for them. The wall's map has other colours than its splats, and its station saw
+through it from y = 0.5 on (make_wall.c)."""
 import contextlib
 import pathlib
 import struct
+import tempfile
 
-from harness import FAKE, MAPPED, REAL, WALL, Daemon, run
+from harness import FAKE, MAPPED, REAL, WALL, Daemon, eventually, run
 
 NAME = pathlib.Path(MAPPED).stem
 VIEW = f"/v1/datasets/{NAME}/view"
 LOOK = "eye=3,0.2,1&target=0,0.2,1&up=0,0,1&fov=60&width=64&height=48"
+BODY = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0.2, 1], "up": [0, 0, 1], "fov": 60}}
 SEEN, THROUGH = (24, 24), (42, 24)  # pixels on the wall: y < 0.5, y > 0.5
 
 
@@ -27,7 +29,7 @@ def at(rows, place):
 def test_a_dataset_says_what_maps_it_has():
     with Daemon(FAKE, datasets=[MAPPED, WALL]) as d:
         maps = d.ask(f"/v1/datasets/{NAME}").json()["maps"]
-        assert maps["stations"] == 1 and maps["texels"] == 6 * 512 * 512 and maps["methods"] == ["splat", "nearest"], maps
+        assert maps["stations"] == 1 and maps["texels"] == 6 * 256 * 256 and maps["methods"] == ["splat", "nearest"], maps
         assert maps["bytes"] / maps["texels"] < 3, maps  # ranges as many as colours: 2 bytes a texel and 0.68
         assert d.ask("/v1/datasets/wall").json()["maps"] is None
         table = {p["name"]: p for p in d.ask("/v1/methods").json()["parameters"]}
@@ -47,8 +49,7 @@ def test_maps_are_drawn_where_there_are_any():
         for layer in "depth", "range", "normal", "id", "coverage":
             one, other = (d.ask(f"{VIEW}?{LOOK}&layer={layer}&format=raw&maps={maps}") for maps in ("on", "off"))
             assert one.body != other.body and one.headers["ETag"] != other.headers["ETag"], layer
-        body = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0.2, 1], "up": [0, 0, 1], "fov": 60}, "width": 64, "height": 48,
-                "format": "raw", "maps": "off"}
+        body = {**BODY, "width": 64, "height": 48, "format": "raw", "maps": "off"}
         assert d.post(body, VIEW).body == off.body
         batch = d.post({**body, "views": [{}, {"maps": "on"}], "container": "multipart"}, VIEW + "s")
         assert batch.status == 200 and off.body in batch.body and on.body in batch.body
@@ -63,6 +64,21 @@ def test_picks_see_what_views_show():
         assert pick(SEEN, "")["splat"] == pick(SEEN, "&maps=off")["splat"] is not None
         assert pick(SEEN, "&maps=on")["color"] != pick(SEEN, "&maps=off")["color"]
         assert pick(THROUGH, "")["splat"] is None and pick(THROUGH, "&maps=off")["splat"] is not None
+        body = {"x": SEEN[0] + 0.5, "y": SEEN[1] + 0.5, **BODY, "width": 64, "height": 48, "maps": "off"}
+        assert d.post(body, f"/v1/datasets/{NAME}/pick").json() == pick(SEEN, "&maps=off")
+
+
+def test_tours_are_drawn_with_maps_or_without():
+    with tempfile.TemporaryDirectory() as folder, Daemon(REAL, "--tours", folder, datasets=[MAPPED]) as d:
+        def frame(maps):
+            tour = d.post({"path": {"keyframes": [BODY, BODY]}, "frames": 2,
+                           "settings": {"width": 64, "height": 48, "format": "png", **maps}}, f"/v1/datasets/{NAME}/tours")
+            assert tour.status == 202, tour.body
+            uri = tour.json()["uri"]
+            eventually(lambda: d.ask(uri).json()["state"] in ("done", "failed"), 120)
+            return d.ask(f"{uri}/frames/0").body
+        on, off = (d.ask(f"{VIEW}?{LOOK}&format=png&maps={maps}").body for maps in ("on", "off"))
+        assert frame({}) == frame({"maps": "on"}) == on != off == frame({"maps": "off"})
 
 
 def test_what_changes_nothing_makes_no_other_etag():

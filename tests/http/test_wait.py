@@ -7,7 +7,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, TEXTURED, VIEW, Daemon, eventually, run, together
+from harness import FAKE, MAPPED, REAL, TEXTURED, VIEW, Daemon, eventually, run, together
 
 LARGE = os.environ["SPLATD_WALL_LARGE"]
 LOOK = "width=64&height=48&eye=3,0.2,1&target=0,0,1&up=0,0,1&fov=50"
@@ -73,17 +73,17 @@ def test_a_view_that_waits_keeps_its_deadline_and_those_who_leave_give_up():
 
 
 @contextlib.contextmanager
-def room_for_one_of_two():
+def room_for_one_of_two(source=TEXTURED):
     """A daemon, its gate, a view of the one and of the other, and what takes the place of the first."""
     with tempfile.TemporaryDirectory() as home:
-        textured = os.path.join(home, "a.spld")
-        shutil.copy(TEXTURED, textured)
+        one = os.path.join(home, "a.spld")
+        shutil.copy(source, one)
         with Daemon(REAL, datasets=[LARGE]) as d:
             limit = d.status()["memory"]["device_bytes"] + 4096
         reads = Reads(home)
         near = LOOK.replace("fov=50", "fov=8")  # so that textures are wider than a pixel
         view, large = (f"/v1/datasets/{name}/view?{near}" for name in ("a", os.path.basename(LARGE)[:-5]))
-        with Daemon(REAL, "--memory-limit", str(limit), "--deadline", "2000", datasets=[textured, LARGE],
+        with Daemon(REAL, "--memory-limit", str(limit), "--deadline", "2000", datasets=[one, LARGE],
                     **reads.environment) as d:
             def drive_out():
                 assert d.ask(f"{large}&near={1e-6 * next(fresh_near):.6f}").headers["Splatd-Complete"] == "true"
@@ -112,6 +112,25 @@ def test_what_is_there_now():
         assert waited.headers["ETag"] == whole.headers["ETag"] and waited.body == whole.body != replies[0].body
         drive_out()
         assert d.ask(f"{view}&near=0.5&wait=1").headers["Splatd-Complete"] == "true"
+
+
+def test_maps_are_read_as_pages_are():
+    with room_for_one_of_two(MAPPED) as (d, reads, view, drive_out):
+        view += "&format=raw"
+        reads.allow(1)  # the first page; the map hangs
+        early = d.ask(f"{view}&wait=0")
+        assert early.headers["Splatd-Complete"] == "false" and early.headers["Splatd-Pending"] == "true", early.headers
+        plain = d.ask(f"{view}&maps=off&wait=0")
+        assert plain.headers["Splatd-Complete"] == "true" and plain.body == early.body
+        late = d.ask(view)
+        assert late.status == 503 and late.json()["type"].endswith(":timeout"), late.body
+        reads.allow_all()
+        eventually(lambda: d.ask(f"{view}&wait=0").headers["Splatd-Complete"] == "true")
+        whole = d.ask(view)
+        assert whole.headers["Splatd-Cache"] == "hit" and whole.body != early.body
+        assert d.ask("/v1/datasets/a").json()["resident_bytes"] >= d.ask("/v1/datasets/a").json()["maps"]["bytes"]
+        drive_out()
+        assert d.ask("/v1/datasets/a").json()["resident_bytes"] < d.ask("/v1/datasets/a").json()["maps"]["bytes"]
 
 
 def test_a_daemon_ends_though_a_read_hangs():

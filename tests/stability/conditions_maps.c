@@ -10,8 +10,8 @@
 #include "photographed.h"
 #include "surveyed.h"
 
-enum { WIDTH = 160, HEIGHT = 120, PANORAMA = 1024 };
-static const double step = 1.2; /* degrees */
+enum { WIDTH = 160, HEIGHT = 120, PANORAMA = 2048 };
+static const double step = 1; /* degrees */
 
 static bool wants(const struct conditions *c, const char *condition, bool whole_only)
 {
@@ -76,7 +76,7 @@ static void contents(struct conditions *c, const struct survey *all)
 
 static void from_scans_alone(struct conditions *c, const struct survey *all)
 {
-    static const struct sight sights[] = {{"masonry, lod 1", "masonry", 1, 0.5}, {"masonry, lod 4", "masonry", 4, 0}};
+    static const struct sight sights[] = {{"masonry, lod 1", "masonry", 1, 1.5}, {"masonry, lod 4", "masonry", 4, 0.25}};
     struct survey survey = {.blind = true};
     if (!wants(c, "maps: from the scans alone", false))
         return;
@@ -94,7 +94,7 @@ static void misplaced(struct conditions *c, const struct survey *all)
     } steps[] = {{{"5 mm", "text", 1, 0}, 0.005, true},
                  {{"10 mm", "text", 1, 0}, 0.01, false},
                  {{"20 mm", "text", 1, 1}, 0.02, true},
-                 {{"50 mm", "text", 1, 3}, 0.05, false}};
+                 {{"50 mm", "text", 1, 2.5}, 0.05, false}};
     for (size_t s = 0; s < sizeof steps / sizeof *steps; s++) {
         struct survey survey = {0};
         if (!wants(c, "maps: misplaced", steps[s].whole_only))

@@ -97,10 +97,10 @@ struct spl_scene *yard_create(enum somebody somebody)
 
 void world_init_yard(struct world *world)
 {
-    struct survey survey = {.step = 1.2};
+    struct survey survey = {.step = 1};
     struct spl_scene *yard = yard_create(NOBODY);
     for (int i = 0; i < 2; i++)
-        survey_add(&survey, yard, survey_places[i], NULL, 1024);
+        survey_add(&survey, yard, survey_places[i], NULL, 2048);
     world_init_surveyed(world, yard, &survey);
     survey_finish(&survey);
 }

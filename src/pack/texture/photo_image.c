@@ -207,3 +207,18 @@ int spl_photo_image_load(const struct spl_named_view *view, struct spl_image *ou
     spl_photo_whole_finish(&whole);
     return rc;
 }
+
+int spl_photo_image_load_whole(const struct spl_named_view *view, struct spl_image *out, struct spl_error *err)
+{
+    *out = (struct spl_image){0};
+    int rc = load_inner(view, out, err);
+    if (rc) {
+        spl_image_finish(out);
+        return rc;
+    }
+    uint8_t(*texels)[4] = out->pixels;
+    for (size_t i = 0; i < (size_t)out->width * out->height; i++)
+        if (texels[i][0] <= black && texels[i][1] <= black && texels[i][2] <= black)
+            texels[i][3] = 0;
+    return SPL_OK;
+}

@@ -231,21 +231,23 @@ static void test_panoramas(void **state)
     assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
                      0);
     json_t *json = json_of("yard/courtyard.ply"), *pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0}]"));
+    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0,\"map_bytes\":72848}]"));
     assert_true(is(pack, "warnings", "[]"));
+    assert_true(json_integer_value(json_object_get(pack, "dataset_bytes")) ==
+                72848 + 10 * json_integer_value(json_object_get(json, "points")));
     json_decref(json);
     write_text("yard/panoramas/station-2.color.png", "");
     assert_int_equal(run("info yard/courtyard.ply", output, sizeof output), 0);
-    assert_non_null(strstr(output, "\n  panoramas     3, for maps of stations: --panoramas yard/panoramas\n"));
+    assert_non_null(strstr(output, "\n  panoramas     3 of yard/panoramas, which become maps of stations\n"));
     assert_non_null(strstr(strstr(output, "\n  warnings"), "station-2"));
     write_text("yard/second.ply", ply); /* two beside one folder */
     assert_int_equal(run("info yard/courtyard.ply yard/second.ply", output, sizeof output), 0);
-    assert_non_null(strstr(strstr(output, "2 scans together"), "\n  panoramas     3, "));
+    assert_non_null(strstr(strstr(output, "2 scans together"), "\n  panoramas     3 of "));
     assert_null(strstr(strstr(output, "\n  panoramas") + 1, "\n  panoramas"));
     write_text("yard/panoramas/panoramas.json", "{\"panoramas\": 7}");
     json = json_of("yard/second.ply");
     pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0}]"));
+    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0,\"map_bytes\":0}]"));
     assert_int_equal(json_array_size(json_object_get(pack, "warnings")), 1);
     json_decref(json);
 }

@@ -168,7 +168,12 @@ static void demands_arrive(void **state)
     assert_int_equal(query("psnr=38&method=points&lod=2&width=64&height=32", &r, &err), 0);
     assert_true(r.planned && r.demand.keep_method && r.demand.keep_lod && !r.demand.keep_supersample);
     assert_true(r.demand.kept.method == SPL_METHOD_POINTS && r.demand.kept.lod == 2);
+    assert_false(r.demand.keep_maps);
     assert_true(r.demand.width == 64 && r.demand.height == 32 && r.demand.layer == SPL_LAYER_COLOR);
+    assert_int_equal(query("budget=50&maps=off", &r, &err), 0);
+    assert_true(r.view.maps == SPL_MAPS_OFF && r.demand.keep_maps && r.demand.kept.maps == SPL_SETTING_MAPS_OFF);
+    assert_int_equal(query("budget=50&maps=on", &r, &err), 0);
+    assert_true(r.view.maps == SPL_MAPS_ON && r.demand.keep_maps && r.demand.kept.maps == SPL_SETTING_MAPS_ON);
     static const char *const bad[] = {"budget=0",    "budget=0ms",   "budget=-1",   "budget=1m",
                                       "budget=ms",   "budget=1.2.3", "budget=601s", "budget=1e2",
                                       "budget=1 ms", "budget=inf",   "budget="};
@@ -296,6 +301,7 @@ static void queries_are_refused_by_name(void **state)
         {"atoms=9", "atoms"},
         {"atoms=-1", "atoms"},
         {"atoms=1e30", "atoms"},
+        {"maps=no", "maps"},
         {"supersample=0", "supersample"},
         {"margin=-1", "margin"},
         {"margin=99", "margin"},
