@@ -390,10 +390,22 @@ static int run_passes(struct passes *p, const char *part, struct spl_error *err)
         if (!rc && more)
             rc = open_part(part, &dataset, err);
     }
-    if (!rc && o->maps)
-        rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, err);
-    else if (!rc && more)
-        rc = spl_prune_apply(dataset, o->prune, o->output, NULL, p->stage, err);
+    bool maps = o->maps;
+    if (!rc && maps) {
+        struct spl_error why = {0};
+        rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, &why);
+        if (rc == SPL_E_INPUT && o->maps->find) { /* nobody asked for what was found beside the scan */
+            if (o->warn)
+                o->warn(o->progress_context, why.message);
+            p->maps = (struct spl_map_report){0};
+            maps = false;
+            rc = SPL_OK;
+        } else if (rc)
+            spl_fail_field(err, rc, why.field, "%s", why.message);
+    }
+    if (!rc && !maps && more)
+        rc = o->prune > 1 ? spl_prune_apply(dataset, o->prune, o->output, NULL, p->stage, err)
+                          : spl_dataset_rewrite(&(struct spl_rewrite){.from = dataset}, o->output, err);
     spl_dataset_close(dataset);
     return rc;
 }
