@@ -1,9 +1,10 @@
 /* Adds the colours of a station's map to the samples of the cells that its chunks reach, an entry and a workgroup each:
- * each sample's point is looked up by its direction from the station. The weight is (cos / range)^8 of the angle that
- * the surface is seen at and the distance, times the share of the four ranges around that agree with the point's own:
- * the station that saw it sharpest prevails, and where two are as good they blend. A common factor of all stations, the
- * view depth, keeps it within floats. The surface's normal and the sample's footprint follow from the samples beside
- * it. Of method nearest (constant 0) depths are bent, and payloads say how far. */
+ * each sample's point is looked up by its direction from the station. The weight is (share cos / range)^8 of the angle
+ * that the surface is seen at, the distance, and the share of the four ranges around that agree with the point's own:
+ * the station that saw it sharpest and whole prevails (beside an edge colours are those of both sides), and where two
+ * are as good they blend. A common factor of all stations, the view depth, keeps it within floats. The surface's normal
+ * and the sample's footprint follow from the samples beside it. Of method nearest (constant 0) depths are bent, and
+ * payloads say how far. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -82,9 +83,9 @@ void main()
     vec3 chart = polar_chart(d);
     float seen = seen_share(chart, range, tolerance);
     precise float footprint = sqrt(area * facing) / max(range, 1e-20) * (float(map_side()) * (1.0 / 1.57079633));
-    precise float share = clamp(facing * z / max(range, 1e-20), SPL_MAP_SHARE_MIN, 1.0 / SPL_MAP_SHARE_MIN);
+    precise float share = clamp(facing * z / max(range, 1e-20), SPL_MAP_SHARE_MIN, 1.0 / SPL_MAP_SHARE_MIN) * seen;
     precise float squared = share * share, fourth = squared * squared;
-    for (float weight = fourth * fourth * seen; weight > 0.0; weight = 0.0) { /* a loop of no rounds costs nothing */
+    for (float weight = fourth * fourth; weight > 0.0; weight = 0.0) { /* a loop of no rounds costs nothing */
         vec3 color = map_color(chart, footprint);
         uvec4 sum = load_sums(index);
         precise vec3 more = uintBitsToFloat(sum.xyz) + color * weight;

@@ -5,8 +5,8 @@
  *
  * "rotation", row-major, turns the panorama's axes (x to the middle of the image, y to the left of it, z up) into the
  * world's; "quaternion" [w, x, y, z] says the same. "elevation" [lowest, highest] in degrees is what the rows of a cut
- * image reach over. "faces" {"front": …, "left", "back", "right", "up", "down"} stands for "color". "width" and
- * "height" are held against the file; what else an entry has is not looked at. Any thread; no state. */
+ * image reach over. "faces" {"front": …, "left", "back", "right", "up", "down"} stands for "color"; where that is
+ * null, a station took no picture. "width" and "height" are held against the file; what else an entry has is not looked at. Any thread; no state. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -289,6 +289,17 @@ static int add_cube(const struct entry *e, const json_t *faces, char **file, str
     return rc;
 }
 
+/* Where a scanner stood that took no picture: a view without a photograph. */
+static int add_place(const struct entry *e, struct spl_error *err)
+{
+    enum { side = 64 };
+    struct spl_camera camera;
+    double axes[9];
+    spl_panorama_face(0, axes);
+    int rc = make_face(e->rotation, e->position, axes, side, &camera, err);
+    return rc ? rc : spl_view_list_add_inner(e->list, e->path, e->name, &camera, NULL, NULL, err);
+}
+
 static int add_entry(struct entry *e, char **file, struct spl_error *err)
 {
     const json_t *color = json_object_get(e->json, "color"), *faces = json_object_get(e->json, "faces");
@@ -298,10 +309,12 @@ static int add_entry(struct entry *e, char **file, struct spl_error *err)
     int rc = read_pose(e, err);
     if (rc)
         return rc;
+    if (json_is_null(color) && !faces)
+        return add_place(e, err);
     if (!color == !faces)
         return spl_fail_field(err, SPL_E_INPUT, "color",
                               color ? "has a color and faces: leave one out"
-                                    : "has no color (the path of an equirectangular image) and no faces");
+                                    : "has no color (the path of an equirectangular image; null: a place alone) and no faces");
     return color ? add_sphere(e, color, file, err) : add_cube(e, faces, file, err);
 }
 

@@ -105,7 +105,8 @@ struct spl_chunk {
     float origin[3]; /* relative to the node's origin; position = origin + step * code */
     float step;
     float radius_min, radius_step;
-    float radius_mean; /* of the chunk's splats: what level selection and prune-and-scale use */
+    float radius_mean; /* of the chunk's splats as they were made, which is their spacing: level selection and
+                          prune-and-scale use it; leaves of pruned datasets are drawn smaller */
     float normal_u, normal_v, normal_step;
     uint32_t geometry_word; /* in the node's page, 32-bit words; the other streams follow in order */
     uint32_t geometry_bits; /* as in shared.h */

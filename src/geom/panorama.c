@@ -35,6 +35,11 @@ bool spl_panorama_place(const struct spl_panorama *panorama, const struct spl_ca
     double x = (pixel[0] - face->cx) / face->fx, y = (pixel[1] - face->cy) / face->fy, p[3];
     for (int k = 0; k < 3; k++)
         p[k] = r[3 * k] * x + r[3 * k + 1] * y + r[3 * k + 2];
+    return spl_panorama_place_of(panorama, p, place);
+}
+
+bool spl_panorama_place_of(const struct spl_panorama *panorama, const double p[3], double place[2])
+{
     double level = hypot(p[0], p[1]), rise = panorama->cylinder ? p[2] / level : atan2(p[2], level);
     place[0] = panorama->width / 2.0 - atan2(p[1], p[0]) * panorama->across;
     place[1] = panorama->horizon - rise * panorama->down;

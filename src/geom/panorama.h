@@ -22,6 +22,9 @@ const char *spl_panorama_face(unsigned face, double rotation[9]);
 bool spl_panorama_place(const struct spl_panorama *panorama, const struct spl_camera *face, const double pixel[2],
                         double place[2]);
 
+/* The same of a direction in the panorama's frame, of any length above 0. */
+bool spl_panorama_place_of(const struct spl_panorama *panorama, const double p[3], double place[2]);
+
 /* All columns go around once: the first lies beside the last. */
 bool spl_panorama_is_closed(const struct spl_panorama *panorama);
 

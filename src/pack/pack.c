@@ -453,6 +453,7 @@ static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_p
 {
     const struct spl_pack_options *options = p->options;
     struct spl_dataset *dataset = NULL;
+    uint64_t begin_ns = spl_now_ns();
     char *part = NULL;
     int rc = SPL_OK;
     if (options->photos && !(rc = spl_photos_load(options->photos, &p->photographs, &p->photos, err)))
@@ -471,7 +472,7 @@ static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_p
         fill_rewritten(spl_dataset_get_info(dataset), report);
         report->photos = p->photos;
         report->maps = p->maps;
-        report->seconds += p->photos.seconds + p->maps.seconds;
+        report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     }
     spl_dataset_close(dataset);
     free(part);

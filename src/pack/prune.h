@@ -38,7 +38,6 @@ struct spl_prune_report {
     uint64_t dense;                    /* of those after: in nodes that keep more than twice 1 / factor */
     double slope;                      /* w that a splat saved costs, at the cut's edge; 0 = nothing was dropped */
     double lost;                       /* sum of w / leaf splats before, 0..1 */
-    double seconds;                    /* of spl_prune_apply() */
 };
 
 /* Sets leaf[node] of each node that stays and loses its children; `leaf` has room for info.nodes. The number of splats

@@ -4,7 +4,6 @@
 
 #include <stdlib.h>
 
-#include "base/clock.h"
 #include "base/memory.h"
 #include "dataset/rewrite.h"
 
@@ -24,7 +23,6 @@ int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     struct spl_prune_report own;
-    uint64_t begin_ns = spl_now_ns();
     bool *leaf = spl_alloc(info->nodes, sizeof *leaf, err);
     const struct spl_prune_options options = {.factor = factor, .no_maps = true};
     int rc = leaf ? spl_prune_plan(dataset, &options, leaf, report ? report : &own, stage, err) : SPL_E_NOMEM;
@@ -32,8 +30,6 @@ int spl_prune_apply(const struct spl_dataset *dataset, double factor, const char
         .from = dataset, .leaf = leaf, .leaf_radius = spl_prune_leaf_radius(dataset)};
     if (!rc)
         rc = spl_dataset_rewrite(&rewrite, output, err);
-    if (!rc && report)
-        report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     free(leaf);
     return rc;
 }

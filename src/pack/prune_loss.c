@@ -17,7 +17,7 @@
 static const float reach_radii = 6;
 
 /* Leaf splats that are looked at for each of the node's. */
-static const double samples_a_splat = 16;
+static const double samples_a_splat = 6;
 
 struct shape { /* a disc; a piece of a line, from `at` by `to` */
     float at[3], to[3]; /* of a disc: its normal */

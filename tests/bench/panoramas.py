@@ -2,11 +2,12 @@
 """Colours from stations' maps beside the splats' own: accuracy, splats, bytes and time, whole and pruned.
 
 usage: panoramas.py [SCENE…] [--points N] [--width W] [--size WxH] [--repeats N] [--quick] [--keep DIR]
-       panoramas.py --scan FILE --panoramas PATH --views FILE [--repeats N] [--quick] [--keep DIR]
+       panoramas.py --scan FILE --views FILE [--panoramas PATH] [--repeats N] [--quick] [--keep DIR]
 
 SCENE (courtyard) is one of `splatd synth`'s that is scanned from tripods; its truth is exact. FILE is a scan of which no
 truth is known: the reference is the render of all its points with their own colours and 16 samples a pixel. Each dataset
-is drawn with every splat (lod 0), at lod 1, and, where it is whole, at 4 and 10. Prints a table in Markdown for each scan;
+is drawn with every splat (lod 0), at lod 1, and, where it is whole, at 4 and 10; maps come from panoramas, or from the
+scan's own colours alone. Prints a table in Markdown for each scan;
 its first line of a dataset says how large it is, in MB and as a share of the dataset without maps and with all splats.
 --quick draws lod 0 once and leaves time out of account. --keep: where scans and datasets go, and are found again.
 
@@ -25,7 +26,9 @@ SPLATD = os.environ.get("SPLATD_BINARY", "splatd")
 # name, options of pack: PICTURES stands for where panoramas lie
 PACKED = (("no maps", ["--no-panoramas"]), ("panoramas", ["--panoramas", "PICTURES"]),
           ("panoramas, 1/10", ["--panoramas", "PICTURES", "--prune", "10"]),
-          ("panoramas, 1/100", ["--panoramas", "PICTURES", "--prune", "100"]))
+          ("panoramas, 1/100", ["--panoramas", "PICTURES", "--prune", "100"]),
+          ("scan alone", ["--panoramas", "scan"]), ("scan alone, 1/10", ["--panoramas", "scan", "--prune", "10"]),
+          ("scan alone, 1/100", ["--panoramas", "scan", "--prune", "100"]))
 SHOWN = ("wall", "plaque")  # views whose figures stand beside those of all
 REFERENCE = (("color", "png"), ("depth", "npy"), ("normal", "npy"), ("coverage", "npy"))
 
@@ -107,6 +110,8 @@ def measure(title, scan, pictures, views, truth, o, folder):
     plain = folder / "no-maps.spld"
     print(f"\n{title}\n\n| " + " | ".join(heads) + " |\n|" + "---|" * len(heads), flush=True)
     for name, options in PACKED:
+        if "PICTURES" in options and not pictures:
+            continue
         dataset = folder / (name.replace(", 1/", "-").replace(" ", "-") + ".spld")
         if not dataset.exists():
             run("pack", scan, *[pictures if word == "PICTURES" else word for word in options], "-o", dataset)
@@ -129,8 +134,8 @@ def main():
     for path in ("scan", "panoramas", "views"):
         parser.add_argument(f"--{path}", type=pathlib.Path)
     o = parser.parse_args()
-    if bool(o.scan) != bool(o.views) or bool(o.scan) != bool(o.panoramas) or (o.scan and o.scenes):
-        parser.error("--scan, --panoramas and --views go together, without a SCENE")
+    if bool(o.scan) != bool(o.views) or (o.scan and o.scenes) or (o.panoramas and not o.scan):
+        parser.error("--scan and --views go together, without a SCENE; --panoramas goes with them")
     with tempfile.TemporaryDirectory() as temporary:
         root = o.keep or pathlib.Path(temporary)
         if o.scan:

@@ -141,6 +141,34 @@ def test_atoms(folder, dataset):
     assert "-o OUT" in splatd("bench", textured, "--atoms", "2", code=2).stderr
 
 
+def test_maps(folder, dataset):
+    splatd("synth", "courtyard", "--points", "20000", "--format", "ptx", "-o", folder / "scan")
+    mapped, cams, out = folder / "mapped.spld", folder / "m-views.json", folder / "m"
+    cams.write_text(json.dumps({"views": [{"name": "near", "width": 64, "height": 36, "camera": {
+        "eye": EYES["low"], "target": [0, 0, 1.5], "fov": 60}}]}))
+    splatd("pack", folder / "scan" / "courtyard.ptx", "--panoramas", "scan", "-o", mapped)
+    command = ["bench", mapped, "--views", cams, "--repeats", "1", "--lod", "2", "--supersample", "1", "-o", out]
+    splatd(*command, "--profile", folder / "m.json")
+    points = json.loads((folder / "m.json").read_text())["points"]
+    assert [(p["method"], p.get("maps")) for p in points if p["method"] in ("splat", "points")] == [
+        ("splat", "on"), ("splat", "off"), ("points", None)], points
+    splats = {p["maps"]: p["psnr"] for p in points if p["method"] == "splat"}
+    assert splats["on"] != splats["off"], splats
+    head, *rows = (out / "bench.csv").read_text().splitlines()
+    assert head.endswith(",maps") and [r.rsplit(",", 1)[1] for r in rows if r.startswith(("splat,", "points,"))] == [
+        "on", "off", ""], rows
+    assert ">splat + panorama<" in (out / "chart.svg").read_text()
+    assert "another 'settings'" in splatd(*command, "--maps", "off", "--no-profile", code=2).stderr
+    splatd(*command, "--maps", "off", "--method", "splat", "--profile", folder / "m.json", "--restart")
+    assert [p["maps"] for p in json.loads((folder / "m.json").read_text())["points"]] == ["off"]
+    assert "'small' has none" in splatd("bench", dataset, "--maps", "on", code=2).stderr
+    assert "-o OUT" in splatd("bench", mapped, "--maps", "both", code=2).stderr
+    assert "on, off or both, not 'some'" in splatd("bench", mapped, "--maps", "some", code=2).stderr
+    for maps in "on", "off":
+        report = json.loads(splatd("bench", mapped, "--maps", maps, "--frames", "2", "--size", "96x54", "--json").stdout)
+        assert len(report["rows"]) == 1, report
+
+
 def test_references(folder, dataset):
     """A render of the scene as its own 'exact' image: equal pixels, and what is refused."""
     cams, truth = views(folder / "v.json"), folder / "truth"
@@ -189,7 +217,7 @@ def main():
         folder = pathlib.Path(name)
         splatd("synth", "courtyard", "--points", "20000", "--format", "ply", "-o", folder / "scan")
         splatd("pack", folder / "scan" / "courtyard.ply", "-o", folder / "small.spld")
-        for test in (test_outputs_and_resume, test_profile, test_atoms, test_references, test_refusals):
+        for test in (test_outputs_and_resume, test_profile, test_atoms, test_maps, test_references, test_refusals):
             try:
                 test(folder, folder / "small.spld")
                 print("ok   " + test.__name__, flush=True)

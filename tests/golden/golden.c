@@ -18,10 +18,19 @@
 
 #include "picture.h"
 #include "support/make_textures.h"
+#include "support/mapped_dataset.h"
 #include "synth/synth.h"
 #include "views.h"
 
 enum { SKIPPED = 77, REPEATS = 100, POINTS = 60000, SEED = 1 };
+
+/* A station that saw waves on the ground, nothing above 22 degrees, and did not look between. */
+static void look_at_ground(const struct make_map *map, const double d[3], double color[3], double *range)
+{
+    *range = d[2] < 0 ? -map->row.position[2] / d[2] : d[2] > 0.375 ? INFINITY : NAN;
+    for (int i = 0; i < 3; i++)
+        color[i] = 127.5 + 100 * sin(30 * d[i] + 7 * d[(i + 1) % 3]);
+}
 
 static struct spl_dataset *make_courtyard(void)
 {
@@ -50,7 +59,11 @@ static struct spl_dataset *make_courtyard(void)
     struct spl_dataset *textured = make_textured(dataset, &dictionary, 4, SEED);
     spl_dictionary_finish(&dictionary);
     spl_dataset_close(dataset);
-    return textured;
+    struct make_map map = {.row = mapped_row((double[]){-6.5, -4.8, 1.7}, 0, 256, 4, 128), .look = look_at_ground};
+    map.row.slack = 0.05f;
+    struct spl_dataset *mapped = make_mapped_alike(textured, &map, 1, true);
+    spl_dataset_close(textured);
+    return mapped;
 }
 
 /* NULL with a message where this machine or build lacks the backend. */
@@ -85,6 +98,7 @@ static struct spl_view make_view(const struct golden *golden)
     view.lod = golden->lod;
     view.supersample = golden->supersample;
     view.disc.atoms = golden->atoms;
+    view.maps = golden->maps ? SPL_MAPS_ON : SPL_MAPS_OFF;
     memcpy(view.background, golden->background, sizeof view.background);
     return view;
 }

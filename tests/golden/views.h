@@ -22,6 +22,7 @@ struct golden {
     double shift;             /* of the principal point from the middle, pixels */
     struct tolerance tolerance;
     uint32_t atoms;           /* of the textures that every splat has; 0 = its colour */
+    bool maps;                /* those of the station are drawn */
 };
 
 static const struct golden goldens[] = {
@@ -54,6 +55,9 @@ static const struct golden goldens[] = {
      * may take either */
     {"wall-textured", {1.2, 6.9, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 13.25,
      {2, 0.004}, 8},
+    /* colours of a map on the ground, splats' own where it did not look, and what it saw through is gone */
+    {"overview-mapped", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.004}, .maps = true},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

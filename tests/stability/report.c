@@ -8,7 +8,6 @@
 #include <string.h>
 
 #define ALIASING "a point is one sample of its pixel; a coarser level's is the mean of many"
-#define LIGHT "panoramas are not matched in exposure, with each other and with the scan's colours"
 #define BLUR "leaf splats are drawn wider, for their distance, than the clusters of the level above"
 
 /* check, scene, view, method (NULL = any), the worst figure it may come to, and why it fails. */
@@ -21,7 +20,6 @@ static const struct known {
     {"finer-is-better", "density", NULL, "splat", -1, BLUR},
     {"finer-is-better", "powerline", "from-above", "splat", -1.2, BLUR},
     {"finer-is-better", "thin-walls", "wedge", "splat", -1.5, BLUR},
-    {"maps-do-no-harm", "maps: exposures", NULL, NULL, -2.75, LIGHT},
     {"lies-on-the-truth", "interior", "from-the-sofa", "splat", 0.12, "not found yet; 0.110 pixels, in the whole form alone"},
 };
 enum { known_count = sizeof known / sizeof *known };

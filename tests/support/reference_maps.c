@@ -136,5 +136,5 @@ float reference_map_color(const struct reference_map *map, const struct referenc
     for (int c = 0; c < 3; c++)
         color[c] = fine[c] + (coarse[c] - fine[c]) * (level - (float)first);
     float share = fminf(fmaxf(cosine * sample->p[2] / range, SPL_MAP_SHARE_MIN), 1 / SPL_MAP_SHARE_MIN);
-    return seen * powf(share, 8);
+    return powf(share * seen, 8);
 }

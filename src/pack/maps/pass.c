@@ -45,7 +45,6 @@ struct pass {
     float (*factors)[3]; /* by row: of colours in linear light, which even exposures out */
     bool *leaf;      /* by node: as of struct spl_rewrite; NULL = nothing is pruned */
     uint32_t *words; /* of the map that is written */
-    struct spl_photo_whole whole;
     struct spl_map_edits edits;
     struct spl_map_export out;
     double errors;   /* of blocks, squared, summed over channels; of so many texels */
@@ -170,6 +169,13 @@ static int refuse(struct pass *p, int rc, const struct spl_error *why, struct sp
     return SPL_OK;
 }
 
+/* A panorama's faces are views; the first of them stands for all. */
+static bool is_same_panorama(const struct spl_named_view *a, const struct spl_named_view *b)
+{
+    return a && a->inner && a->inner->is_panorama && b->inner && b->inner->is_panorama &&
+           a->inner->at == b->inner->at && !strcmp(a->inner->path, b->inner->path) && a->panorama == b->panorama;
+}
+
 static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station,
                        const struct spl_inverse_ranges *inverse, const struct spl_named_view *view,
                        struct spl_error *err)
@@ -177,10 +183,11 @@ static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station
     struct spl_image image = {0};
     struct spl_image_info info;
     struct spl_pyramid pixels;
+    bool panorama = view->inner && view->inner->is_panorama;
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc)
-        rc = spl_photo_image_load_of(&p->whole, view, &image, err);
-    if (!rc && (image.width != view->camera.width || image.height != view->camera.height)) {
+        rc = panorama ? spl_photo_image_load_whole(view, &image, err) : spl_photo_image_load(view, &image, err);
+    if (!rc && !panorama && (image.width != view->camera.width || image.height != view->camera.height)) {
         rc = spl_fail_field(err, SPL_E_INPUT, "width", "%s: %u x %u pixels; its camera says %u x %u", view->photograph,
                             image.width, image.height, view->camera.width, view->camera.height);
         spl_image_finish(&image);
@@ -198,6 +205,7 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
     static const float even[3] = {1, 1, 1};
     uint32_t station = p->station_of[row];
     struct spl_ranges ranges = {.side = p->rows[row].range_side};
+    const struct spl_named_view *last = NULL;
     struct spl_inverse_ranges inverse = {0};
     struct spl_hits hits = {0};
     size_t texels = 2 * spl_map_range_words(&p->rows[row]);
@@ -217,8 +225,15 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
         struct spl_error why = {0};
         if (p->stations.of_view[v] != station || !p->views->views[v].photograph)
             continue;
-        if ((rc = add_picture(p, atlas, station, &inverse, &p->views->views[v], &why))) {
-            p->stations.of_view[v] = UINT32_MAX;
+        if (is_same_panorama(last, &p->views->views[v])) {
+            spl_stage_add(p->stage, 1, 0);
+            continue;
+        }
+        last = &p->views->views[v];
+        if ((rc = add_picture(p, atlas, station, &inverse, last, &why))) {
+            for (size_t face = v; face < p->views->count; face++)
+                if (face == v || is_same_panorama(last, &p->views->views[face]))
+                    p->stations.of_view[face] = UINT32_MAX;
             rc = refuse(p, rc, &why, err);
         }
         spl_stage_add(p->stage, 1, 0);
@@ -470,7 +485,6 @@ done:
     free(p.factors);
     free(p.leaf);
     free(p.words);
-    spl_photo_whole_finish(&p.whole);
     spl_map_export_finish(&p.out);
     spl_map_edits_finish(&p.edits);
     spl_stations_finish(&p.stations);

@@ -75,6 +75,8 @@ static int get_size(const char *path, uint32_t *width, uint32_t *height, struct 
 static int check_header(const struct spl_named_view *view, struct spl_error *err)
 {
     struct spl_image_info info;
+    if (!view->photograph)
+        return SPL_OK; /* the place of a station alone */
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc && (info.width != view->camera.width || info.height != view->camera.height))
         rc = spl_fail_field(err, SPL_E_INPUT, "width", "%s: %u x %u pixels; its camera says %u x %u", view->photograph,

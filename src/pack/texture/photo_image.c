@@ -1,6 +1,5 @@
-/* Where a photograph's pixels come from. A face is cut out of its panorama when it is loaded, so that what follows knows
- * pinholes alone: bilinearly, or by splines where its camera has more pixels than the panorama. The panorama stays with
- * the caller for the next face. Any thread, all cores; no state. */
+/* Where a photograph's pixels come from. A face is cut out of its panorama when it is loaded, bilinearly, so that what
+ * follows knows pinholes alone; the panorama stays with the caller for the next face. Any thread; no state. */
 #include "pack/texture/photo_image.h"
 
 #include <math.h>
@@ -8,7 +7,6 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/parallel.h"
 
 static int check_size(const struct spl_named_view *view, uint32_t width, uint32_t height, struct spl_error *err)
 {
@@ -44,7 +42,6 @@ int spl_photo_image_get_info(const struct spl_named_view *view, struct spl_image
 }
 
 enum { black = 6 };
-static const double finer_than = 1.25; /* pixels of the panorama: faces that have more of them lose nothing by splines */
 
 /* Bilinear at `place` of an image that may close around, colours by their alpha; texels beyond its edges repeat those at
  * the edge. */
@@ -74,84 +71,27 @@ static void sample(const struct spl_image *from, bool closed, const double place
     rgba[3] = weight[0] == 1 && alpha == 1 ? four[0][3] : (uint8_t)(255 * alpha + 0.5);
 }
 
-/* The values of a Catmull-Rom spline's four taps, the place being `t` behind the second. */
-static void make_taps(double t, float taps[4])
-{
-    taps[0] = (float)(((-0.5 * t + 1) * t - 0.5) * t);
-    taps[1] = (float)((1.5 * t - 2.5) * t * t + 1);
-    taps[2] = (float)(((-1.5 * t + 2) * t + 0.5) * t);
-    taps[3] = (float)((0.5 * t - 0.5) * t * t);
-}
-
-/* The same by splines, which keep what is fine; false beside what is transparent. */
-static bool sample_finely(const struct spl_image *from, bool closed, const double place[2], uint8_t rgba[4])
-{
-    const uint8_t(*texels)[4] = from->pixels;
-    double x = place[0] - 0.5, y = place[1] - 0.5;
-    int64_t column = (int64_t)floor(x), row = (int64_t)floor(y), width = from->width, height = from->height;
-    float across[4], down[4], sum[3] = {0};
-    make_taps(x - (double)column, across);
-    make_taps(y - (double)row, down);
-    for (int64_t i = 0; i < 4; i++) {
-        int64_t v = row - 1 + i;
-        const uint8_t(*line)[4] = texels + (v < 0 ? 0 : v < height ? v : height - 1) * width;
-        for (int64_t k = 0; k < 4; k++) {
-            int64_t u = column - 1 + k;
-            u = closed ? (u + width) % width : u < 0 ? 0 : u < width ? u : width - 1;
-            if (line[u][3] != 255)
-                return false;
-            for (int c = 0; c < 3; c++)
-                sum[c] += down[i] * across[k] * line[u][c];
-        }
-    }
-    for (int c = 0; c < 3; c++)
-        rgba[c] = (uint8_t)(fminf(fmaxf(sum[c], 0), 255) + 0.5f);
-    rgba[3] = 255;
-    return true;
-}
-
-struct cut {
-    const struct spl_named_view *view;
-    const struct spl_image *whole;
-    struct spl_image *face;
-    bool closed, fine;
-};
-
-static void cut_rows(void *context, size_t begin, size_t end, unsigned worker)
-{
-    const struct cut *cut = context;
-    const struct spl_camera *camera = &cut->view->camera;
-    uint8_t(*texels)[4] = cut->face->pixels;
-    (void)worker;
-    for (size_t y = begin; y < end; y++)
-        for (uint32_t x = 0; x < camera->width; x++) {
-            double place[2];
-            uint8_t *texel = texels[y * camera->width + x];
-            if (spl_panorama_place(&cut->view->inner->panorama, camera, (double[2]){x + 0.5, (double)y + 0.5}, place) &&
-                !(cut->fine && sample_finely(cut->whole, cut->closed, place, texel)))
-                sample(cut->whole, cut->closed, place, texel);
-            if (texel[0] <= black && texel[1] <= black && texel[2] <= black)
-                texel[3] = 0; /* what a panorama's camera did not take is black */
-        }
-}
-
 static int cut_face(const struct spl_named_view *view, const struct spl_image *whole, struct spl_image *image,
                     struct spl_error *err)
 {
     const struct spl_panorama *panorama = &view->inner->panorama;
     const struct spl_camera *camera = &view->camera;
-    struct cut cut = {.view = view,
-                      .whole = whole,
-                      .face = image,
-                      .closed = spl_panorama_is_closed(panorama),
-                      .fine = camera->fx > finer_than * panorama->across};
+    bool closed = spl_panorama_is_closed(panorama);
     *image = *whole;
     image->width = camera->width;
     image->height = camera->height;
     image->pixels = spl_alloc((size_t)camera->width * camera->height, 4, err);
-    if (image->pixels)
-        spl_parallel_for(0, camera->height, 32, cut_rows, &cut);
-    return image->pixels ? SPL_OK : SPL_E_NOMEM;
+    uint8_t(*texels)[4] = image->pixels;
+    for (uint32_t y = 0; texels && y < camera->height; y++)
+        for (uint32_t x = 0; x < camera->width; x++) {
+            double place[2];
+            uint8_t *texel = texels[(size_t)y * camera->width + x];
+            if (spl_panorama_place(panorama, camera, (double[2]){x + 0.5, y + 0.5}, place))
+                sample(whole, closed, place, texel);
+            if (texel[0] <= black && texel[1] <= black && texel[2] <= black)
+                texel[3] = 0; /* what a panorama's camera did not take is black */
+        }
+    return texels ? SPL_OK : SPL_E_NOMEM;
 }
 
 void spl_photo_whole_finish(struct spl_photo_whole *whole)
@@ -206,4 +146,19 @@ int spl_photo_image_load(const struct spl_named_view *view, struct spl_image *ou
     int rc = spl_photo_image_load_of(&whole, view, out, err);
     spl_photo_whole_finish(&whole);
     return rc;
+}
+
+int spl_photo_image_load_whole(const struct spl_named_view *view, struct spl_image *out, struct spl_error *err)
+{
+    *out = (struct spl_image){0};
+    int rc = load_inner(view, out, err);
+    if (rc) {
+        spl_image_finish(out);
+        return rc;
+    }
+    uint8_t(*texels)[4] = out->pixels;
+    for (size_t i = 0; i < (size_t)out->width * out->height; i++)
+        if (texels[i][0] <= black && texels[i][1] <= black && texels[i][2] <= black)
+            texels[i][3] = 0;
+    return SPL_OK;
 }

@@ -22,6 +22,9 @@ void spl_photo_whole_finish(struct spl_photo_whole *whole);
  * of another one. Blocks. */
 int spl_photo_image_load_of(struct spl_photo_whole *whole, const struct spl_named_view *view, struct spl_image *out,
                             struct spl_error *err);
+/* The whole panorama that the view is a face of, of which black is transparent. */
+int spl_photo_image_load_whole(const struct spl_named_view *view, struct spl_image *out, struct spl_error *err);
+
 int spl_photo_image_load(const struct spl_named_view *view, struct spl_image *out, struct spl_error *err);
 
 #endif

@@ -42,6 +42,8 @@ static int check_file(const struct spl_named_view *view, struct spl_error *err)
 {
     struct spl_image_info info;
     const struct spl_camera *camera = &view->camera;
+    if (!view->photograph)
+        return spl_fail_field(err, SPL_E_INPUT, "color", "%s: is a place without a photograph", view->name);
     int rc = spl_photo_image_get_info(view, &info, err);
     if (!rc && (info.width != camera->width || info.height != camera->height))
         rc = spl_fail_field(err, SPL_E_INPUT, "width",

@@ -165,6 +165,7 @@ static void what_is_wrong_is_named(void **state)
         {"{\"name\": \"a\", \"color\": \"s.jpg\", \"position\": [0, 0, 0], \"quaternion\": [0, 0, 0, 0]}",
          "quaternion", "no rotation"},
         {"{\"name\": \"a\", " POSE "}", "color", "no color"},
+        {"{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 0]}", "rotation", "no rotation"},
         {"{\"name\": \"a\", \"color\": \"s.jpg\", \"faces\": {}, " POSE "}", "color", "leave one out"},
         {"{\"name\": \"a\", \"color\": 7, " POSE "}", "color", "must be the path"},
         {"{\"name\": \"a\", \"color\": \"none.jpg\", " POSE "}", "", "no such file"},

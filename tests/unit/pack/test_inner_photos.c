@@ -203,51 +203,6 @@ static void what_a_panorama_does_not_show_lends_no_colour(void **state)
     assert_int_equal(spl_photo_image_load(&view, &image, NULL), SPL_E_NOT_FOUND);
 }
 
-/* A wave of four pixels across a panorama: faces at its own pixels blur it, those of twice as many show it whole. */
-static void finer_faces_keep_what_is_fine(void **state)
-{
-    static uint8_t texels[height][width][4];
-    struct spl_image image = {
-        .layer = SPL_LAYER_COLOR, .type = SPL_PIXEL_RGBA8, .width = width, .height = height, .pixels = texels};
-    const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
-    struct spl_inner_photograph inner = {.path = path, .is_panorama = true, .width = width, .height = height};
-    struct spl_named_view view = {.photograph = path, .inner = &inner};
-    struct spl_encoded png;
-    double worst[2] = {0};
-    (void)state;
-    for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++) {
-            uint8_t level = (uint8_t)lround(128 + 100 * cos(M_PI / 2 * (x + 0.5)));
-            memcpy(texels[y][x], (uint8_t[4]){level, level, level, 255}, 4);
-        }
-    assert_int_equal(spl_image_encode(&image, &options, &png, NULL), 0);
-    FILE *out = fopen(path, "wb");
-    assert_non_null(out);
-    assert_int_equal(fwrite(png.bytes, 1, png.length, out), png.length);
-    fclose(out);
-    spl_encoded_finish(&png);
-    inner.panorama = (struct spl_panorama){.width = width,
-                                           .height = height,
-                                           .across = width / (2 * M_PI),
-                                           .down = height / M_PI,
-                                           .horizon = height / 2.0};
-    spl_panorama_face(2, inner.panorama.rotation); /* the back, where the columns begin again */
-    for (uint32_t finer = 1; finer <= 2; finer++) {
-        uint32_t side = 82 * finer;
-        view.camera = (struct spl_camera){
-            .width = side, .height = side, .fx = side / 2.0, .fy = side / 2.0, .cx = side / 2.0, .cy = side / 2.0};
-        assert_int_equal(spl_photo_image_load(&view, &image, NULL), 0);
-        const uint8_t(*row)[4] = (const uint8_t(*)[4])image.pixels + (size_t)side / 2 * side;
-        for (uint32_t x = 0; x < side; x++) {
-            double place[2];
-            assert_true(spl_panorama_place(&inner.panorama, &view.camera, (double[2]){x + 0.5, side / 2 + 0.5}, place));
-            worst[finer - 1] = fmax(worst[finer - 1], fabs(row[x][0] - (128 + 100 * cos(M_PI / 2 * place[0]))));
-        }
-        spl_image_finish(&image);
-    }
-    assert_true(worst[0] > 25 && worst[1] < 14);
-}
-
 static int remove_file(void **state)
 {
     (void)state;
@@ -263,7 +218,6 @@ int main(void)
         cmocka_unit_test(the_size_that_the_file_says_must_be_the_images),
         cmocka_unit_test(a_panorama_is_read_once_for_its_faces),
         cmocka_unit_test(what_a_panorama_does_not_show_lends_no_colour),
-        cmocka_unit_test(finer_faces_keep_what_is_fine),
     };
     snprintf(path, sizeof path, "/tmp/splatd-test-inner-%ld", (long)getpid());
     return cmocka_run_group_tests(tests, NULL, remove_file);

