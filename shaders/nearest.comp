@@ -31,14 +31,14 @@ void draw(splat_run run, splat s)
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
-        distance = trim(rule, sample_at, z, distance);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             precise float bent = z + d.margin * distance;
             uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
-            if (wins(at, bits))
-                put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
-                              : GROUP == SPL_SUMS_MAPPED ? payload | bend_code(z, bent) << 24
-                                                         : payload);
+            SPL_WHERE(wins(at, bits))
+                if (!is_trimmed(rule, sample_at, z))
+                    put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
+                                  : GROUP == SPL_SUMS_MAPPED ? payload | bend_code(z, bent) << 24
+                                                             : payload);
         }
         next_sample(d, sample_at);
         if (sample_at.y > d.last.y)

@@ -23,11 +23,13 @@ void draw(splat_run run, splat s)
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, at, z, offset));
-        if (trim(rule, at, z, distance) < 1.0 && at.y <= d.last.y) {
+        if (distance < 1.0 && at.y <= d.last.y) {
             precise float pushed = z + d.margin;
             uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
-            if (bits < imageLoad(depth_texels, int(index)).x) /* what it reads may be old, never too near */
-                atomicMin(depth[index], bits);
+            /* What it reads may be old, never too near. */
+            SPL_WHERE(bits < imageLoad(depth_texels, int(index)).x)
+                if (!is_trimmed(rule, at, z))
+                    atomicMin(depth[index], bits);
         }
         next_sample(d, at);
         if (at.y > d.last.y)

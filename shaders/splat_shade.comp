@@ -6,7 +6,9 @@
  *   normal  x y z w         of w * (127 n + 127.5)
  *   id      least dataset index among the discs that set the depth, in the id buffer
  * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture
- * there; with SPL_SUMMED too, interpolated in the sums that splat_sum.comp made. */
+ * there; with SPL_SUMMED too, interpolated in the sums that splat_sum.comp made.
+ * With SPL_TRIMS, for chunks that a map trims: what was trimmed is what would have been nearer than the depth pass says;
+ * beside the surface itself nothing is. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -18,7 +20,6 @@
 #else
 #include "common/clip.glsl"
 #endif
-#include "common/trim.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 #ifdef SPL_TEXTURED
@@ -83,7 +84,6 @@ void draw(splat_run run, splat s)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s, run.low, run.high);
     clip_line line = load_clip(run.chunk, s);
-    trim_rule rule = load_trim(s);
 #ifdef SPL_TEXTURED
     splat_texture t = load_texture(run.chunk, s, value);
     lay_texture(t, run.chunk, s, gl_GlobalInvocationID.x / SPL_LANES * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);
@@ -93,7 +93,6 @@ void draw(splat_run run, splat s)
         float z;
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
-        distance = trim(rule, sample_at, z, distance);
         uint at = image_sample_index(sample_at);
         if (distance < 1.0 && sample_at.y <= d.last.y) {
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
@@ -101,8 +100,12 @@ void draw(splat_run run, splat s)
             if (z <= first)
                 value = sample_texture(t, offset);
 #endif
+            precise float pushed = z + d.margin;
+#ifdef SPL_TRIMS
+            z = pushed < first ? 3e38 : z;
+#endif
             if (z <= first)
-                shade(at, first, z, distance, z + d.margin, value, run.chunk.first_id + s.index);
+                shade(at, first, z, distance, pushed, value, run.chunk.first_id + s.index);
         }
         next_sample(d, sample_at);
         if (sample_at.y > d.last.y)

@@ -23,10 +23,10 @@ trim_rule load_trim(splat s)
     return rule;
 }
 
-/* The squared distance of a sample of view depth z: 1 and more where the station's ranges around the fragment all lie
- * behind it, further than ranges of one surface differ (spl_map_code_of_range() of a larger range is larger, that of no
- * return the largest, and unknown the least). */
-float trim(trim_rule rule, ivec2 at, float z, float distance)
+/* Does a sample of view depth z lie where the station's ranges around it are all behind it, further than ranges of one
+ * surface differ (spl_map_code_of_range() of a larger range is larger, that of no return the largest, and unknown the
+ * least)? */
+bool is_trimmed(trim_rule rule, ivec2 at, float z)
 {
     float range;
     vec3 d = map_look(map_point(view_point(at, z)), range);
@@ -34,8 +34,11 @@ float trim(trim_rule rule, ivec2 at, float z, float distance)
     uvec4 codes = map_range_codes(polar_chart(d), along);
     precise float tolerance = rule.tolerance + map_slant(map_facing(rule.normal, d), range);
     float least = float(min(min(codes.x, codes.y), min(codes.z, codes.w)));
-    return least > map_code(range + tolerance) ? 1.0 : distance;
+    return least > map_code(range + tolerance);
 }
+
+/* A body behind `if` costs software drivers what it costs where some lane is on; a loop of no rounds costs nothing. */
+#define SPL_WHERE(condition) for (bool once = (condition); once; once = false)
 
 #else
 
@@ -50,10 +53,12 @@ trim_rule load_trim(splat s)
     return rule;
 }
 
-float trim(trim_rule rule, ivec2 at, float z, float distance)
+bool is_trimmed(trim_rule rule, ivec2 at, float z)
 {
-    return distance;
+    return false;
 }
+
+#define SPL_WHERE(condition) if (condition)
 
 #endif
 #endif

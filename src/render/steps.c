@@ -22,6 +22,9 @@
 
 enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
 
+/* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
+enum { mapped_samples = 1 << 20 };
+
 struct spl_frame_steps {
     const struct spl_dataset *dataset;
     struct spl_view wanted, view; /* as asked for; as rendered, with at least one sample a pixel */
@@ -112,12 +115,13 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     const struct spl_view *view = &steps->view;
     const struct spl_method_row *method = spl_method_row(view->method);
     bool mapped = spl_dataset_get_info(steps->dataset)->maps && spl_view_get_maps(view) & SPL_MAP_COLORS;
+    uint64_t samples = job->renderer->scratch.samples;
     job->tiling.reach = (struct spl_reach){.align = 1, .apron = method->apron + (mapped ? 1 : 0)}; // normals look so far
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
     if (!rc)
-        rc = spl_tiling_init(&job->tiling, view, job->renderer->scratch.samples, err);
+        rc = spl_tiling_init(&job->tiling, view, mapped && samples > mapped_samples ? mapped_samples : samples, err);
     steps->prepared = !rc;
     return rc;
 }

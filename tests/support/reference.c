@@ -225,7 +225,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
                 continue;
             float p[3];
             view_point(s, x, y, z, p);
-            if (d->trims && reference_map_trims(d->trims, p, d->n, d->radius))
+            if (!(sums(s) && shade) && d->trims && reference_map_trims(d->trims, p, d->n, d->radius))
                 continue;
             struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
             float pushed = z + margin;
@@ -239,7 +239,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
                     at->first = pushed;
                 continue;
             }
-            if (z > at->first)
+            if (z > at->first || pushed < at->first) /* the latter was trimmed */
                 continue;
             if (pushed == at->first && d->id < at->id)
                 at->id = d->id;
