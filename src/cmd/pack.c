@@ -289,7 +289,7 @@ static const struct spl_cmd_option options[] = {
     {"maps", "DIR", "such a folder, whose colours are taken into the maps after they were edited",
      SPL_CMD_TEXT(struct arguments, maps.edits)},
     {"prune", "N",
-     "about one of N splats stays for good, 2 to 1000, where a coarser one is as good; best with maps, whose colours stay "
+     "about one of N splats stays for good, where a coarser one is as good; best with maps, whose colours stay "
      "as fine as they are", .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},

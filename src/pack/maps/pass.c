@@ -434,6 +434,17 @@ static void name_nowhere(void *context, const struct spl_named_view *view, doubl
         p->options->refused(p->options->context, &why);
 }
 
+/* Pictures that somebody named, of which none stands where the scan has a station, are those of another scan. */
+static int check_any(const struct pass *p, struct spl_error *err)
+{
+    if (!p->views->count || p->report->refused < p->report->pictures || p->options->find)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_INPUT, "panoramas",
+                          "%s: none of its %u pictures stands within half a metre of a station of the scan: are they of "
+                          "this scan, and their poses in its coordinates? --panoramas scan takes the scan's own colours",
+                          p->options->panoramas, p->report->pictures);
+}
+
 int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view_list *views,
                    const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
                    struct spl_error *err)
@@ -446,7 +457,7 @@ int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view
     int rc = open_files(options->maps, &p.edits, &p.out, err);
     if (rc || (rc = spl_splats_init(&p.splats, dataset, err)) ||
         (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
-        (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
+        (rc = check_any(&p, err)) || (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
         (rc = check_pictures(&p, err)) || (rc = prune(&p, dataset, options->prune, err)))
         goto done;
     about = json_pack("{s:i}", "pictures", (int)(report->pictures - report->refused));

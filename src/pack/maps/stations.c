@@ -245,7 +245,9 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_splats *sp
     if (!rc && !stations->count)
         rc = spl_fail_field(err, SPL_E_INPUT, "panoramas",
                             "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
-                            "is no panorama; name one by --panoramas");
+                            "is no panorama; name one by --panoramas, or a panoramas.json that says the place alone: "
+                            "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
+                            "\"quaternion\": [1, 0, 0, 0]}]}");
     if (!rc)
         rc = place_views(&p, views, metre, nowhere, context, err);
     if (!rc && !(stations->of = spl_alloc_raw(splats->count, sizeof *stations->of, err)))
