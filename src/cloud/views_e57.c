@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/memory.h"
+#include "base/reading.h"
 #include "cloud/e57/document.h"
 #include "cloud/view_list.h"
 #include "geom/quaternion.h"
@@ -271,7 +272,7 @@ int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct s
     struct spl_source source;
     struct spl_e57_pages pages = {0};
     if (!inner->at)
-        return (*file = fopen(inner->path, "rbe")) ? SPL_OK
+        return (*file = spl_open_for_reading(inner->path)) ? SPL_OK
                : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", inner->path)
                                  : spl_fail_errno(err, errno, "%s: cannot be opened", inner->path);
     int rc = spl_source_open(&source, inner->path, err);

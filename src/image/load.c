@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "base/memory.h"
+#include "base/reading.h"
 #include "image/decode.h"
 
 static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {
@@ -76,7 +77,7 @@ static int load(FILE *file, const char *path, struct spl_image *out, struct spl_
 
 static int open_file(const char *path, FILE **file, struct spl_error *err)
 {
-    *file = fopen(path, "rbe");
+    *file = spl_open_for_reading(path);
     return *file             ? SPL_OK
            : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path)
                              : spl_fail_errno(err, errno, "%s: cannot be opened", path);

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <cmocka.h>
 #include <turbojpeg.h>
@@ -64,6 +65,13 @@ static void what_is_no_image_is_refused(void **state)
     struct spl_image image;
     struct spl_error err = {0};
     assert_int_equal(spl_image_load("/nowhere/a.png", SPL_LAYER_COLOR, &image, &err), SPL_E_NOT_FOUND);
+    char pipe[sizeof path + 5];
+    snprintf(pipe, sizeof pipe, "%s.pipe", path);
+    assert_int_equal(mkfifo(pipe, 0600), 0);
+    alarm(10); /* a pipe that nobody writes to keeps nobody waiting */
+    assert_int_equal(spl_image_load(pipe, SPL_LAYER_COLOR, &image, NULL), SPL_E_INPUT);
+    alarm(0);
+    unlink(pipe);
     assert_non_null(strstr(err.message, "/nowhere/a.png"));
     assert_int_equal(spl_image_load("/tmp", SPL_LAYER_COLOR, &image, NULL), SPL_E_INPUT);
     put("", 0);

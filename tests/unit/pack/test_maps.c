@@ -601,7 +601,7 @@ static void a_pruned_room_has_the_same_map(void **state)
     assert_int_equal(pack_room(path_of("room.ptx"), path_of("none.spld"), &maps, 2, &report, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "prune");
     for (int with = 0; with < 2; with++) {
-        struct spl_dataset *dataset, *whole;
+        struct spl_dataset *dataset = NULL, *whole = NULL;
         err = (struct spl_error){0};
         prune = 10;
         if (pack_room(path_of("room.ptx"), path_of("pruned.spld"), with ? &maps : NULL, 2, &report, &err) ||
