@@ -53,7 +53,8 @@ class Daemon:
         self.process = subprocess.Popen(
             [binary, *(["serve"] if binary == REAL else []), "--listen", "127.0.0.1:0",
              *([] if "--ops-listen" in args else ["--ops-listen", "127.0.0.1:0"]), *args, *datasets],
-            stderr=subprocess.PIPE, text=True, errors="backslashreplace", preexec_fn=preexec,
+            # a thousand lines at once, of which a pipe of the usual size would lose some, maybe "ready"
+            stderr=subprocess.PIPE, pipesize=1 << 20, text=True, errors="backslashreplace", preexec_fn=preexec,
             env={**os.environ, **{k: str(v) for k, v in environment.items()}})
         self.lines, self.port, self.ops_port, self.code = [], None, None, None
         ready = queue.Queue()
