@@ -75,7 +75,8 @@ static void put_list(const char *name, const char *const *images, size_t count)
     for (size_t i = 0; i < count; i++)
         sprintf(json + strlen(json), "%s{\"name\": \"p%zu\", \"color\": \"%s\", \"position\": [%zu, 0, 0], "
                                      "\"quaternion\": [1, 0, 0, 0]}", i ? "," : "", i, images[i], i);
-    put(name, strcat(json, "]}"), strlen(json) + 2);
+    strcat(json, "]}");
+    put(name, json, strlen(json));
 }
 
 /* One scan; with an image of an E57 file's own kinds where `image` says one. */
