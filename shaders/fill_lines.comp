@@ -5,7 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
-#include "common/splat.glsl"
+#include "common/piece.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
@@ -18,20 +18,13 @@ uint payload(spl_draw_chunk chunk, splat vertex)
     }
     if (GROUP == SPL_SUMS_NORMAL)
         return pack_normal(vertex.normal);
-    return chunk.first_id + vertex.index;
+    return identity(SPL_DRAWN_LINE, chunk.first_id + vertex.index);
 }
 
-/* How much of the way from end `at` of a piece to the other one lies beyond the planes near and far. */
-float beyond(float at, float other)
+/* Along the image axis on which the piece is longer, sample by sample. */
+void draw(piece cut, uvec2 payloads)
 {
-    precise float share = (clamp(at, frame.near, frame.far) - at) / (other - at);
-    return at < frame.near || at > frame.far ? share : 0.0;
-}
-
-/* Along the image axis on which the piece is longer, sample by sample. `middle` is the share of the way from `from` to
- * `to`, in space, up to which it is the first payload's. */
-void draw_piece(vec3 from, vec3 to, float middle, uvec2 payloads)
-{
+    vec3 from = cut.from, to = cut.to;
     precise vec2 a = vec2(frame.fx * (from.x / from.z) + frame.cx, frame.fy * (from.y / from.z) + frame.cy);
     precise vec2 b = vec2(frame.fx * (to.x / to.z) + frame.cx, frame.fy * (to.y / to.z) + frame.cy);
     bool upright = abs(b.y - a.y) > abs(b.x - a.x);
@@ -53,23 +46,11 @@ void draw_piece(vec3 from, vec3 to, float middle, uvec2 payloads)
             uint at = image_sample_index(upright ? ivec2(row, k) : ivec2(k, row));
             uint bits = (floatBitsToUint(z) & ~SPL_FILL_DEPTH_BITS) | SPL_FILL_LINEAR;
             if (wins(at, bits))
-                put(at, bits, t * w1 * z < middle ? payloads.x : payloads.y);
+                put(at, bits, t * w1 * z < cut.middle ? payloads.x : payloads.y);
         }
         if (++k > to_k)
             break;
     }
-}
-
-/* The piece between the planes. */
-void draw(spl_draw_chunk chunk, splat a, splat b)
-{
-    vec3 p = a.position, q = b.position;
-    float skip = beyond(p.z, q.z), rest = beyond(q.z, p.z);
-    precise vec3 from = p + skip * (q - p), to = q + rest * (p - q);
-    from.z = clamp(p.z, frame.near, frame.far);
-    to.z = clamp(q.z, frame.near, frame.far);
-    precise float middle = (0.5 - skip) / (1.0 - skip - rest);
-    draw_piece(from, to, middle, uvec2(payload(chunk, a), payload(chunk, b)));
 }
 
 void main()
@@ -77,10 +58,10 @@ void main()
     load_frame();
     splat_run run = load_run_of(gl_GlobalInvocationID.x / SPL_RUN_SPLATS);
     uint i = run.first + gl_GlobalInvocationID.x % SPL_RUN_SPLATS;
-    if (i >= run.end || i + 1u >= bitfieldExtract(run.chunk.count, 0, SPL_COUNT_BITS) || !is_linear(run.chunk, i))
+    if (i >= run.end || !is_piece(run, i))
         return;
     splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL);
     splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL);
-    if (max(a.position.z, b.position.z) > frame.near && min(a.position.z, b.position.z) < frame.far)
-        draw(run.chunk, a, b);
+    if (is_between(a.position, b.position))
+        draw(cut_piece(a.position, b.position), uvec2(payload(run.chunk, a), payload(run.chunk, b)));
 }

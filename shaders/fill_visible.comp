@@ -158,5 +158,5 @@ void main()
         open -= sqrt(q / (q + 1.0));
     }
     bool visible = open >= frame.fill_threshold;
-    planes[frame.fill_from + i] = visible || (own != 0u && frame.fill_keep != 0u) ? own : SPL_FILL_HOLE;
+    planes[frame.fill_from + i] = visible || (own != 0u && (frame.flags & SPL_FRAME_KEEP) != 0u) ? own : SPL_FILL_HOLE;
 }

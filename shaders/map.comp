@@ -14,9 +14,9 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint BENT = 0;
 
-layout(std430, binding = SPL_STORAGE_ENTRIES) readonly buffer cell_buffer { uint cells[]; };
 layout(std430, binding = SPL_STORAGE_SUMS) writeonly buffer sums_buffer { float sums[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_SURFACE) surface_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_ENTRIES) cell_texels; /* column | row << 16 */
 
 /* View depth of sample `at` of the tile; 0 where it holds nothing. */
 float surface_depth(ivec2 at)
@@ -58,7 +58,7 @@ float seen_share(vec3 chart, float range, float tolerance)
 void main()
 {
     load_frame();
-    uint cell = cells[frame.first_entry + gl_WorkGroupID.x], lane = gl_LocalInvocationID.x;
+    uint cell = imageLoad(cell_texels, int(frame.first_entry + gl_WorkGroupID.x)).x, lane = gl_LocalInvocationID.x;
     ivec2 own = ivec2(cell & 0xffffu, cell >> 16) * SPL_MAP_CELL + ivec2(lane % SPL_MAP_CELL, lane / SPL_MAP_CELL);
     ivec2 at = own - tile_corner();
     float z = surface_depth(at);
@@ -78,7 +78,7 @@ void main()
     /* Discs are pushed back by as much of their radius. */
     uint index = sample_index(at);
     float first = uintBitsToFloat(depth_word(index));
-    precise float radius = max(first - z, 0.0) / (max(frame.margin, 1e-6) * slant);
+    precise float radius = max(first - z, 0.0) / (max(frame.margin, 1.0) * slant);
     precise float tolerance = frame.map_slack + SPL_MAP_TOLERANCE * radius + map_slant(facing, range);
     vec3 chart = polar_chart(d);
     float seen = seen_share(chart, range, tolerance);

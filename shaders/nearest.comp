@@ -1,7 +1,7 @@
 /* Method nearest: each sample keeps the disc whose depth, bent into a cone by as much of the blend margin as the sample
  * lies off the disc's centre, is the least; the least payload among equals. So discs of one surface meet where their
  * cones do, in the middle between their centres, without sums. The payload (constant 0) is what the requested layer
- * needs: colour, octahedral normal, id, the depth that was not bent, or for maps colour and how far it was. */
+ * needs: colour, octahedral normal, id, what it is, the depth that was not bent, or for maps colour and how far it was. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
@@ -16,7 +16,7 @@ void draw(splat_run run, splat s)
 {
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
         return;
-    uint payload = run.chunk.first_id + s.index;
+    uint payload = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
     if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
         uvec3 c = load_color(run.chunk, s.index);
         payload = c.x | c.y << 8 | c.z << 16;
@@ -32,7 +32,7 @@ void draw(splat_run run, splat s)
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
         if (distance < 1.0 && sample_at.y <= d.last.y) {
-            precise float bent = z + d.margin * distance;
+            precise float bent = z + d.margin * distance + d.behind;
             uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
             SPL_WHERE(wins(at, bits))
                 if (!is_trimmed(rule, sample_at, z))
@@ -52,9 +52,9 @@ void main()
     splat_run run = load_splat_run();
     uint i = run.first;
     for (;;) {
-        if (i < run.end)
+        if (has_splat(run, i) && is_drawn(run.chunk, i))
             draw(run, load_splat(run.chunk, i, false));
-        i += SPL_LANES;
+        i += SPL_RUN_STEP;
         if (i >= run.end)
             break;
     }

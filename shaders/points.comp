@@ -1,6 +1,6 @@
 /* Method points: each splat's centre covers the one sample that it falls on; the nearest wins, the least payload among
  * equals. With 64 bit atomics one pass keeps depth << 32 | payload; without, pass 0 finds the depth and pass 1 the
- * payload. The payload (constant 0) is what the requested layer needs: colour, octahedral normal or id. For method fill
+ * payload. The payload (constant 0) is what the requested layer needs: colour, octahedral normal, id or what it is. For method fill
  * (constant 2) the depth's low bits hold the splat's spacing and whether it is linear. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -19,7 +19,7 @@ uint payload(spl_draw_chunk chunk, splat s)
     }
     if (GROUP == SPL_SUMS_NORMAL)
         return pack_normal(s.normal);
-    return chunk.first_id + s.index;
+    return identity(SPL_DRAWN, chunk.first_id + item_of(s.index));
 }
 
 void draw(spl_draw_chunk chunk, splat s)
@@ -45,9 +45,9 @@ void main()
     splat_run run = load_splat_run();
     uint i = run.first;
     for (;;) {
-        if (i < run.end)
+        if (has_splat(run, i))
             draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
-        i += SPL_LANES;
+        i += SPL_RUN_STEP;
         if (i >= run.end)
             break;
     }

@@ -5,6 +5,7 @@
  *   range     the same along the ray
  *   normal    octahedral word of the mean, world axes; SPL_NOTHING = none
  *   id        that of the nearest sample, the least among equals
+ *   primitive the same; 0 = none
  *   coverage  float, share of the samples that hold something */
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -106,7 +107,7 @@ void main()
                 color += RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
             if (LAYER == SPL_RESOLVE_NORMAL)
                 normal += sample_normal(at);
-            if (LAYER == SPL_RESOLVE_ID && bits <= nearest)
+            if ((LAYER == SPL_RESOLVE_ID || LAYER == SPL_RESOLVE_PRIMITIVE) && bits <= nearest)
                 id = bits == nearest ? min(id, payload(at)) : payload(at);
             nearest = min(nearest, bits);
         }
@@ -153,6 +154,8 @@ void main()
         }
     } else if (LAYER == SPL_RESOLVE_ID) {
         value = id;
+    } else if (LAYER == SPL_RESOLVE_PRIMITIVE) {
+        value = covered != 0u ? id : 0u;
     } else {
         value = floatBitsToUint(float(covered) / float(side * side));
     }

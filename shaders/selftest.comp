@@ -75,7 +75,7 @@ void put_frame()
     put(frame.fill_threshold);
     put(frame.fill_levels), put(frame.fill_level);
     put(frame.fill_from), put(frame.fill_to), put(frame.fill_stride);
-    put(frame.fill_keep);
+    put(frame.flags);
     for (int i = 0; i < 12; i++)
         put(frame.map_pose[i]);
     put(frame.map_near), put(frame.map_slack);

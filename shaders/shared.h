@@ -35,8 +35,9 @@
 #define SPL_SUMS_DEPTH 1  /* layers depth and range */
 #define SPL_SUMS_NORMAL 2
 #define SPL_SUMS_ID 3
-#define SPL_SUMS_COUNT 4
-#define SPL_SUMS_MAPPED 4 /* method nearest alone: colours for maps to add to, and how far the depth was bent */
+#define SPL_SUMS_PRIMITIVE 4 /* as ids, of SPL_DRAWN_* */
+#define SPL_SUMS_COUNT 5
+#define SPL_SUMS_MAPPED 5 /* method nearest alone: colours for maps to add to, and how far the depth was bent */
 
 /* Layers of the resolve pass, the values of enum spl_layer. */
 #define SPL_RESOLVE_COLOR 0
@@ -45,6 +46,13 @@
 #define SPL_RESOLVE_NORMAL 3
 #define SPL_RESOLVE_ID 4
 #define SPL_RESOLVE_COVERAGE 5
+#define SPL_RESOLVE_PRIMITIVE 6
+
+/* What is drawn, the values of enum spl_shape; 0 is nothing. */
+#define SPL_DRAWN_SPLAT 1
+#define SPL_DRAWN_LINE 2
+#define SPL_DRAWN_PANEL 3
+#define SPL_DRAWN_MESH 4
 
 /* What the resolve pass finds in a sample. */
 #define SPL_RESOLVED_SUMS 0    /* sums over fragments, as the shade pass leaves them */
@@ -63,6 +71,9 @@
 /* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many
  * sample sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f
+/* A sample that a cell's middle falls on takes the depth of its plane, up to this many sample sizes behind it (a slant
+ * of 88 degrees). */
+#define SPL_CELL_REACH 16.0f
 
 /* Seen at a slant, discs of one surface differ in depth by more than seen square on: by up to 1 / cos for the same
  * error of a normal. The blend margin grows with it, up to this much. */
@@ -110,6 +121,14 @@
 #define SPL_FILL_LEVELS_MAX 8
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
 #define SPL_FILL_SLOPE 4.0f
+
+/* Lines of methods splat and nearest. They cover what lies within so many samples of their axis, however thin they are:
+ * a sample in all, and a thousandth more, for an axis in the middle between two. */
+#define SPL_LINE_THIN 0.5005f
+/* Seen at a slant, a line at the image's edge is up to so many times wider than one in its middle. */
+#define SPL_LINE_SLANT 2.0f
+/* Samples that are looked at for a piece (see SPL_WINDOW); pieces of which there may be more are drawn by windows. */
+#define SPL_LINE_ROUNDS 60000
 
 /* Maps of stations: polar-capped atlases (src/geom/polar.h), as words on the device, of a station's own frame. First the
  * ranges, an atlas of SPL_MAP_RANGE_APRON with two texels a word, the first in its low half:
@@ -167,7 +186,8 @@ struct spl_draw_chunk {
     SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
     SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the tile */
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
-    SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for */
+    SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
+                                             width, metres */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -208,13 +228,47 @@ struct spl_draw_chunk {
 
 #define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
 
+/* Panels: SPL_PANEL_SIDE x SPL_PANEL_SIDE cells of a plane, block by block of 4 x 4. A chunk of them begins with two
+ * words a panel:
+ *   column 0..7, row 8..15 of the panel in the chunk's grid; from bit 16 on: block b (4 row + column) has cells
+ *   where the panel's own words begin, from the chunk's first on (SPL_PANEL_OFFSET_BITS); level of its colours; from
+ *   bit 16 on: block b has all of its cells
+ * Its own words: for each block that has cells but not all of them, in their order, a mask of 16 bits (bit 4 row +
+ * column), two a word from the low end; then its colours, blocks of two words as maps have them: level 0 one for each
+ * block that has cells, in their order; 1 four, a texel of 2 x 2 cells; 2 one, 4 x 4 cells; SPL_PANEL_EVEN and above one
+ * colour, r | g << 8 | b << 16. */
+#define SPL_PANEL_SIDE 16
+#define SPL_PANELS_MAX 32 /* of a chunk */
+#define SPL_RUN_PANELS 8  /* of a draw-list entry: chunk index << 2 | run, as of splats */
+#define SPL_PANEL_OFFSET_BITS 13
+#define SPL_PANEL_EVEN 3
+#define SPL_PANEL_WORDS_MAX 42 /* 2 of the table, 8 of masks, 32 of colours */
+/* geometry_bits: columns 0..7 and rows 8..15 of the chunk's grid, less 1 each; the axis as of discs. */
+#define SPL_PANEL_COLUMNS 0
+#define SPL_PANEL_ROWS 8
+
+/* Meshes: panels with relief, whose surface is a lattice of triangles over the plane. A panel's own words begin with the
+ * heights of its lattice of level k, (2^k + 1)^2 bytes row by row from the low ends of words, the last word filled with
+ * zeros: a byte b is b - SPL_RELIEF_ZERO steps along the plane's normal. A drawn chunk has the step, metres, as
+ * radius_step and k as color_bits. Masks and colours follow as of panels. */
+#define SPL_RELIEF_LEVEL_MAX 3
+#define SPL_RELIEF_ZERO 128
+#define SPL_RELIEF_POINTS(level) (((1 << (level)) + 1) * ((1 << (level)) + 1))
+#define SPL_RELIEF_WORDS(level) ((SPL_RELIEF_POINTS(level) + 3) / 4)
+#define SPL_MESH_WORDS_MAX (SPL_PANEL_WORDS_MAX + SPL_RELIEF_WORDS(SPL_RELIEF_LEVEL_MAX))
+
 /* count: splats 0..7 (1..SPL_CHUNK_SPLATS; 0 = hidden), window 8..31: 0 = the whole tile, else column + 1 (12 bits) and
  * row (12 bits) in a grid of SPL_WINDOW samples a side. A chunk whose discs may be larger than a window is listed once
  * a window: a loop of a software driver's kernel ends after 65535 rounds, whether it is done or not, and one invocation
  * draws SPL_RUN_SPLATS / SPL_LANES discs. */
 #define SPL_COUNT_BITS 8
 #define SPL_WINDOW_BITS 12
-#define SPL_WINDOW 112
+#define SPL_WINDOW 80
+/* Chunks of panels are, where a panel may be wider than this: SPL_LANES invocations draw one. */
+#define SPL_PANEL_WINDOW 320
+/* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of them. */
+#define SPL_MESH_LANES 32
+#define SPL_MESH_WINDOW 112
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
@@ -226,6 +280,10 @@ struct spl_chunk_bounds {
     SPL_U32 first, last; /* occlusion tiles, x | y << 16, inclusive */
     SPL_F32 near;        /* least view depth of its discs; 0 = never occluded (it reaches the eye's plane) */
 };
+
+/* Flags of a frame. */
+#define SPL_FRAME_KEEP 1u  /* fill: samples are visible in any case */
+#define SPL_FRAME_SIDED 2u /* what turns its back to the eye lies behind what faces it */
 
 /* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
 struct spl_frame_params {
@@ -255,7 +313,7 @@ struct spl_frame_params {
     SPL_U32 fill_level;                   /* that this pass makes */
     SPL_U32 fill_from, fill_to;           /* words of its planes */
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
-    SPL_U32 fill_keep;                    /* 1: samples are visible in any case */
+    SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
     SPL_F32 map_near;                     /* range of code 1 */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
@@ -263,10 +321,16 @@ struct spl_frame_params {
 };
 
 #ifndef SPL_GLSL
+_Static_assert(SPL_RUN_PANELS << SPL_RUN_BITS == SPL_PANELS_MAX, "runs of panels");
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
 _Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
-_Static_assert(SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000, "an invocation ends within its rounds");
+_Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000,
+               "an invocation ends within its rounds, of which a sample that may be trimmed takes two");
+_Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE * SPL_PANEL_SIDE / SPL_LANES < 60000,
+               "the same of a panel");
+_Static_assert(2 * SPL_MESH_WINDOW * SPL_MESH_WINDOW * (1 << 2 * SPL_RELIEF_LEVEL_MAX) / SPL_MESH_LANES < 55000,
+               "the same of a mesh, with some for what the rows of its triangles are short of");
 _Static_assert(sizeof(struct spl_frame_params) == 256, "spl_frame_params is 256 bytes on both sides");
 #endif
 

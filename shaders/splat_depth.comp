@@ -24,7 +24,7 @@ void draw(splat_run run, splat s)
         vec3 offset;
         float distance = clip(line, offset, disc_sample(d, at, z, offset));
         if (distance < 1.0 && at.y <= d.last.y) {
-            precise float pushed = z + d.margin;
+            precise float pushed = z + d.margin + d.behind;
             uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
             /* What it reads may be old, never too near. */
             SPL_WHERE(bits < imageLoad(depth_texels, int(index)).x)
@@ -43,9 +43,9 @@ void main()
     splat_run run = load_splat_run();
     uint i = run.first;
     for (;;) {
-        if (i < run.end)
+        if (has_splat(run, i) && is_drawn(run.chunk, i))
             draw(run, load_splat(run.chunk, i, false));
-        i += SPL_LANES;
+        i += SPL_RUN_STEP;
         if (i >= run.end)
             break;
     }

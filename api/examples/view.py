@@ -44,9 +44,14 @@ class RenderOptions(c.Structure):  # struct spl_render_options
     _fields_ = [("size", c.c_size_t), ("images", c.POINTER(Image)), ("image_count", c.c_size_t)]
 
 
+class PickPlane(c.Structure):  # struct spl_pick_plane
+    _fields_ = [("point", real * 3), ("normal", real * 3), ("error_mean", real), ("error_most", real), ("points", u64)]
+
+
 class Pick(c.Structure):  # struct spl_pick
     _fields_ = [("hit", c.c_bool), ("position", real * 3), ("depth", real), ("distance", real), ("normal", real * 3),
-                ("color", c.c_uint8 * 4), ("classification", c.c_int32), ("splat", c.c_int64)]
+                ("color", c.c_uint8 * 4), ("classification", c.c_int32), ("splat", c.c_int64),
+                ("primitive", c.c_int), ("plane", PickPlane)]
 
 
 class Info(c.Structure):  # struct spl_dataset_info, which is lent: only its beginning is declared here

@@ -6,7 +6,7 @@ import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
 import {notices} from "./notice.js";
 import {toWorld} from "./place.js";
-import {Points, coordinates, withUnit} from "./points.js";
+import {Points, coordinates, lengthText, withUnit} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
@@ -75,17 +75,19 @@ function writeLink() {
 }
 
 let opening = 0; // counts calls of open(): the last one wins
+let opened = 0; // the one whose dataset and camera the stage has
 
 /** Opens what the fragment names, else the first dataset that is ready. */
 async function open() {
-  const turn = ++opening;
+  const turn = ++opening,
+    fragment = location.hash;
   try {
     const [{datasets}, {limits, device, tours}] = await Promise.all([
       askJson("/v1/datasets"),
       askJson("/v1/status"),
       loadTable(),
     ]);
-    const wanted = parse(location.hash);
+    const wanted = parse(fragment);
     const ids = datasets.map(({id}) => id);
     const id = wanted.dataset ?? (datasets.find(({state}) => state === "ready") ?? datasets[0])?.id;
     if (!id) throw new Problem("gone", "No dataset is served yet", 5);
@@ -108,7 +110,7 @@ async function open() {
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
     $("about").textContent =
-      `${thousands(dataset.points)} points, ${withUnit(size, dataset.unit)}, ` +
+      `${describeContents(dataset)}, ${withUnit(size, dataset.unit)}, ` +
       `drawn by ${device.name.replace(/ \(.*/, "")}`;
     document.title = `${id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
@@ -116,6 +118,7 @@ async function open() {
     const camera = Object.fromEntries(
       ["eye", "target", "up", "fov"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]),
     );
+    opened = turn;
     stage.open(dataset, camera);
     points.clear();
     tour.open(id);
@@ -127,9 +130,19 @@ async function open() {
   }
 }
 
+/** "10 651 of 998 728 points, maps of 4 stations, of 2 at a time" */
+function describeContents({points, leaf_splats: left, pruned, maps}) {
+  const some = maps && maps.at_once < maps.stations ? `, of ${maps.at_once} at a time` : "";
+  return (
+    (pruned ? `${thousands(left)} of ${thousands(pruned.of)} points` : `${thousands(points)} points`) +
+    (maps ? `, maps of ${thousands(maps.stations)} station${maps.stations === 1 ? "" : "s"}${some}` : "")
+  );
+}
+
 function showFrame({detail: frame}) {
   const distances = ["depth", "range"].includes(stage.settings.layer) && frame.near !== null;
   $("legend").hidden = !distances;
+  $("primitives").hidden = stage.settings.layer !== "primitive";
   const [near, far] = $("legend").querySelectorAll("span");
   if (distances)
     [near.textContent, far.textContent] = [frame.near, frame.far].map((x) =>
@@ -147,7 +160,7 @@ function showFrame({detail: frame}) {
       (dataset.textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
       `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
     : "";
-  writeLink();
+  if (opened === opening) writeLink(); // else it names what comes next
 }
 
 /** [term, text] rows into a <dl>. */
@@ -161,10 +174,26 @@ function fill(list, rows) {
   );
 }
 
+/** As what a point is drawn, and how far off the points are that its panel stands for. */
+function describePrimitive({primitive, plane}) {
+  if (!primitive) return [];
+  const off = plane && [plane.error_mean, plane.error_most].map((x) => lengthText(x, dataset.unit));
+  return [
+    ["drawn as", primitive],
+    ...(plane
+      ? [
+          ["normal", coordinates(plane.normal)],
+          ["points off it", `${off[0]}, at most ${off[1]}`],
+        ]
+      : []),
+  ];
+}
+
 function showPoints({detail}) {
   const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
   if (points.distance !== null) rows.push(["A – B", points.distanceText]);
   fill($("points"), rows);
+  fill($("primitive"), describePrimitive(points.list.at(-1) ?? {}));
   const had = Object.entries(points.list.at(-1)?.attributes ?? {}).filter(([, value]) => value !== null);
   fill(
     $("attributes"),

@@ -22,10 +22,20 @@ export const findMethod = (name) => table.methods.find((method) => method.name =
 export const findParameter = (name) => table.parameters.find((parameter) => parameter.name === name);
 
 /** Does the parameter change what `method` draws of `dataset`? */
-export const counts = ({name, textures, maps}, method, dataset) =>
+export const counts = ({name, textures, maps, primitives}, method, dataset) =>
   Boolean(
-    findMethod(method)?.parameters.includes(name) && (dataset.textures || !textures) && (dataset.maps || !maps),
+    findMethod(method)?.parameters.includes(name) &&
+      (dataset.textures || !textures) &&
+      (dataset.maps || !maps) &&
+      (dataset.primitives || !primitives),
   );
+
+/** What of a view's setting picks take, so that they find what the picture shows: its method, and what changes what is
+ * seen where. */
+export function pickable(setting) {
+  const names = ["method", ...table.parameters.filter(({textures}) => !textures).map(({name}) => name)];
+  return Object.fromEntries(names.filter((name) => name in setting).map((name) => [name, setting[name]]));
+}
 
 /** What draws `dataset` where `method` is asked for. */
 export function offered(method = table.default, dataset) {

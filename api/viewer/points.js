@@ -3,6 +3,7 @@
 // Points are kept in world coordinates and drawn where the newest camera sees them. The third click begins anew.
 
 import {length, project, sub} from "./camera.js";
+import {pickable} from "./methods.js";
 import {askJson, query} from "./service.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -50,7 +51,8 @@ export class Points extends EventTarget {
       size: [width, height],
     } = this.stage;
     const {eye, target, up, fov} = this.stage.params();
-    const found = await askJson(`${dataset.uri}/pick?${query({x, y, eye, target, up, fov, width, height})}`);
+    const drawn = pickable(this.stage.shown?.chosen ?? this.stage.settings);
+    const found = await askJson(`${dataset.uri}/pick?${query({x, y, eye, target, up, fov, width, height, ...drawn})}`);
     return found.position ? found : null;
   }
 

@@ -75,6 +75,7 @@ export class Stage extends EventTarget {
     if (this.flight) this.flight.abort.abort();
     this.dataset = this.shown = null;
     this.canvas.hidden = true;
+    this.element.classList.remove("rest");
   }
 
   /** Puts the camera elsewhere as part of a motion. */

@@ -27,6 +27,8 @@ enum spl_attribute {
     SPL_ATTRIBUTE_LINEAR,
     SPL_ATTRIBUTE_CLIP,    /* clip lines and the mask that says which splats have one */
     SPL_ATTRIBUTE_LINES,   /* chunks of lines, with their headers: wires, poles and cables */
+    SPL_ATTRIBUTE_PANELS,  /* chunks of panels, with their headers: what is flat */
+    SPL_ATTRIBUTE_MESHES,  /* the same of meshes: what is curved, but smooth */
     SPL_ATTRIBUTE_CHUNK,   /* chunk, node and stream headers, spread over the splats */
     SPL_ATTRIBUTE_TEXTURE, /* indices and weights of atoms, their masks and headers */
     SPL_ATTRIBUTE_DICTIONARY,
@@ -49,10 +51,11 @@ struct spl_dataset_info {
     uint64_t page_bytes;       /* bytes that become resident on the GPU when everything is */
     uint64_t dictionary_bytes; /* of them: the textures' atoms, expanded with their mips */
     uint64_t points;           /* read from the sources, before duplicates were dropped */
-    uint64_t leaf_splats;      /* splats of the leaves: the points that were kept */
-    uint64_t splats;           /* leaf splats plus those of the inner levels */
+    uint64_t leaf_splats;      /* the points that were kept: splats of the leaves, and points that their panels and
+                                  meshes stand for */
+    uint64_t splats; /* of the leaves and the inner levels, without what panels and meshes stand for: may be 0 */
     uint64_t pieces;           /* straight pieces of wires, poles and cables, of all levels */
-    uint64_t ids;              /* of splats and of the pieces' vertices: below it */
+    uint64_t ids;              /* of splats, of the pieces' vertices, of panels and meshes: below it */
     uint32_t levels;           /* depth of the octree, 1 = a single node */
     uint64_t nodes, chunks;
     uint32_t pages;
@@ -69,6 +72,9 @@ struct spl_dataset_info {
     char unit[SPL_STREAM_TEXT_MAX]; /* of coordinates: "m", "ft", "us-ft", "unknown" */
     uint32_t maps;                  /* stations with a panorama's map of colours and ranges */
     uint64_t map_texels, map_bytes; /* of all: texels of the colours' finest level; bytes, among page_bytes */
+    uint64_t panels;                /* of all levels */
+    uint64_t panel_points;          /* of the points, those that the leaves' panels stand for */
+    uint64_t meshes, mesh_points;   /* the same of panels with relief, which are not counted as panels */
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are

@@ -16,9 +16,21 @@ enum spl_layer {
     SPL_LAYER_DEPTH,    /* F32, linear depth along the viewing axis, dataset's unit; NaN = nothing there */
     SPL_LAYER_RANGE,    /* F32, length of the ray to the surface; NaN = nothing */
     SPL_LAYER_NORMAL,   /* F32X3, unit, world axes; (0,0,0) = nothing */
-    SPL_LAYER_ID,       /* U32, index of the nearest splat or vertex of a line in the dataset; UINT32_MAX = nothing */
+    SPL_LAYER_ID,       /* U32, index of the nearest splat, panel, mesh or vertex of a line in the dataset; UINT32_MAX =
+                           nothing */
     SPL_LAYER_COVERAGE, /* F32, share of the pixel's samples that hit a surface, 0..1 */
+    SPL_LAYER_PRIMITIVE, /* U32, an enum spl_shape: as what the nearest thing is drawn */
     SPL_LAYER_COUNT
+};
+
+/* What a dataset is drawn as. */
+enum spl_shape {
+    SPL_SHAPE_NONE,  /* nothing is there */
+    SPL_SHAPE_SPLAT, /* a splat: a disc or a point */
+    SPL_SHAPE_LINE,  /* a piece of a line */
+    SPL_SHAPE_PANEL, /* a panel, or one of its cells */
+    SPL_SHAPE_MESH,  /* a panel with relief: a triangle of it, or one of its cells */
+    SPL_SHAPE_COUNT
 };
 
 enum spl_pixel_type { SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32X3, SPL_PIXEL_U32 };
@@ -34,7 +46,8 @@ struct spl_image {
 enum spl_format {
     SPL_FORMAT_JPEG, /* color; float layers through a colour map, a picture for people */
     SPL_FORMAT_PNG, /* color RGBA8; depth and range 16 bit grey, `depth_scale` steps per unit, 0 = nothing; normal RGB8;
-                       id RGBA8 (little-endian bytes of the id); coverage 8 bit grey */
+                       id RGBA8 (little-endian bytes of the id); coverage 8 bit grey; primitive RGB8, a colour for
+                       each: spl_shape_color() */
     SPL_FORMAT_NPY, /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
     SPL_FORMAT_RAW, /* the same bytes without a header, little-endian */
     SPL_FORMAT_WEBP, /* lossy; as JPEG, with the alpha of color; only where it was built in */
@@ -81,6 +94,12 @@ SPL_API const char *spl_layer_name(enum spl_layer layer);
 SPL_API int spl_layer_from_name(const char *name);
 SPL_API const char *spl_format_name(enum spl_format format);
 SPL_API int spl_format_from_name(const char *name);
+
+/* "none", "splat", "line", "panel", "mesh"; static. "unknown" of other numbers. */
+SPL_API const char *spl_shape_name(enum spl_shape shape);
+/* Its colour in pictures of layer primitive, sRGB: apart from the others for colour-blind people, too. Black of none,
+ * white of other numbers. */
+SPL_API void spl_shape_color(enum spl_shape shape, uint8_t rgb[3]);
 
 /* False for a format whose library this build does without. */
 SPL_API bool spl_format_is_built(enum spl_format format);

@@ -60,11 +60,18 @@ enum spl_maps { SPL_MAPS_ON, SPL_MAPS_OFF, SPL_MAPS_COUNT };
 SPL_API const char *spl_maps_name(enum spl_maps maps);
 SPL_API int spl_maps_from_name(const char *name); /* -1 for an unknown name */
 
+/* What of a dataset's primitives is drawn as such by methods that draw discs; the rest of them as discs: lines as those
+ * of their points, panels and meshes as one for each of their cells. Meshes are drawn as such with all. */
+enum spl_shapes { SPL_SHAPES_OFF, SPL_SHAPES_LINES, SPL_SHAPES_PANELS, SPL_SHAPES_ALL, SPL_SHAPES_COUNT };
+SPL_API const char *spl_shapes_name(enum spl_shapes shapes);
+SPL_API int spl_shapes_from_name(const char *name); /* -1 for an unknown name */
+
 /* What a parameter changes. */
 enum spl_param_changes {
-    SPL_CHANGES_SHAPES,   /* what is seen where */
-    SPL_CHANGES_TEXTURES, /* colours alone, and those of datasets with textures */
-    SPL_CHANGES_MAPS,     /* colours and silhouettes, and those of datasets with maps of stations */
+    SPL_CHANGES_SHAPES,     /* what is seen where */
+    SPL_CHANGES_TEXTURES,   /* colours alone, and those of datasets with textures */
+    SPL_CHANGES_MAPS,       /* colours and silhouettes, and those of datasets with maps of stations */
+    SPL_CHANGES_PRIMITIVES, /* what is seen where, and that of datasets with lines or panels */
 };
 
 /* Every parameter of a method, in the order of --help:
@@ -77,6 +84,8 @@ enum spl_param_changes {
     COUNT(atoms, disc.atoms, 0, 8, 8, SPL_CHANGES_TEXTURES, "of a splat's texture at most; 0 = its mean colour")       \
     CHOICE(maps, maps, maps, SPL_MAPS_ON, SPL_CHANGES_MAPS,                                                            \
            "colours and silhouettes from the maps of stations, where there are any")                                   \
+    CHOICE(primitives, shapes, shapes, SPL_SHAPES_ALL, SPL_CHANGES_PRIMITIVES,                                         \
+           "what is drawn as lines, panels and, with all, meshes, where there are any; off: all of it as discs")       \
     CHOICE(visibility, fill.visibility, visibility, SPL_VISIBILITY_ADAPTIVE, SPL_CHANGES_SHAPES,                       \
            "which points are hidden; constant: the whole kernel everywhere, slow; none: removes none")                 \
     REAL(kernel, fill.kernel, 3, 129, 0, SPL_CHANGES_SHAPES,                                                           \

@@ -61,7 +61,8 @@ static inline void spl_photo_options_init(struct spl_photo_options *options)
 struct spl_photo_report {
     uint32_t photographs;      /* whose poses and files could be used */
     uint32_t refused;
-    uint64_t unseen;           /* splats that none of them shows */
+    uint64_t unseen;           /* splats that none of them shows; with panels as large a share of them as of splats
+                                * and cells */
     uint64_t textured;         /* splats whose texture was coded */
     uint32_t texture_size;     /* texels a side, 8, 16 or 32; 0 = no textures */
     uint32_t atoms;            /* of the dictionary */
@@ -95,13 +96,17 @@ static inline void spl_map_options_init(struct spl_map_options *options)
 
 struct spl_map_report {
     uint32_t stations;         /* that have a map; 0 = no maps were made */
-    uint32_t pictures;         /* that were named; so many of them could not be used: */
+    uint32_t pictures;         /* that were named, of a panorama one; so many of them could not be used: */
     uint32_t refused;
     uint32_t side;             /* of the largest: texels a quarter turn */
     uint64_t texels, bytes;    /* of all maps: texels of the finest colours; all that they take */
     double block_psnr;         /* of the blocks, against the colours that they hold, dB */
     double seconds;
+    uint32_t edits, edited;    /* maps that options->edits lists; that took their colours from there */
 };
+
+/* What is said as something else than a disc a point. */
+enum spl_pack_primitives { SPL_PRIMITIVES_OFF, SPL_PRIMITIVES_ALL };
 
 struct spl_pack_options {
     size_t size;               /* spl_pack_options_init() */
@@ -140,8 +145,16 @@ struct spl_pack_options {
     double up[3];
     const struct spl_map_options *maps; /* NULL = none are made */
     /* About one of so many leaf splats stays, where maps show their colours and surfaces are plain; more of them where
-     * splats of a coarser level lose shape. 2..1000; 0 and 1 = all stay. */
+     * splats of a coarser level lose shape. Two cells of panels count as a splat. 2..1000; 0 and 1 = all stay. */
     uint32_t prune;
+    /* Metres that a primitive may be off the points that it stands for; 0 = from the scan's noise and spacing. More
+     * only with primitives. */
+    double error;
+    /* What is flat becomes panels, what bends smoothly meshes. Not with points_only. */
+    enum spl_pack_primitives primitives;
+    /* Where planes, meshes and lines are written besides, as polygons, triangles and polylines (api/primitives.md): a
+     * name that ends in .ply, .obj or .dxf; only with primitives. NULL = nowhere. */
+    const char *export_primitives;
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
@@ -165,13 +178,15 @@ struct spl_pack_report {
     uint64_t part_of; /* points of all scans, where options->max_points left some out; else 0 */
     struct spl_map_report maps;
     uint64_t pruned_of; /* leaf splats of which leaf_splats are left; 0 = all are */
+    uint64_t panels, panel_points, meshes, mesh_points; /* as in struct spl_dataset_info */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,
  * rename: a crash leaves the old file or none). With photographs or maps the dataset is first written beside `output`,
- * removed as soon as it is open again, and then written with their colours, with maps once more. Blocks; uses options->threads threads
- * and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for each point on a wire, a pole
- * or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any thread. */
+ * removed as soon as it is open again, and then written with their colours, with maps once more. Blocks; uses
+ * options->threads threads and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for
+ * each point on a wire, a pole or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any
+ * thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 SPL_END_DECLARATIONS

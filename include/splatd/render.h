@@ -33,6 +33,7 @@ struct spl_view {
                                    for them. A dataset's first page is waited for in any case */
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
+    enum spl_shapes shapes;     /* the same */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,
@@ -191,6 +192,15 @@ SPL_API int spl_renderer_render_with(struct spl_renderer *renderer, const struct
                                      const struct spl_view *view, const struct spl_render_options *options,
                                      struct spl_frame *frame, struct spl_error *err);
 
+/* The plane that a panel lies on. */
+struct spl_pick_plane {
+    double point[3];   /* of it, world */
+    double normal[3];  /* unit, world axes, away from the surface */
+    double error_mean; /* distance of the points to it that it was found in: root of the mean square, and the most */
+    double error_most;
+    uint64_t points;   /* that its panels stand for in their part of the dataset */
+};
+
 /* What lies under one point of a view. */
 struct spl_pick {
     bool hit;            /* false: the rest is zero */
@@ -200,7 +210,10 @@ struct spl_pick {
     double normal[3];    /* unit, world axes; (0,0,0) = none is known */
     uint8_t color[4];    /* of the splats, without textures */
     int32_t classification; /* of the nearest splat; -1 = the dataset has none */
-    int64_t splat;       /* its index in the dataset; -1 = none is known */
+    int64_t splat;       /* its index in the dataset, or that of a panel, mesh or vertex of a line; -1 =
+                            none is known */
+    enum spl_shape primitive;    /* as what it is drawn; SPL_SHAPE_NONE where `splat` is -1 */
+    struct spl_pick_plane plane; /* of a panel; zero of others */
 };
 
 /* Picks point (x, y) of the view's image, pixels from its left upper corner, so that a pixel's middle is at .5. One

@@ -1,5 +1,6 @@
-/* Clip lines: where discs at silhouettes and creases end; src/dataset/chunk_clip.c is the decoding in C. For chunks
- * that have any there is another kernel (constant 2), so that the others do not pay for them. */
+/* Clip lines: where discs at silhouettes and creases end; src/dataset/chunk_clip.c is the decoding in C. And discs that
+ * are not drawn, since lines stand for them. For chunks that have any there is another kernel (constant 2), so that the
+ * others do not pay for them. */
 #ifndef SPL_CLIP_GLSL
 #define SPL_CLIP_GLSL
 
@@ -33,11 +34,17 @@ clip_line load_clip(spl_draw_chunk chunk, splat s)
     vec3 u, v;
     tangent_frame(s.world_normal, u, v);
     precise vec3 across = (d.x * u + d.y * v) * inverse;
-    bool has = (mask >> bit & 1u) != 0u;
+    bool has = (mask >> bit & 1u) != 0u && chunk.color_bits >> SPL_COLOR_CLIP != 0u;
     line.direction = has ? rotate_to_view(across) : vec3(0.0);
     uint end = bitfieldExtract(code, SPL_CLIP_DIRECTION_BITS, SPL_CLIP_OFFSET_BITS);
     line.end = has ? float(end) * (1.0 / float(1 << SPL_CLIP_OFFSET_BITS)) / chunk.texture_scale : 1.0;
     return line;
+}
+
+/* Is disc `index` drawn? The others' chunk is the only one whose linear discs are marked. */
+bool is_drawn(spl_draw_chunk chunk, uint index)
+{
+    return CLIPPED == 0u || !is_linear(chunk, index);
 }
 
 /* The squared distance of a sample that lies `offset` off the centre: 1 and more beyond the line. No comparison: see

@@ -15,6 +15,7 @@ struct disc {
     vec2 center;       /* samples */
     float depth;       /* of the centre */
     float margin;      /* metres that the disc is pushed back for blending */
+    float behind;      /* metres that its back is pushed back besides, so that what faces the eye wins */
     /* With uv = sample - centre: the plane is hit at depth k, k = 1 / (1 + slope . uv) (never behind the eye: there the
      * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth /
      * radius. */
@@ -73,6 +74,7 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     d.pitch = pitch;
     d.scale = scale;
     d.margin = margin;
+    d.behind = facing > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? s.radius : 0.0;
     return d;
 }
 

@@ -1,5 +1,5 @@
-/* Means of payloads of method points: colours and normals are averaged, an id is the nearest's. GROUP is the kernel's
- * constant 0. */
+/* Means of payloads of method points: colours and normals are averaged, an id is the nearest's, as is what it is. GROUP
+ * is the kernel's constant 0. */
 #ifndef SPL_PAYLOAD_GLSL
 #define SPL_PAYLOAD_GLSL
 

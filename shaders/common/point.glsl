@@ -12,6 +12,8 @@
 layout(constant_id = 0) const uint GROUP = SPL_SUMS_COLOR;
 layout(constant_id = 1) const uint PASS = 0;
 
+#include "common/drawn.glsl"
+
 #ifdef SPL_ATOMICS_64
 layout(std430, binding = SPL_STORAGE_DEPTH) coherent buffer depth_buffer { uint64_t depth[]; };
 #else

@@ -3,6 +3,7 @@
 #ifndef SPL_POLAR_GLSL
 #define SPL_POLAR_GLSL
 
+#include "common/block.glsl"
 #include "common/frame.glsl"
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_MAP) map_texels;
@@ -146,32 +147,18 @@ uint map_range_words()
     return 3u * (side + SPL_MAP_RANGE_APRON) * (side + 2u * SPL_MAP_RANGE_APRON);
 }
 
-vec3 map_color_565(uint c)
-{
-    uint r = c >> 11 & 31u, g = c >> 5 & 63u, b = c & 31u;
-    return vec3(r << 3 | r >> 2, g << 2 | g >> 4, b << 3 | b >> 2);
-}
-
 /* Texel `at` of a level whose blocks, `across` a row, begin at word `first`: 0..255. */
 vec3 map_texel(uint first, uint across, uvec2 at)
 {
-    uint block = first + 2u * ((at.y >> 2) * across + (at.x >> 2)), ends = map_word(block);
-    uint code = map_word(block + 1u) >> 2u * ((at.y & 3u) * 4u + (at.x & 3u)) & 3u;
-    float share = code == 0u ? 0.0 : code == 1u ? 1.0 : float(code - 1u) * (1.0 / 3.0);
-    vec3 a = map_color_565(ends & 65535u), b = map_color_565(ends >> 16);
-    precise vec3 color = a + (b - a) * share;
-    return color;
+    uint block = first + 2u * ((at.y >> 2) * across + (at.x >> 2));
+    return block_color(map_word(block), map_word(block + 1u), (at.y & 3u) * 4u + (at.x & 3u));
 }
 
 /* Words before level `level` of the colours, from the end of the ranges on. */
 uint map_level_word(uint level)
 {
-    uint words = 0u, side = map_side();
-    for (uint l = 0u; l < SPL_MAP_LEVELS_MAX - 1u; l++) {
-        uint own = side >> l;
-        words += l < level ? 6u * (own + SPL_MAP_APRON) * (own + 2u * SPL_MAP_APRON) / 8u : 0u;
-    }
-    return words;
+    uint side = map_side(), own = side >> level;
+    return (side - own) * (side + own + 18u) + 24u * level; /* the sum of 6 (side + apron) (side + 2 apron) / 8 */
 }
 
 /* The colour there, interpolated in level `level` (a whole number). */

@@ -1,4 +1,5 @@
-/* One splat of the draw list, decoded into view space. The arithmetic of src/dataset/chunk_decode.c, in floats. */
+/* One splat of the draw list, decoded into view space. The arithmetic of src/dataset/chunk_decode.c, in floats. With
+ * SPL_PANELS the entries are of panels, with SPL_CELL_LANES too splats are their cells: cells.glsl. */
 #ifndef SPL_SPLAT_GLSL
 #define SPL_SPLAT_GLSL
 
@@ -15,6 +16,12 @@ struct splat {
     float radius;
     uint index;    /* within the chunk */
 };
+
+#ifdef SPL_PANELS
+#define SPL_RUN_ITEMS SPL_RUN_PANELS
+#else
+#define SPL_RUN_ITEMS SPL_RUN_SPLATS
+#endif
 
 /* A run of splats of one chunk: what an invocation draws every SPL_LANES-th splat of. */
 struct splat_run {
@@ -125,9 +132,9 @@ splat_run load_run_of(uint entry)
     if (entry < frame.entries) {
         uint packed_entry = draw_entries[frame.first_entry + entry];
         r.chunk = load_chunk(packed_entry >> SPL_RUN_BITS);
-        uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_SPLATS;
+        uint first = (packed_entry & ((1u << SPL_RUN_BITS) - 1u)) * SPL_RUN_ITEMS;
         r.first = first;
-        r.end = min(first + SPL_RUN_SPLATS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
+        r.end = min(first + SPL_RUN_ITEMS, bitfieldExtract(r.chunk.count, 0, SPL_COUNT_BITS));
         uint column = bitfieldExtract(r.chunk.count, SPL_COUNT_BITS, SPL_WINDOW_BITS);
         uint row = r.chunk.count >> (SPL_COUNT_BITS + SPL_WINDOW_BITS);
         vec2 corner = vec2(tile_corner()), end = vec2(tile_end());
@@ -136,6 +143,14 @@ splat_run load_run_of(uint entry)
     }
     return r;
 }
+
+#ifdef SPL_CELL_LANES
+#include "common/cells.glsl"
+#elif !defined(SPL_PANELS)
+
+/* Invocations step through a run by so much. */
+#define SPL_RUN_STEP SPL_LANES
+#define SPL_DRAWN SPL_DRAWN_SPLAT
 
 /* The invocation's run, from its own first splat on. */
 splat_run load_splat_run()
@@ -218,4 +233,17 @@ uvec3 load_color(spl_draw_chunk chunk, uint index)
     return uvec3(ivec3(v + g, g, u + g) & 255);
 }
 
+/* Is there a splat at step i of the run? */
+bool has_splat(splat_run r, uint i)
+{
+    return i < r.end;
+}
+
+/* Its id within the chunk. */
+uint item_of(uint index)
+{
+    return index;
+}
+
+#endif
 #endif

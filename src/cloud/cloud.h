@@ -92,7 +92,7 @@ struct spl_cloud_info {
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
     const struct spl_cloud_image *images; /* borrowed until destroy */
     char version[48];                     /* of the format, and its kind: "1.4, point format 7"; "" = it has none */
-    double bounds[2][3];                  /* least and most of the coordinates, as the header says, which may be wrong */
+    double bounds[2][3]; /* least and most of the coordinates, as the header says, which may be wrong */
     bool has_bounds;                      /* it does */
 };
 

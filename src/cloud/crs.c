@@ -1,5 +1,5 @@
-/* What the ways of naming a coordinate system have in common: numbers held against units, the text that a dataset keeps,
- * and what users say. Pure but for the file that a user names; any thread. */
+/* What the ways of naming a coordinate system have in common: numbers held against units, the text that a dataset
+ * keeps, and what users say. Pure but for the file that a user names; any thread. */
 #include "cloud/crs.h"
 
 #include <ctype.h>
@@ -117,8 +117,8 @@ int spl_crs_read_option(const char *text, struct spl_cloud_coordinates *crs, str
         return spl_fail_field(err, rc, "crs", "--crs %.120s: %s", text, why.message);
     return rc == SPL_E_NOT_FOUND
                ? spl_fail_field(err, SPL_E_USAGE, "crs",
-                                "--crs takes EPSG and a number, such as EPSG:25832, a file that holds WKT, or none; there "
-                                "is no file %.120s",
+                                "--crs takes EPSG and a number, such as EPSG:25832, a file that holds WKT, or none; "
+                                "there is no file %.120s",
                                 text)
                : spl_fail_field(err, rc, "crs", "--crs: %s", why.message);
 }

@@ -7,8 +7,8 @@
 
 enum { SPL_CRS_TEXT_MAX = 1 << 16 }; /* bytes of WKT */
 
-/* What a text says, in place of what `crs` says, whose precision stays: `length` bytes, or up to a NUL. SPL_E_INPUT with
- * the byte and the reason, crs untouched, for what is no WKT, is not closed, or holds no system. Any thread. */
+/* What a text says, in place of what `crs` says, whose precision stays: `length` bytes, or up to a NUL. SPL_E_INPUT
+ * with the byte and the reason, crs untouched, for what is no WKT, is not closed, or holds no system. Any thread. */
 int spl_crs_read_wkt(const char *text, size_t length, struct spl_cloud_coordinates *crs, struct spl_error *err);
 
 /* Contents of the three GeoTIFF records; NULL and 0 where there is none. */

@@ -1,7 +1,7 @@
 /* What coordinates of each EPSG number are in: where a header gives a number, it need not say the unit, and a foot that
- * is taken for a metre shows nowhere. From EPSG's register, release 10.076: projected, geographic, compound and vertical
- * systems whose first axis is in something else than metres. A row stands for first, first + step, … up to last, and
- * numbers that the register does not have may lie between. Pure functions; any thread. */
+ * is taken for a metre shows nowhere. From EPSG's register, release 10.076: projected, geographic, compound and
+ * vertical systems whose first axis is in something else than metres. A row stands for first, first + step, … up to
+ * last, and numbers that the register does not have may lie between. Pure functions; any thread. */
 #include "cloud/crs.h"
 
 struct run {

@@ -1,6 +1,6 @@
-/* GeoTIFF's keys, in the records of LAS files: entries of 8 bytes behind a head of 8, each a number, where its value lies
- * (0: in the entry itself), how many there are, and the value or its place. Nothing that is odd refuses points: it counts
- * as not said. Pure functions; any thread. */
+/* GeoTIFF's keys, in the records of LAS files: entries of 8 bytes behind a head of 8, each a number, where its value
+ * lies (0: in the entry itself), how many there are, and the value or its place. Nothing that is odd refuses points: it
+ * counts as not said. Pure functions; any thread. */
 #include <endian.h>
 #include <math.h>
 #include <stdio.h>

@@ -97,7 +97,8 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
         bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed"), crs = !strcmp(name, "crs");
         if (!number && !flag && !crs && strcmp(name, reader->list))
             return spl_fail_field(err, SPL_E_INPUT, name,
-                                  "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name, reader->list);
+                                  "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name,
+                                  reader->list);
         if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
             return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name,
                                                           "fps must be a number above 0, up to 1000, not %g",

@@ -218,7 +218,8 @@ int spl_panoramas_load(struct spl_view_list *list, const char *path, const struc
         return SPL_E_NOMEM;
     bool folder = !stat(path, &status) && S_ISDIR(status.st_mode);
     static const char *const models[] = {"panoramas.json", "cameras.bin", "cameras.txt", "camera-intrinsics.txt",
-                                         "sparse/0/cameras.bin", "sparse/0/cameras.txt"};
+                                         "sparse/0/cameras.bin", "sparse/0/cameras.txt", "sparse/cameras.bin",
+                                         "sparse/cameras.txt", "0/cameras.bin", "0/cameras.txt"};
     bool known = !folder;
     for (size_t i = 0; i < sizeof models / sizeof *models; i++)
         known |= has(path, models[i]);
@@ -226,8 +227,8 @@ int spl_panoramas_load(struct spl_view_list *list, const char *path, const struc
                  ? spl_view_list_load_photographs(list, below, options, err)
              : known ? spl_view_list_load_photographs(list, path, options, err)
                      : spl_fail(err, SPL_E_NOT_FOUND,
-                                "%s: holds no panoramas.json and no COLMAP model; images need poses "
-                                "(api/photographs.md)",
+                                "%s: holds no panoramas.json, which says where each image was taken "
+                                "(api/panoramas.md has one to start from), and no COLMAP model",
                                 path);
     free(below);
     return rc;

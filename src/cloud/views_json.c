@@ -97,8 +97,9 @@ static int read_own(struct spl_view_list *list, const char *path, const json_t *
     int rc = SPL_OK;
     if (!json_is_array(views))
         return spl_fail_field(err, SPL_E_INPUT, "views",
-                              "%s: a list of views is {\"views\": [{\"name\": …, \"camera\": {…}}]}; views is %s", path,
-                              spl_json_type_name(views));
+                              "%s: a list of views is {\"views\": [{\"name\": …, \"camera\": {…}}]}, one of panoramas "
+                              "{\"panoramas\": [{\"name\": …, \"color\": …}]}; views is %s",
+                              path, spl_json_type_name(views));
     for (size_t i = 0; !rc && i < json_array_size(views); i++) {
         struct spl_error why = {0};
         rc = add_own(list, path, json_array_get(views, i), photographs, &why);
@@ -112,6 +113,14 @@ static bool is_image(const char *text, size_t length)
     return length > 8 && (!memcmp(text, "\xff\xd8\xff", 3) || !memcmp(text, "\x89PNG\r\n\x1a\n", 8));
 }
 
+static bool begins_json(const char *text, size_t length)
+{
+    size_t i = 0;
+    while (i < length && strchr(" \t\r\n", text[i]) && text[i])
+        i++;
+    return i < length && (text[i] == '{' || text[i] == '[');
+}
+
 int spl_view_list_load_json(struct spl_view_list *list, const char *path,
                             const struct spl_photograph_options *photographs, struct spl_error *err)
 {
@@ -120,13 +129,19 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
     json_t *document = NULL;
     json_error_t where;
     int rc = read_all(path, &text, &length, err);
+    size_t mark = length >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0; /* as editors on Windows put before UTF-8 */
     if (!rc && is_image(text, length))
         rc = spl_fail(err, SPL_E_INPUT,
-                      "%s: is an image, which says no pose: name a list of images with their poses (api/photographs.md)",
+                      "%s: is an image, which says no pose: name the panoramas.json that does (api/panoramas.md has "
+                      "one to start from)",
+                      path);
+    else if (!rc && !begins_json(text + mark, length - mark))
+        rc = spl_fail(err, SPL_E_INPUT,
+                      "%s: is no JSON, as lists of views and panoramas are (api/photographs.md has what is read)",
                       path);
     if (rc)
         goto done;
-    document = json_loadb(text, length, JSON_REJECT_DUPLICATES, &where);
+    document = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
     if (!document)
         rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", path, where.line, where.column,
                       where.text);

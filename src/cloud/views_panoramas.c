@@ -6,7 +6,8 @@
  * "rotation", row-major, turns the panorama's axes (x to the middle of the image, y to the left of it, z up) into the
  * world's; "quaternion" [w, x, y, z] says the same. "elevation" [lowest, highest] in degrees is what the rows of a cut
  * image reach over. "faces" {"front": …, "left", "back", "right", "up", "down"} stands for "color"; where that is
- * null, a station took no picture. "width" and "height" are held against the file; what else an entry has is not looked at. Any thread; no state. */
+ * null, a station took no picture. "width" and "height" are held against the file; what else an entry has is not looked
+ * at. Any thread; no state. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -136,14 +137,14 @@ static int read_pose(struct entry *e, struct spl_error *err)
         if ((rc = spl_json_get_matrix(rotation, "rotation", 3, 3, SPL_ROW_MAJOR, e->rotation, err)))
             return rc;
         double turn = determinant(e->rotation);
-        if (!(turn > 0))
+        if (turn < 0)
             return spl_fail_field(err, SPL_E_INPUT, "rotation",
                                   "rotation has the determinant %.3g: it mirrors the panorama; it must be 1", turn);
         struct spl_camera face;
         static const double upright[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, origin[3];
-        if (make_face(e->rotation, origin, upright, face_side_min, &face, NULL))
+        if (!(turn > 0) || make_face(e->rotation, origin, upright, face_side_min, &face, NULL))
             return spl_fail_field(err, SPL_E_INPUT, "rotation",
-                                  "rotation, of determinant %.3g, is no rotation (scaled or sheared)", turn);
+                                  "rotation, of determinant %.3g, is no rotation (scaled, sheared or flat)", turn);
         return SPL_OK;
     }
     if ((rc = spl_json_get_matrix(quaternion, "quaternion", 1, 4, SPL_ROW_MAJOR, q, err)))
@@ -217,6 +218,27 @@ static int read_elevation(const struct entry *e, double degrees[2], struct spl_e
     return rc;
 }
 
+static int refuse_height(const char *file, const uint32_t size[2], const double degrees[2], double height,
+                         struct spl_error *err)
+{
+    if (degrees[1] - degrees[0] < 180)
+        return spl_fail_field(err, SPL_E_INPUT, "height",
+                              "%s has %u x %u pixels; one so wide whose elevation is %g to %g degrees has %.0f rows, "
+                              "as rows are as high as columns are wide",
+                              file, size[0], size[1], degrees[0], degrees[1], height);
+    if (size[1] > height)
+        return spl_fail_field(err, SPL_E_INPUT, "height",
+                              "%s has %u x %u pixels; an equirectangular panorama is twice as wide as high, %u x %.0f: "
+                              "is it two of them, of a stereo camera, or stretched? Cut or scale it",
+                              file, size[0], size[1], size[0], height);
+    double span = 180 * size[1] / height;
+    return spl_fail_field(err, SPL_E_INPUT, "height",
+                          "%s has %u x %u pixels; a whole equirectangular panorama is twice as wide as high, "
+                          "%u x %.0f. Of one that is cut above or below say which degrees its rows reach over, "
+                          "\"elevation\": [lowest, highest]: %.4g degrees in all, [%.4g, %.4g] where both are cut alike",
+                          file, size[0], size[1], size[0], height, span, -span / 2, span / 2);
+}
+
 static int add_sphere(const struct entry *e, const json_t *color, char **file, struct spl_error *err)
 {
     uint32_t size[2];
@@ -226,12 +248,11 @@ static int add_sphere(const struct entry *e, const json_t *color, char **file, s
         return rc;
     double span = degrees[1] - degrees[0], height = size[0] * span / 360, off = fabs(size[1] - height);
     bool whole = span == 180;
+    if (height < 1)
+        return spl_fail_field(err, SPL_E_INPUT, "width", "%s has %u x %u pixels, too few for a panorama", *file, size[0],
+                              size[1]);
     if (off > off_px && (whole || off > off_share * height))
-        return spl_fail_field(err, SPL_E_INPUT, "height",
-                              "%s has %u x %u pixels; %s is %u x %.0f%s", *file, size[0], size[1],
-                              whole ? "an equirectangular panorama" : "one of that elevation", size[0], height,
-                              whole ? ": of one that is cut above or below say its \"elevation\": [lowest, highest]"
-                                    : "");
+        return refuse_height(*file, size, degrees, height, err);
     struct spl_inner_photograph inner = {.path = *file, .is_panorama = true, .width = size[0], .height = size[1]};
     inner.panorama = (struct spl_panorama){.width = size[0],
                                            .height = size[1],
@@ -248,6 +269,17 @@ static int add_sphere(const struct entry *e, const json_t *color, char **file, s
                                                               .panorama = e->number,
                                                               .photographs = e->photographs},
                                    err);
+}
+
+#define FACES "front, left, back, right, up, down"
+
+static bool is_face(const char *key)
+{
+    double axes[9];
+    bool known = false;
+    for (unsigned face = 0; face < SPL_PANORAMA_FACES; face++)
+        known |= !strcmp(key, spl_panorama_face(face, axes));
+    return known;
 }
 
 static int add_cube(const struct entry *e, const json_t *faces, char **file, struct spl_error *err)
@@ -282,10 +314,15 @@ static int add_cube(const struct entry *e, const json_t *faces, char **file, str
         if (!rc)
             e->list->views[e->list->count - 1].panorama = e->number;
     }
-    if (!rc && (!known || known != json_object_size(faces)))
-        rc = spl_fail_field(err, SPL_E_INPUT, "faces",
-                            "faces has %zu members that are none of front, left, back, right, up, down, and %zu that are",
-                            json_object_size(faces) - known, known);
+    if (!rc && known == json_object_size(faces))
+        return known ? SPL_OK : spl_fail_field(err, SPL_E_INPUT, "faces", "faces is empty; it takes " FACES);
+    const char *key;
+    json_t *value;
+    json_object_foreach((json_t *)faces, key, value)
+    {
+        if (!rc && !is_face(key))
+            rc = spl_fail_field(err, SPL_E_INPUT, "faces", "faces has '%.60s', which is none of " FACES, key);
+    }
     return rc;
 }
 
@@ -312,9 +349,10 @@ static int add_entry(struct entry *e, char **file, struct spl_error *err)
     if (json_is_null(color) && !faces)
         return add_place(e, err);
     if (!color == !faces)
-        return spl_fail_field(err, SPL_E_INPUT, "color",
-                              color ? "has a color and faces: leave one out"
-                                    : "has no color (the path of an equirectangular image; null: a place alone) and no faces");
+        return spl_fail_field(
+            err, SPL_E_INPUT, "color",
+            color ? "has a color and faces: leave one out"
+                  : "has no color (the path of an equirectangular image; null: a place alone) and no faces");
     return color ? add_sphere(e, color, file, err) : add_cube(e, faces, file, err);
 }
 

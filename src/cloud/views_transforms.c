@@ -49,13 +49,25 @@ static int get_model(const json_t *document, const json_t *frame, struct spl_dis
                           name, spl_colmap_model_names);
 }
 
+/* Its panoramas have no lens. */
+static int refuse_panorama(const json_t *document, const json_t *frame, struct spl_error *err)
+{
+    const char *model = json_string_value(get(document, frame, "camera_model"));
+    if (!model || strcmp(model, "EQUIRECTANGULAR"))
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_UNSUPPORTED, "camera_model",
+                          "camera_model EQUIRECTANGULAR is a panorama, which panoramas.json takes; api/panoramas.md "
+                          "says how to make that of this file");
+}
+
 static int get_lens(const json_t *document, const json_t *frame, struct spl_camera *camera,
                     struct spl_distortion *distortion, struct spl_error *err)
 {
     static const char *const k[] = {"k1", "k2", "k3", "k4"}, *const p[] = {"p1", "p2"};
     double w = 0, h = 0, angle = NAN;
     int rc;
-    if ((rc = get_real(document, frame, "w", 0, &w, err)) || (rc = get_real(document, frame, "h", 0, &h, err)) ||
+    if ((rc = refuse_panorama(document, frame, err)) || (rc = get_real(document, frame, "w", 0, &w, err)) ||
+        (rc = get_real(document, frame, "h", 0, &h, err)) ||
         (rc = get_real(document, frame, "camera_angle_x", NAN, &angle, err)))
         return rc;
     const double limit = spl_view_list_limits.side_px, size[2] = {w, h};

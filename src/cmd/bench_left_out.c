@@ -1,5 +1,5 @@
-/* splatd bench --left-out: what textures gain on photographs that a dataset was packed without. A table to stdout, the
- * pictures into a folder where one is given. */
+/* splatd bench --left-out: what textures, or maps of stations, gain on photographs that a dataset was packed without. A
+ * table to stdout, the pictures into a folder where one is given. */
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
@@ -125,8 +125,9 @@ static int run(const struct arguments *a, struct spl_error *err)
     int rc = spl_view_list_load_photographs(&list, a->cameras, &how, err);
     if (rc || (rc = spl_dataset_open_whole(a->dataset, true, &dataset, err)))
         goto done;
-    if (!spl_dataset_get_info(dataset)->atoms) {
-        rc = spl_fail(err, SPL_E_INPUT, "%s has no textures whose gain could be measured: pack it with --cameras",
+    if (!spl_dataset_get_info(dataset)->atoms && !spl_dataset_get_info(dataset)->maps) {
+        rc = spl_fail(err, SPL_E_INPUT,
+                      "%s has no textures or maps whose gain could be measured: pack it with --cameras or --panoramas",
                       a->dataset);
         goto done;
     }
@@ -168,10 +169,9 @@ const struct spl_cmd_table spl_cmd_bench_left_out_table = {
     .command = "bench --left-out",
     .before =
         "usage: splatd bench --left-out NAME.spld --cameras MODEL [--images DIR] [--lod L] [--device D] [-o OUT]\n\n"
-        "Photographs that packing did not have: renders from their poses, with textures and without, by the width of\n"
-        "splats: as they are, with exposure matched, with the means of blocks of 16x16 pixels made equal, and with "
-        "each\n"
-        "block moved by up to 2 pixels to where it fits best.\n"
+        "Photographs that packing did not have: renders from their poses, with textures or maps of stations and\n"
+        "without, by the width of splats: as they are, with exposure matched, with the means of blocks of 16x16\n"
+        "pixels made equal, and with each block moved by up to 2 pixels to where it fits best.\n"
         "  splatd bench --left-out hall.spld --cameras colmap/left-out -o hall-left-out\n\n",
     .options = options,
     .count = sizeof options / sizeof *options,

@@ -39,7 +39,8 @@ static int take_verify(void *arguments, const char *option, char *text, struct s
 static const struct spl_cmd_option options[] = {
     {"json", NULL, "one JSON object a line", SPL_CMD_FLAG(struct arguments, json)},
     {"dictionary", "PNG", "where the picture goes; one dataset with textures", SPL_CMD_TEXT(struct arguments, picture)},
-    {"columns", "LIST", "of text scans: x y z r g b intensity class nx ny nz -", SPL_CMD_TEXT(struct arguments, columns)},
+    {"columns", "LIST", "of text scans: x y z r g b intensity class nx ny nz -",
+     SPL_CMD_TEXT(struct arguments, columns)},
     {"verify", NULL, "check the pages' checksums too, read all points of scans (default)", .take = take_verify},
     {"no-verify", NULL, "trust the pages, and of scans the header; everything else is always checked",
      SPL_CMD_FLAG(struct arguments, no_verify)},
@@ -51,8 +52,8 @@ static const struct spl_cmd_table table = {
         "usage: splatd info [--json] [--no-verify] [--dictionary PNG] [--columns LIST] NAME.spld|SCAN…\n\n"
         "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
         "histogram of bits that the scene needed. Every section's checksum is verified first.\n"
-        "Of scans (also folders of them and @LISTs, as pack takes them): format, points, attributes, coordinate system,\n"
-        "bounds, stations, and what pack would make of them, without packing.\n\n"
+        "Of scans (also folders of them and @LISTs, as pack takes them): format, points, attributes, coordinates,\n"
+        "bounds, stations, panoramas, and what pack would make of them, without packing.\n\n"
         "A table to read:\n"
         "  splatd info courtyard.spld\n"
         "A scan, before it is packed:\n"
@@ -102,6 +103,19 @@ static void print_maps(const struct spl_info_report *report)
         printf(" to %u", most);
     printf(", %s texels, %s bytes (%.3f a texel)\n", spl_cmd_group(info->map_texels, b),
            spl_cmd_group(info->map_bytes, c), (double)info->map_bytes / (double)info->map_texels);
+}
+
+/* Those of coarser levels stand for the same points once more. */
+static void print_panels(const struct spl_info_report *report, enum spl_chunk_kind kind)
+{
+    const struct spl_dataset_info *info = report->info;
+    char a[32], b[32];
+    if (report->items[kind])
+        printf("  %s        %s for %s points (%.2f %%), %.1f kB; points off them %.3g %s, %.3g at most\n",
+               spl_chunk_get_codec(kind)->name, spl_cmd_group(report->items[kind], a),
+               spl_cmd_group(report->points[kind], b),
+               100.0 * (double)report->points[kind] / (double)info->leaf_splats, (double)report->bytes[kind] / 1e3,
+               spl_info_error_mean(report, kind), spl_unit_word(info), report->error_most[kind]);
 }
 
 /* Photographs first: they have taken the place of the others, of which only the sum that is left is known. */
@@ -184,16 +198,20 @@ static void print_table(const struct spl_info_report *report)
         printf("  pruned        of %s points\n", spl_cmd_group((uint64_t)json_integer_value(pruned), a));
     if (whole)
         printf("  a part of     %s points of the sources\n", spl_cmd_group((uint64_t)json_integer_value(whole), a));
-    printf("  splats        %s: %s points and %s for coarser levels (%.1f %%)\n", spl_cmd_group(info->splats, a),
-           spl_cmd_group(info->leaf_splats, b), spl_cmd_group(info->splats - info->leaf_splats, c),
-           100.0 * (double)(info->splats - info->leaf_splats) / (double)info->leaf_splats);
+    uint64_t discs = info->leaf_splats - info->panel_points - info->mesh_points;
+    printf("  splats        %s: %s points and %s for coarser levels", spl_cmd_group(info->splats, a),
+           spl_cmd_group(discs, b), spl_cmd_group(info->splats - discs, c));
+    if (discs)
+        printf(" (%.1f %%)", 100.0 * (double)(info->splats - discs) / (double)discs);
+    printf("\n");
     printf("  attributes    %s", info->has_color ? "color" : "no color");
     uint32_t streams;
     const struct spl_stream *stream = spl_dataset_get_streams(report->dataset, &streams);
     for (uint32_t s = 0; s < streams; s++)
         print_stream(&stream[s]);
     printf("\n");
-    print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"), info->leaf_splats);
+    print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"),
+                 pruned ? (uint64_t)json_integer_value(pruned) : info->leaf_splats);
     if (info->maps)
         print_maps(report);
     printf("  surface       %s\n", info->has_surface ? "normals and radii" : "none (packed with --points-only)");
@@ -201,8 +219,10 @@ static void print_table(const struct spl_info_report *report)
            100.0 * (double)report->linear / (double)info->leaf_splats);
     printf("  lines         %s pieces between them, %.1f kB\n", spl_cmd_group(info->pieces, a),
            (double)report->bytes[SPL_CHUNK_LINES] / 1e3);
+    print_panels(report, SPL_CHUNK_PANELS);
+    print_panels(report, SPL_CHUNK_MESHES);
     printf("  clip lines    %s splats (%.2f %%)\n", spl_cmd_group(report->clips, a),
-           100.0 * (double)report->clips / (double)info->splats);
+           100.0 * (double)report->clips / fmax((double)info->splats, 1));
     printf("  bounds        %.10g %.10g %.10g to\n                %.10g %.10g %.10g\n", info->bounds_min[0],
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
     printf("  unit          %s\n", info->unit);
@@ -213,15 +233,29 @@ static void print_table(const struct spl_info_report *report)
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
     printf("  splat radius  %.4g %s (median)\n", info->splat_radius, spl_unit_word(info));
-    printf("  pages         %s, %.1f MB resident\n\n", spl_cmd_group(info->pages, a), (double)info->page_bytes / 1e6);
+    printf("  pages         %s, %.1f MB resident", spl_cmd_group(info->pages, a),
+           (double)(info->page_bytes - info->map_bytes) / 1e6);
+    if (info->maps)
+        printf(", %.1f MB with all maps", (double)info->page_bytes / 1e6);
+    printf("\n\n");
 
-    printf("  %-6s%12s%14s%16s%12s%12s\n", "level", "nodes", "chunks", "splats", "pieces", "spacing");
+    printf("  %-6s%12s%14s%16s%12s", "level", "nodes", "chunks", "splats", "pieces");
+    if (info->panels)
+        printf("%12s", "panels");
+    if (info->meshes)
+        printf("%12s", "meshes");
+    printf("%12s\n", "spacing");
     for (uint32_t level = 0; level < report->level_count; level++) {
         const struct spl_info_level *l = &report->levels[level];
-        printf("  %-6u%12s%14s%16s%12s%12.4g\n", level, spl_cmd_group(l->nodes, a), spl_cmd_group(l->chunks, b),
-               spl_cmd_group(l->splats, c), spl_cmd_group(l->pieces, d), l->spacing);
+        printf("  %-6u%12s%14s%16s%12s", level, spl_cmd_group(l->nodes, a), spl_cmd_group(l->chunks, b),
+               spl_cmd_group(l->splats, c), spl_cmd_group(l->pieces, d));
+        if (info->panels)
+            printf("%12s", spl_cmd_group(l->panels, a));
+        if (info->meshes)
+            printf("%12s", spl_cmd_group(l->meshes, a));
+        printf("%12.4g\n", l->spacing);
     }
-    printf("\n  bytes a splat\n");
+    printf("\n  bytes a %s\n", spl_info_has_primitives(info) ? "point" : "splat");
     int name_width = 14;
     for (uint32_t s = 0; s < streams; s++)
         name_width = (int)strlen(stream[s].name) > name_width ? (int)strlen(stream[s].name) : name_width;

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "dataset/chunk_clip.h"
+#include "dataset/panels.h"
 
 const struct spl_info_code spl_info_codes[SPL_INFO_CODES] = {
     {"position_axis",
@@ -39,6 +40,23 @@ static void gather_widths(struct spl_info_report *report, const struct spl_table
         report->widths[SPL_INFO_CODES + s][tables->width[s][index]] += share;
 }
 
+static void gather_leaf_chunk(struct spl_info_report *report, const struct spl_chunk *chunk)
+{
+    uint32_t kind = spl_chunk_kind(chunk);
+    report->points[kind] += kind == SPL_CHUNK_DISCS ? chunk->count : 0;
+    if (!spl_kind_has_panels(kind))
+        return;
+    double mean = (double)spl_panels_get_error_mean(chunk);
+    report->points[kind] += spl_panels_get_points(chunk);
+    report->error_squares[kind] += mean * mean * spl_panels_get_points(chunk);
+    report->error_most[kind] = fmax(report->error_most[kind], (double)spl_panels_get_error_most(chunk));
+}
+
+double spl_info_error_mean(const struct spl_info_report *report, enum spl_chunk_kind kind)
+{
+    return sqrt(report->error_squares[kind] / fmax((double)report->points[kind], 1));
+}
+
 static void gather_node(struct spl_info_report *report, const struct spl_node *node, const struct spl_chunk *chunks)
 {
     uint32_t depth = node->depth < SPL_INFO_LEVELS_MAX ? node->depth : SPL_INFO_LEVELS_MAX - 1;
@@ -47,10 +65,14 @@ static void gather_node(struct spl_info_report *report, const struct spl_node *n
     level->nodes++;
     level->chunks += node->chunk_count;
     for (uint32_t c = 0; c < node->chunk_count; c++) {
-        uint32_t splats = spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS ? chunks[c].count : 0;
-        level->splats += splats;
+        uint32_t kind = spl_chunk_kind(&chunks[c]), count = chunks[c].count;
+        level->splats += kind == SPL_CHUNK_DISCS ? count : 0;
         level->pieces += spl_chunk_count_pieces(&chunks[c]);
-        level->spacing += (double)node->spacing * splats;
+        level->panels += kind == SPL_CHUNK_PANELS ? count : 0;
+        level->meshes += kind == SPL_CHUNK_MESHES ? count : 0;
+        level->spacing += kind == SPL_CHUNK_LINES ? 0 : (double)node->spacing * count;
+        if (!node->child_count)
+            gather_leaf_chunk(report, &chunks[c]);
     }
 }
 
@@ -82,8 +104,10 @@ int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *da
         gather_page(report, tables);
         free(read);
     }
-    for (uint32_t i = 0; i < report->level_count; i++)
-        report->levels[i].spacing /= fmax((double)report->levels[i].splats, 1);
+    for (uint32_t i = 0; i < report->level_count; i++) {
+        struct spl_info_level *level = &report->levels[i];
+        level->spacing /= fmax((double)(level->splats + level->panels + level->meshes), 1);
+    }
     int rc = spl_dataset_count_linear(dataset, &report->linear, err);
     return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
 }
@@ -103,7 +127,7 @@ double spl_info_bytes_per_splat(const struct spl_dataset_info *info, int attribu
 {
     uint64_t bits = attribute < SPL_ATTRIBUTE_COUNT ? info->attribute_bits[attribute]
                                                     : info->streams[attribute - SPL_ATTRIBUTE_COUNT].bits;
-    return (double)bits / 8 / (double)info->splats;
+    return (double)bits / 8 / (double)(spl_info_has_primitives(info) ? info->leaf_splats : info->splats);
 }
 
 double spl_info_total_bytes_per_splat(const struct spl_dataset_info *info)
@@ -154,13 +178,33 @@ static json_t *maps_to_json(const struct spl_info_report *report)
 /* Bytes with the chunks' headers. */
 static json_t *kinds_to_json(const struct spl_info_report *report)
 {
+    static const char *const item_names[SPL_CHUNK_KINDS] = {"splats", "pieces", "panels", "meshes"};
     json_t *kinds = json_object();
     for (uint32_t kind = 0; kind < SPL_CHUNK_KINDS; kind++)
         json_object_set_new(kinds, spl_chunk_get_codec(kind)->name,
                             json_pack("{s:I, s:I, s:I}", "chunks", (json_int_t)report->chunks[kind],
-                                      kind == SPL_CHUNK_LINES ? "pieces" : "splats", (json_int_t)report->items[kind],
+                                      item_names[kind], (json_int_t)report->items[kind],
                                       "bytes", (json_int_t)report->bytes[kind]));
     return kinds;
+}
+
+static json_t *panels_to_json(const struct spl_info_report *report, enum spl_chunk_kind kind)
+{
+    return json_pack("{s:I, s:I, s:I, s:f, s:f}", "count", (json_int_t)report->items[kind], "points",
+                     (json_int_t)report->points[kind], "bytes", (json_int_t)report->bytes[kind], "error_mean",
+                     spl_info_error_mean(report, kind), "error_most", report->error_most[kind]);
+}
+
+/* What is said as something else than a splat a point. */
+static json_t *primitives_to_json(const struct spl_info_report *report)
+{
+    json_t *packed = json_object_get(spl_dataset_get_meta(report->dataset), "primitives");
+    json_t *panels = panels_to_json(report, SPL_CHUNK_PANELS);
+    json_object_set(panels, "packed", packed ? packed : json_null());
+    return json_pack("{s:o, s:o, s:{s:I, s:I, s:I}}", "panels", panels, "meshes",
+                     panels_to_json(report, SPL_CHUNK_MESHES), "lines", "count",
+                     (json_int_t)report->items[SPL_CHUNK_LINES], "points", (json_int_t)report->linear, "bytes",
+                     (json_int_t)report->bytes[SPL_CHUNK_LINES]);
 }
 
 /* NULL when memory is refused: json_pack passes it on. */
@@ -173,9 +217,10 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     json_t *levels = json_array();
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct spl_info_level *l = &report->levels[i];
-        json_array_append_new(levels, json_pack("{s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes, "chunks",
-                                                (json_int_t)l->chunks, "splats", (json_int_t)l->splats, "pieces",
-                                                (json_int_t)l->pieces, "spacing", l->spacing));
+        json_array_append_new(levels, json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:f}", "nodes", (json_int_t)l->nodes,
+                                                "chunks", (json_int_t)l->chunks, "splats", (json_int_t)l->splats,
+                                                "pieces", (json_int_t)l->pieces, "panels", (json_int_t)l->panels,
+                                                "meshes", (json_int_t)l->meshes, "spacing", l->spacing));
     }
     json_t *widths = json_object();
     for (int k = 0; k < SPL_INFO_CODES + (int)info->stream_count; k++) {
@@ -191,7 +236,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, s:o}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -202,11 +247,12 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
         "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
         kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
-        textures_to_json(report), "maps", maps_to_json(report), "sources", json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
+        textures_to_json(report), "maps", maps_to_json(report), "sources",
+        json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
         json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
         json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "pruned",
         json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
-        json_object_get(spl_dataset_get_meta(report->dataset), "up"));
+        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report));
 }

@@ -24,7 +24,7 @@ struct spl_info_report {
     const struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
     struct spl_info_level {
-        uint64_t nodes, chunks, splats, pieces;
+        uint64_t nodes, chunks, splats, pieces, panels, meshes;
         double spacing;            /* mean over the splats */
     } levels[SPL_INFO_LEVELS_MAX]; /* deeper ones are counted with the last */
     uint32_t level_count;
@@ -32,6 +32,9 @@ struct spl_info_report {
     uint64_t atoms[SPL_ATOMS_MAX + 1];                                       /* splats by number of atoms */
     uint64_t linear;                                                         /* points on wires, poles and cables */
     uint64_t chunks[SPL_CHUNK_KINDS], items[SPL_CHUNK_KINDS], bytes[SPL_CHUNK_KINDS];
+    uint64_t points[SPL_CHUNK_KINDS]; /* of the leaves, that the kind stands for; of lines 0: they lie over discs */
+    double error_squares[SPL_CHUNK_KINDS]; /* of panels and meshes: sum over their points of squared distances */
+    double error_most[SPL_CHUNK_KINDS];
     uint64_t clips;                                                          /* splats that end at a clip line */
 };
 
@@ -41,8 +44,18 @@ int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *da
 /* What is counted, by name: the attributes that every dataset has, then its own. */
 int spl_info_count(const struct spl_dataset_info *info);
 const char *spl_info_name(const struct spl_dataset_info *info, int attribute);
+/* Has the dataset anything in whose points' place there are no splats? */
+static inline bool spl_info_has_primitives(const struct spl_dataset_info *info)
+{
+    return info->panels || info->meshes;
+}
+
+/* Of a dataset that has, of a point that was kept. */
 double spl_info_bytes_per_splat(const struct spl_dataset_info *info, int attribute);
 double spl_info_total_bytes_per_splat(const struct spl_dataset_info *info);
+
+/* The root of the mean squared distance of panels' points to their planes, or of meshes' to them. */
+double spl_info_error_mean(const struct spl_info_report *report, enum spl_chunk_kind kind);
 
 /* As printed with --json; NULL when memory is refused. */
 json_t *spl_info_to_json(const struct spl_info_report *report);

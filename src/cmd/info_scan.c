@@ -145,9 +145,10 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));
-    return json_pack("{s:o, s:I, s:I, s:o, s:o}", "refused", refused.code ? spl_info_text(refused.message) : json_null(),
-                     "memory_bytes", (json_int_t)estimate.memory_bytes, "dataset_bytes",
-                     (json_int_t)estimate.dataset_bytes, "panoramas", panoramas, "warnings", warnings);
+    return json_pack("{s:o, s:I, s:I, s:o, s:o}", "refused",
+                     refused.code ? spl_info_text(refused.message) : json_null(), "memory_bytes",
+                     (json_int_t)estimate.memory_bytes, "dataset_bytes", (json_int_t)estimate.dataset_bytes,
+                     "panoramas", panoramas, "warnings", warnings);
 }
 
 static json_t *list_images(const struct spl_cloud_info *info)
@@ -156,8 +157,8 @@ static json_t *list_images(const struct spl_cloud_info *info)
     for (uint32_t i = 0; i < info->image_count; i++) {
         const struct spl_cloud_image *image = &info->images[i];
         json_array_append_new(all,
-                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", spl_info_text(image->name), "kind",
-                                        image->kind, "coding", image->coding, "width", image->width, "height",
+                              json_pack("{s:o, s:s, s:s, s:f, s:f, s:I, s:b}", "name", spl_info_text(image->name),
+                                        "kind", image->kind, "coding", image->coding, "width", image->width, "height",
                                         image->height, "bytes", (json_int_t)image->bytes, "posed", (int)image->posed));
     }
     return all;
@@ -191,7 +192,8 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
                                                              : json_null());
     json_object_set_new(json, "images", list_images(info));
     json_object_set_new(json, "crs", crs ? spl_info_text(crs) : json_null());
-    json_object_set_new(json, "crs_name", info->coordinates.name[0] ? spl_info_text(info->coordinates.name) : json_null());
+    json_object_set_new(json, "crs_name",
+                        info->coordinates.name[0] ? spl_info_text(info->coordinates.name) : json_null());
     json_object_set_new(
         json, "unit",
         json_string(info->coordinates.angles ? "degree" : spl_unit_print(info->coordinates.unit_m, unit)));

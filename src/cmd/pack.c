@@ -2,6 +2,7 @@
  * is never touched before the library's last rename. */
 #include "cmd/cmd.h"
 
+#include <ctype.h>
 #include <getopt.h>
 #include <math.h>
 #include <signal.h>
@@ -12,18 +13,20 @@
 
 #include <splatd/pack.h>
 
-#include "base/array.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
-#include "cmd/progress.h"
+#include "cmd/pack_report.h"
 #include "cmd/table.h"
+#include "geom/unit.h"
 
-static char
-    part_paths[3][4096]; /* of the dataset; of the scan alone while photographs are put onto it, and its own part */
+/* Of the dataset; of the scan while photographs or maps are put onto it, and of its points where it has panels; and the
+ * parts of these two. */
+enum { parts = 5 };
+static char part_paths[parts][4096];
 
 static void remove_part(int signal_number)
 {
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < parts; i++)
         if (part_paths[i][0])
             unlink(part_paths[i]);
     signal(signal_number, SIG_DFL);
@@ -33,143 +36,23 @@ static void remove_part(int signal_number)
 static void catch_signals(const char *output)
 {
     long pid = (long)getpid();
-    int length = snprintf(part_paths[2], sizeof part_paths[2], "%s.part-%ld-scan.part-%ld", output, pid, pid);
-    if (length < 0 || (size_t)length >= sizeof part_paths[2])
+    static const char *const of[2] = {"scan", "points"};
+    int length = snprintf(part_paths[0], sizeof part_paths[0], "%s.part-%ld-points.part-%ld", output, pid, pid);
+    if (length < 0 || (size_t)length >= sizeof part_paths[0]) {
+        part_paths[0][0] = 0;
         return;
-    snprintf(part_paths[1], sizeof part_paths[1], "%s.part-%ld-scan", output, pid);
+    }
     snprintf(part_paths[0], sizeof part_paths[0], "%s.part-%ld", output, pid);
+    for (int i = 0; i < 2; i++) {
+        snprintf(part_paths[1 + i], sizeof part_paths[1 + i], "%s.part-%ld-%s", output, pid, of[i]);
+        snprintf(part_paths[3 + i], sizeof part_paths[3 + i], "%s.part-%ld-%s.part-%ld", output, pid, of[i], pid);
+    }
     struct sigaction action = {.sa_handler = remove_part, .sa_flags = (int)SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGHUP, &action, NULL);
-}
-
-static void print_textures(const struct spl_photo_report *r, const uint64_t *bits, double splats)
-{
-    fprintf(stderr, "%llu textures of %u x %u: ", (unsigned long long)r->textured, r->texture_size, r->texture_size);
-    if (isnan(r->resampling_psnr))
-        fprintf(stderr, "resampled without a pixel to compare with, ");
-    else
-        fprintf(stderr, "resampled at %.2f dB, ", r->resampling_psnr);
-    fprintf(stderr, "coded at %.2f dB with %u atoms; %.2f bytes a splat\n", r->texture_psnr, r->atoms,
-            (double)(bits[SPL_ATTRIBUTE_TEXTURE] + bits[SPL_ATTRIBUTE_DICTIONARY]) / 8 / splats);
-    fprintf(stderr, "atoms a splat:");
-    for (int i = 0; i <= 8; i++)
-        fprintf(stderr, " %d: %.1f %%%s", i, 100 * (double)r->histogram[i] / (double)(r->textured ? r->textured : 1),
-                i < 8 ? "," : "\n");
-}
-
-static void print_summary(const char *output, const struct spl_pack_report *r)
-{
-    uint64_t total = 0;
-    double splats = (double)r->splats;
-    fprintf(stderr,
-            "%s: %llu points in (%llu skipped, %llu duplicates), %llu splats out, %u levels, %llu nodes, %u pages\n",
-            output, (unsigned long long)r->points_read, (unsigned long long)r->points_skipped,
-            (unsigned long long)r->duplicates, (unsigned long long)r->splats, r->levels,
-            (unsigned long long)r->nodes, r->pages);
-    fprintf(stderr, "levels of detail add %.1f %% to %llu leaf splats\n", 100 * (splats / (double)r->leaf_splats - 1),
-            (unsigned long long)r->leaf_splats);
-    if (r->pruned_of)
-        fprintf(stderr, "pruned: %llu of %llu leaf splats are left, one of %.1f\n", (unsigned long long)r->leaf_splats,
-                (unsigned long long)r->pruned_of, (double)r->pruned_of / (double)r->leaf_splats);
-    fprintf(stderr, "bytes a splat:");
-    for (int a = 0; a < SPL_ATTRIBUTE_COUNT; a++) {
-        total += r->attribute_bits[a];
-        if (r->attribute_bits[a])
-            fprintf(stderr, " %s %.2f,", spl_attribute_name(a), (double)r->attribute_bits[a] / 8 / splats);
-    }
-    for (uint32_t s = 0; s < r->stream_count; s++) {
-        total += r->streams[s].bits;
-        fputc(' ', stderr);
-        spl_cmd_put_text(stderr, r->streams[s].name, 0);
-        fprintf(stderr, " %.2f,", (double)r->streams[s].bits / 8 / splats);
-    }
-    fprintf(stderr, " in all %.2f\n", (double)total / 8 / splats);
-    fprintf(stderr, "mean errors: position %.2f %% of the radius, normal %.2f degrees\n", 100 * r->position_error,
-            r->normal_error);
-    if (r->part_of)
-        fprintf(stderr, "a part (--max-points) of the %llu points that the scans have\n",
-                (unsigned long long)r->part_of);
-    if (r->linear)
-        fprintf(stderr, "%llu points on wires, poles and cables, joined by %llu pieces of all levels\n",
-                (unsigned long long)r->linear, (unsigned long long)r->pieces);
-    if (r->photos.photographs)
-        fprintf(stderr, "%u photographs in %.1f s (%u could not be used); %.1f %% of the splats are on none\n",
-                r->photos.photographs, r->photos.seconds, r->photos.refused, 100 * (double)r->photos.unseen / splats);
-    if (r->photos.texture_size)
-        print_textures(&r->photos, r->attribute_bits, splats);
-    if (r->maps.stations)
-        fprintf(stderr,
-                "maps of %u stations from %u pictures (%u could not be used), up to %u texels a quarter turn: %.1f MB, "
-                "%.2f bytes a texel, blocks at %.1f dB\n",
-                r->maps.stations, r->maps.pictures, r->maps.refused, r->maps.side, (double)r->maps.bytes / 1e6,
-                (double)r->maps.bytes / (double)r->maps.texels, r->maps.block_psnr);
-    fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
-}
-
-static void say_trained(void *context, uint32_t epoch, double seconds, double psnr, double atoms_per_splat,
-                        uint32_t atoms)
-{
-    (void)context;
-    spl_cmd_progress_clear();
-    fprintf(stderr, "training: epoch %u, %.0f s, %.2f dB, %.2f atoms a splat of %u\n", epoch, seconds, psnr,
-            atoms_per_splat, atoms);
-}
-
-static void say_warning(void *context, const char *text)
-{
-    spl_cmd_progress_finish(context);
-    fprintf(stderr, "splatd: warning: ");
-    spl_cmd_put_text(stderr, text, 0);
-    fputc('\n', stderr);
-}
-
-static void name_refused(void *context, const struct spl_error *why)
-{
-    spl_cmd_progress_finish(context);
-    fprintf(stderr, "splatd: left out: %s\n", why->message);
-}
-
-/* What was left out is said at once, while a user may still stop, and again when all is done. */
-struct left_out {
-    char **reasons;
-    size_t count, capacity;
-};
-
-struct listener {
-    struct spl_cmd_progress progress; /* first: it is the context of what knows nothing else */
-    struct left_out left_out;
-};
-
-static void say_left_out(void *context, const struct spl_error *why)
-{
-    struct listener *listener = context;
-    struct left_out *left_out = &listener->left_out;
-    spl_cmd_progress_finish(&listener->progress);
-    fprintf(stderr, "splatd: left out: ");
-    spl_cmd_put_text(stderr, why->message, 0);
-    fputc('\n', stderr);
-    char *copy = spl_array_reserve(left_out->reasons, left_out->capacity, left_out->count + 1, NULL)
-                     ? NULL
-                     : strdup(why->message);
-    if (copy)
-        left_out->reasons[left_out->count++] = copy;
-}
-
-static void finish_left_out(struct left_out *left_out, bool say)
-{
-    if (say && left_out->count)
-        fprintf(stderr, "%zu scans were left out:\n", left_out->count);
-    for (size_t i = 0; i < left_out->count; i++) {
-        if (say) {
-            fprintf(stderr, "  ");
-            spl_cmd_put_text(stderr, left_out->reasons[i], 0);
-            fputc('\n', stderr);
-        }
-        free(left_out->reasons[i]);
-    }
-    free(left_out->reasons);
+    sigaction(SIGPIPE, &action, NULL); /* of who reads the progress */
+    signal(SIGXFSZ, SIG_IGN); /* a file at its limit is an error like a full disk */
 }
 
 struct arguments {
@@ -229,6 +112,23 @@ static int take_up(void *arguments, const char *option, char *text, struct spl_e
     return 0;
 }
 
+static const char *const primitive_names[] = {"off", "all", NULL};
+
+/* "10mm", "0.4 in": metres where no unit is said, as of the library. */
+static int take_error(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    char *end;
+    double value = strtod(text, &end), unit = 1;
+    end += *end == ' ' && end > text;
+    bool known = end > text && (!*end || (isalpha((unsigned char)*end) && spl_unit_parse(end, &unit)));
+    if (!known || !(unit > 0) || !(value * unit > 0 && isfinite(value * unit)))
+        return spl_fail_field(err, SPL_E_USAGE, "error",
+                              "%s takes a length above 0: 10mm, 0.5cm, 0.01 (metres), not '%.60s'", option, text);
+    a->pack.error = value * unit;
+    return SPL_OK;
+}
+
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
      SPL_CMD_TEXT(struct arguments, pack.output)},
@@ -279,7 +179,7 @@ static const struct spl_cmd_option options[] = {
     {"keep-textures", "FILE", "as they are before coding too, for 'splatd bench --textures FILE'",
      SPL_CMD_TEXT(struct arguments, photos.keep_textures)},
     {"panoramas", "PATH",
-     "maps of stations, whose colours come from panoramas: a panorama's JSON or its folder, an E57 file, photographs on "
+     "maps of stations, whose colours come from panoramas: a folder with panoramas.json, an E57 file, photographs on "
      "tripods with poses as of --cameras; 'scan': from the scan's own colours",
      .otherwise = "images of an E57 scan, DIR/panoramas of a scan in DIR, where there are any", .take = take_panoramas},
     {"no-panoramas", NULL, "no maps of stations, even where a scan has panoramas",
@@ -290,7 +190,19 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, maps.edits)},
     {"prune", "N",
      "about one of N splats stays for good, where a coarser one is as good; best with maps, whose colours stay "
-     "as fine as they are", .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
+     "as fine as they are; of panels two cells count as a splat",
+     .otherwise = "all stay", SPL_CMD_COUNT_32(struct arguments, pack.prune, 1, 1000)},
+    {"primitives", "WHICH",
+     "all: what is flat becomes panels of cells, a fraction of the discs' bytes, what bends smoothly meshes, and wires "
+     "lines as thick as they are; the rest stays discs",
+     .otherwise = "off", SPL_CMD_CHOICE(struct arguments, pack.primitives, primitive_names)},
+    {"error", "LENGTH",
+     "that points may lie off what stands for them, with --primitives all: 10mm, 0.5cm, 0.01 (metres)",
+     .otherwise = "from the scan's noise and spacing", .take = take_error},
+    {"export-primitives", "FILE",
+     "planes, meshes and lines besides, as polygons with their areas and inclinations, triangles, and polylines with "
+     "their sag: a name that ends in .ply, .obj or .dxf, with --primitives all",
+     SPL_CMD_TEXT(struct arguments, pack.export_primitives)},
     {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
      SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
@@ -313,12 +225,14 @@ static const struct spl_cmd_table table = {
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n"
         "                   [--panoramas PATH [--images DIR] [--keep-going] | --no-panoramas] [--prune N]\n"
-        "                   [--export-maps DIR] [--maps DIR]\n\n"
-        "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ and other text) into one dataset that splatd can serve\n"
-        "and render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates are "
-        "kept once.\n"
+        "                   [--export-maps DIR] [--maps DIR]\n"
+        "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n\n"
+        "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ, other text) into one dataset to serve and\n"
+        "render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates\n"
+        "are kept once.\n"
         "IN is a scan, a folder (all scans in it and below, by the endings of their names) or @LIST, a text with a\n"
-        "path a line, relative to its own folder (those with # in front are comments). What is named twice is taken once.\n\n"
+        "path a line, relative to its own folder (those with # in front are comments). What is named twice is taken\n"
+        "once.\n\n"
         "One scan, and what came of it:\n"
         "  splatd pack hall.ply -o hall.spld && splatd info hall.spld\n"
         "Several scans of one place, in the same coordinates, into one dataset:\n"
@@ -341,6 +255,10 @@ static const struct spl_cmd_table table = {
         "  splatd pack street.las --points-only -o street.spld\n"
         "A first look at a large scan, a second or two where it is COPC:\n"
         "  splatd pack tile.copc.laz --max-points 2000000 -o look.spld\n"
+        "What is flat as panels, which lie no farther than a centimetre off its points:\n"
+        "  splatd pack hall.ply --primitives all --error 10mm -o hall.spld\n"
+        "Its planes and wires for CAD, with areas, inclinations and sag:\n"
+        "  splatd pack hall.ply --primitives all --export-primitives hall.dxf -o hall.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
     .after = "\nAbout 80 bytes of memory a point, 180 on a wire. Progress and the summary go to stderr.\n",
@@ -370,6 +288,10 @@ static const char *find_contradiction(const struct arguments *a)
     if (o->points_only && (o->neighbours || o->normal_error > 0 || o->no_clip_lines))
         return "--points-only makes no normals, radii and clip lines: leave out --neighbours, --normal-error and "
                "--no-clip-lines, or it";
+    if (o->export_primitives && o->primitives == SPL_PRIMITIVES_OFF)
+        return "--export-primitives writes what --primitives all finds: name that too, or leave it out";
+    if (o->error > 0 && o->primitives == SPL_PRIMITIVES_OFF)
+        return "--error is how far primitives may be off: name --primitives all, or leave it out";
     return NULL;
 }
 
@@ -391,13 +313,13 @@ static int check(const struct arguments *a, struct spl_error *err)
 
 int spl_cmd_pack(int argc, char **argv)
 {
-    struct listener listener = {0};
+    struct spl_cmd_pack_listener listener = {0};
     struct arguments a = {
         .pack = {.size = sizeof a.pack,
                  .progress = spl_cmd_progress,
-                 .warn = say_warning,
+                 .warn = spl_cmd_pack_say_warning,
                  .progress_context = &listener},
-        .photos = {.size = sizeof a.photos, .trained = say_trained, .context = &listener},
+        .photos = {.size = sizeof a.photos, .trained = spl_cmd_pack_say_trained, .context = &listener},
         .maps = {.size = sizeof a.maps},
         .textures = -1,
     };
@@ -410,11 +332,11 @@ int spl_cmd_pack(int argc, char **argv)
     a.pack.input_count = (size_t)(argc - optind);
     if (rc || (rc = check(&a, &err)))
         return spl_cmd_fail(&err);
-    a.pack.left_out = a.skip_broken ? say_left_out : NULL;
-    a.photos.refused = a.keep_going ? name_refused : NULL;
+    a.pack.left_out = a.skip_broken ? spl_cmd_pack_say_left_out : NULL;
+    a.photos.refused = a.keep_going ? spl_cmd_pack_name_refused : NULL;
     a.photos.textures = a.textures < 0 ? SPL_TEXTURES_ADAPTIVE : (enum spl_texture_coding)a.textures;
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
-    a.maps.refused = a.keep_going ? name_refused : NULL;
+    a.maps.refused = a.keep_going ? spl_cmd_pack_name_refused : NULL;
     a.maps.context = &listener;
     a.maps.images = a.photos.cameras ? NULL : a.photos.images; /* a second list's photographs lie where that says */
     a.maps.find = !a.wants_maps;
@@ -423,7 +345,7 @@ int spl_cmd_pack(int argc, char **argv)
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);
     if (!rc)
-        print_summary(a.pack.output, &report);
-    finish_left_out(&listener.left_out, !rc);
+        spl_cmd_pack_print(a.pack.output, &report);
+    spl_cmd_pack_finish_left_out(&listener, !rc);
     return rc ? spl_cmd_fail(&err) : 0;
 }

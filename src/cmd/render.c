@@ -52,7 +52,8 @@ static const struct spl_cmd_option options[] = {
     {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 1e-9, 1e12)},
     {"far", "N", "and up to which", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
     {.help = "Drawing:"},
-    {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage",
+    {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage, "
+     "primitive (splat, line, panel or mesh)",
      .otherwise = "color", .take = spl_cmd_take_layer},
     SPL_CMD_DRAWING_ROWS,
     {.help = "File:"},

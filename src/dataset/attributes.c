@@ -138,7 +138,7 @@ bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint6
         dataset->stream_types[stream] == SPL_STREAM_UNKNOWN)
         return false;
     struct spl_place place = spl_dataset_find_place(dataset, id);
-    bool found = place.tables && spl_chunk_kind(place.chunk) == SPL_CHUNK_DISCS && // vertices have no attributes
+    bool found = place.tables && spl_chunk_kind(place.chunk) != SPL_CHUNK_LINES && // vertices have no attributes
                  read_value(dataset, &place, (uint32_t)stream, id, value);
     spl_place_finish(&place);
     return found;

@@ -32,6 +32,7 @@ struct spl_chunk_options {
     double normal_error;   /* mean error, radians; default 1 degree */
     double radius_error;   /* largest relative error; default 0.05 */
     uint32_t kind;         /* enum spl_chunk_kind, which has what of these and of a splat's fields it knows */
+    double width;          /* of lines: what they are thick, metres; 0 = not known */
 };
 
 struct spl_chunk_error { /* what quantisation did to one chunk, sums over its splats */
@@ -49,6 +50,11 @@ uint32_t spl_chunk_clip_word(const struct spl_chunk *chunk);
 /* Straight pieces between the vertices of a chunk of lines, as its header says; 0 of discs. */
 uint32_t spl_chunk_count_pieces(const struct spl_chunk *chunk);
 
+/* How thick what the lines of a chunk stand for is, metres, 0 where that is not known, and its code: 1 + 16 log2(width
+ * / 0.25 mm), rounded, within 1 and 255 (15 m). */
+double spl_chunk_line_width(const struct spl_chunk *chunk);
+uint32_t spl_line_width_code(double width);
+
 /* Adds the chunk's bits to each attribute's; header and padding go to SPL_ATTRIBUTE_CHUNK (a dataset adds nodes). */
 void spl_chunk_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
 
@@ -58,7 +64,11 @@ uint32_t spl_chunk_count_linear(const struct spl_chunk *chunk, const uint32_t *m
 /* Largest number of words a chunk can need. */
 enum {
     SPL_CLIP_WORDS_MAX = SPL_LINEAR_WORDS + SPL_CHUNK_SPLATS * SPL_CLIP_BITS / 32,
-    SPL_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9)) / 32 + SPL_LINEAR_WORDS + 4 + SPL_CLIP_WORDS_MAX
+    SPL_DISC_CHUNK_WORDS_MAX = (128 * (3 * 24 + 3 * 12 + 3 * 9)) / 32 + SPL_LINEAR_WORDS + 4 + SPL_CLIP_WORDS_MAX,
+    SPL_PANEL_CHUNK_WORDS_MAX = SPL_PANELS_MAX * SPL_PANEL_WORDS_MAX,
+    SPL_MESH_CHUNK_WORDS_MAX = SPL_PANELS_MAX * SPL_MESH_WORDS_MAX, /* more than of any other kind */
+    SPL_CHUNK_WORDS_MAX =
+        SPL_MESH_CHUNK_WORDS_MAX > SPL_DISC_CHUNK_WORDS_MAX ? SPL_MESH_CHUNK_WORDS_MAX : SPL_DISC_CHUNK_WORDS_MAX
 };
 
 /* Chooses widths and codes for `count` splats (1..128; of lines 2..128 vertices, of which the last is joined to none

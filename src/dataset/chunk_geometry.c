@@ -151,7 +151,7 @@ static double encode_normals(const struct spl_splat *splats, uint32_t count, dou
 {
     unsigned turn = mean_axis(splats, count);
     float local[3][SPL_CHUNK_SPLATS];
-    double u[SPL_CHUNK_SPLATS], v[SPL_CHUNK_SPLATS], stretch = 0;
+    double u[SPL_CHUNK_SPLATS] = {0}, v[SPL_CHUNK_SPLATS] = {0}, stretch = 0;
     for (uint32_t i = 0; i < count; i++) {
         float n[3], eu, ev;
         spl_octahedral_turn(splats[i].normal, turn & 3, turn >> 2, n);

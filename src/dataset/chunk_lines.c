@@ -3,10 +3,16 @@
  * kernel finds it without looking at another but the next. What a vertex has beside its position: the colour and the
  * normal of the point there, and a radius, the spacing that the line stands for, which positions are quantised by.
  *
- * The header's number of lines is for whoever counts pieces without reading the page. Pure functions; any thread. */
+ * The header's number of lines is for whoever counts pieces without reading the page; how thick the lines are is the
+ * chunk's, so that a line of another thickness is in another chunk. Pure functions; any thread. */
 #include "dataset/codec.h"
 
+#include <math.h>
+
 #include "base/error.h"
+
+#define WIDTH_LEAST 0.25e-3 /* of code 1, metres */
+enum { width_steps = 16 };  /* of its codes, to the double */
 
 static uint32_t line_count(const struct spl_chunk *chunk)
 {
@@ -16,6 +22,19 @@ static uint32_t line_count(const struct spl_chunk *chunk)
 uint32_t spl_chunk_count_pieces(const struct spl_chunk *chunk)
 {
     return spl_chunk_kind(chunk) == SPL_CHUNK_LINES ? chunk->count - line_count(chunk) : 0;
+}
+
+double spl_chunk_line_width(const struct spl_chunk *chunk)
+{
+    uint32_t code = chunk->extra_bits >> SPL_EXTRA_WIDTH & 255;
+    return spl_chunk_kind(chunk) == SPL_CHUNK_LINES && code ? WIDTH_LEAST * exp2((code - 1.0) / width_steps) : 0;
+}
+
+uint32_t spl_line_width_code(double width)
+{
+    if (!(width > 0))
+        return 0;
+    return (uint32_t)fmin(fmax(1 + floor(width_steps * log2(width / WIDTH_LEAST) + 0.5), 1), 255);
 }
 
 static uint32_t encode(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
@@ -29,15 +48,18 @@ static uint32_t encode(const struct spl_splat *splats, const double (*position)[
         spl_assert(splats[i].linear || (i && splats[i - 1].linear)); /* a vertex that no piece has costs bits */
     }
     uint32_t used = spl_discs_encode(splats, position, count, options, chunk, words, error);
-    chunk->extra_bits = lines << SPL_EXTRA_LINES | (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND;
+    chunk->extra_bits = lines << SPL_EXTRA_LINES | (uint32_t)SPL_CHUNK_LINES << SPL_EXTRA_KIND |
+                        spl_line_width_code(options->width) << SPL_EXTRA_WIDTH;
     spl_assert(used == spl_discs_words(chunk)); /* no clip lines */
     return used;
 }
 
 static const char *judge(const struct spl_chunk *chunk)
 {
-    uint32_t known = 255u << SPL_EXTRA_LINES | 255u << SPL_EXTRA_KIND;
-    const char *what = spl_discs_judge(chunk);
+    uint32_t known = 255u << SPL_EXTRA_LINES | 255u << SPL_EXTRA_KIND | 255u << SPL_EXTRA_WIDTH;
+    struct spl_chunk as_discs = *chunk;
+    as_discs.extra_bits &= ~(255u << SPL_EXTRA_WIDTH);
+    const char *what = spl_discs_judge(&as_discs);
     if (what)
         return what;
     if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR != SPL_LINEAR_SOME || chunk->extra_bits & ~known)

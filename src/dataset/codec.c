@@ -16,6 +16,8 @@ static const struct spl_chunk_codec discs = {
 static const struct spl_chunk_codec *const codecs[SPL_CHUNK_KINDS] = {
     [SPL_CHUNK_DISCS] = &discs,
     [SPL_CHUNK_LINES] = &spl_codec_lines,
+    [SPL_CHUNK_PANELS] = &spl_codec_panels,
+    [SPL_CHUNK_MESHES] = &spl_codec_meshes,
 };
 
 const struct spl_chunk_codec *spl_chunk_get_codec(uint32_t kind)
@@ -38,7 +40,7 @@ uint32_t spl_chunk_encode(const struct spl_splat *splats, const double (*positio
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error)
 {
-    spl_assert(options->kind < SPL_CHUNK_KINDS);
+    spl_assert(options->kind < SPL_CHUNK_KINDS && codecs[options->kind]->encode);
     return codecs[options->kind]->encode(splats, position, count, options, chunk, words, error);
 }
 

@@ -11,6 +11,7 @@ struct spl_chunk_codec {
     const char *(*judge)(const struct spl_chunk *chunk);
     /* As the functions of chunk.h, which look the row up. */
     uint32_t (*words)(const struct spl_chunk *chunk);
+    /* NULL of panels and meshes, which are no splats: panels.h. */
     uint32_t (*encode)(const struct spl_splat *splats, const double (*position)[3], uint32_t count,
                        const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                        struct spl_chunk_error *error);
@@ -30,6 +31,6 @@ void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint3
 void spl_discs_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
 const char *spl_discs_judge(const struct spl_chunk *chunk);
 
-extern const struct spl_chunk_codec spl_codec_lines;
+extern const struct spl_chunk_codec spl_codec_lines, spl_codec_panels, spl_codec_meshes;
 
 #endif

@@ -10,6 +10,7 @@
 struct spl_counts {
     uint64_t splats, leaf_splats, pieces; /* as in struct spl_dataset_info */
     uint64_t linear_chunks;               /* of discs, that have linear splats */
+    uint64_t panels, panel_points, meshes, mesh_points; /* the same; 0 where META says nothing */
     uint32_t levels;
     uint64_t bits[SPL_ATTRIBUTE_COUNT]; /* without textures and dictionary, which follow from their sections */
     uint64_t stream_bits[SPL_STREAMS_MAX];

@@ -1,7 +1,7 @@
 /* Opening a packed dataset from wherever its bytes come (source.h): what describes it is read into memory and checked
- * from the outside in (sections.c, meta.c, structure.c, maps.c, textures.c) before anyone else sees it. After that nothing
- * changes, so every accessor runs on any thread. What is trusted without a look is only the pages' codes, and any code
- * decodes to finite numbers.
+ * from the outside in (sections.c, meta.c, structure.c, maps.c, textures.c) before anyone else sees it. After that
+ * nothing changes, so every accessor runs on any thread. What is trusted without a look is only the pages' codes, and
+ * any code decodes to finite numbers.
  *
  * Pages are read from the source when they are wanted, with their checksum, so that a file which is cut or overwritten
  * in place while it is served is an error of that page; only spl_dataset_get_page() looks through a map. */
@@ -307,7 +307,8 @@ const char *spl_attribute_name(enum spl_attribute attribute)
         [SPL_ATTRIBUTE_POSITION] = "position", [SPL_ATTRIBUTE_RADIUS] = "radius",
         [SPL_ATTRIBUTE_NORMAL] = "normal",     [SPL_ATTRIBUTE_COLOR] = "color",
         [SPL_ATTRIBUTE_LINEAR] = "linear",     [SPL_ATTRIBUTE_CLIP] = "clip",
-        [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_CHUNK] = "chunk",
+        [SPL_ATTRIBUTE_LINES] = "lines",       [SPL_ATTRIBUTE_PANELS] = "panels",
+        [SPL_ATTRIBUTE_MESHES] = "meshes",     [SPL_ATTRIBUTE_CHUNK] = "chunk",
         [SPL_ATTRIBUTE_TEXTURE] = "texture",   [SPL_ATTRIBUTE_DICTIONARY] = "dictionary",
     };
     return (unsigned)attribute < SPL_ATTRIBUTE_COUNT ? names[attribute] : "unknown";

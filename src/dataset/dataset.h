@@ -109,6 +109,10 @@ const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t
 struct spl_splat;
 bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, struct spl_splat *splat);
 
+/* The chunk that has splat, vertex, panel or mesh `id`, and its node's origin in the world; false (nothing written) as
+ * of find_splat. Any thread; may block on disk. */
+bool spl_dataset_find_chunk(const struct spl_dataset *dataset, uint64_t id, struct spl_chunk *chunk, double origin[3]);
+
 /* Optional attributes: `streams` has a row for each, in the order of the file. */
 const struct spl_stream *spl_dataset_get_streams(const struct spl_dataset *dataset, uint32_t *count);
 

@@ -3,6 +3,7 @@
 #ifndef SPL_DATASET_FORMAT_H
 #define SPL_DATASET_FORMAT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -80,11 +81,15 @@ struct spl_node {
 
 #define SPL_NODE_BYTES 60u /* of a node on disk */
 
-/* extra_bits: number of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31; on disk, the
- * number of splats 0..7. */
+/* extra_bits: number of splats with a clip line, or of lines in a chunk of lines, 16..23, kind 24..31; of lines the
+ * code of their width 8..15; of meshes the step of their heights 8..15 and the level of their lattices 16..17; on disk,
+ * the number of splats 0..7. */
 #define SPL_EXTRA_COUNT 0
 #define SPL_EXTRA_CLIP 16
 #define SPL_EXTRA_LINES 16
+#define SPL_EXTRA_WIDTH 8
+#define SPL_EXTRA_STEP 8
+#define SPL_EXTRA_LEVEL 16
 #define SPL_EXTRA_KIND 24
 
 /* Zero words that end each page, so that a shader may load two words a field without looking where a stream ends. */
@@ -94,24 +99,27 @@ struct spl_node {
 enum spl_chunk_kind {
     SPL_CHUNK_DISCS, /* splats */
     SPL_CHUNK_LINES, /* vertices of wires, poles and cables; pieces go from one to the next */
+    SPL_CHUNK_PANELS, /* cells of a plane; panels.h */
+    SPL_CHUNK_MESHES, /* the same with heights above it; relief.h */
     SPL_CHUNK_KINDS
 };
 
 /* Up to SPL_CHUNK_SPLATS splats that lie close together, in pruning order; or as many vertices of lines, in the order
  * of their lines, with the same fields but for clip lines. Streams of fixed-width codes, each stream starting on a
  * word: geometry (x y z u v radius), linear, colour (y u v), clip lines; then the dataset's optional attributes
- * (streams.h), which vertices do not have. A splat's fields lie one after the other from the low bits up. */
+ * (streams.h), which vertices and panels do not have. A splat's fields lie one after the other from the low bits up.
+ * Of panels the fields mean what is said behind them: the plane stands where discs have the coding of theirs. */
 struct spl_chunk {
-    float origin[3]; /* relative to the node's origin; position = origin + step * code */
-    float step;
-    float radius_min, radius_step;
+    float origin[3]; /* relative to the node's origin; position = origin + step * code; panels: of cell (0, 0) */
+    float step;      /* panels: side of a cell */
+    float radius_min, radius_step; /* panels: by which they blend; mean distance of their points to the plane */
     float radius_mean; /* of the chunk's splats as they were made, which is their spacing: level selection and
                           prune-and-scale use it; leaves of pruned datasets are drawn smaller */
-    float normal_u, normal_v, normal_step;
+    float normal_u, normal_v, normal_step; /* panels: the plane's; the largest distance of a point */
     uint32_t geometry_word; /* in the node's page, 32-bit words; the other streams follow in order */
     uint32_t geometry_bits; /* as in shared.h */
-    uint32_t color_bits;    /* as in shared.h */
-    uint32_t color_base;
+    uint32_t color_bits;    /* as in shared.h; panels: words of the chunk */
+    uint32_t color_base;    /* panels: points that they stand for */
     uint32_t extra_bits; /* SPL_EXTRA_* */
 
     /* Not on disk. */
@@ -125,6 +133,12 @@ struct spl_chunk {
 static inline uint32_t spl_chunk_kind(const struct spl_chunk *chunk)
 {
     return chunk->extra_bits >> SPL_EXTRA_KIND;
+}
+
+/* Panels, with relief or without? */
+static inline bool spl_kind_has_panels(uint32_t kind)
+{
+    return kind == SPL_CHUNK_PANELS || kind == SPL_CHUNK_MESHES;
 }
 
 /* ATOM: this header, then the stream of atoms.h. */

@@ -1,9 +1,10 @@
-/* One splat, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages
+/* One splat, panel, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages
  * and chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a map,
  * so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "dataset/chunk.h"
 #include "dataset/open.h"
@@ -54,6 +55,23 @@ bool spl_dataset_find_splat(const struct spl_dataset *dataset, uint64_t id, stru
 {
     struct spl_place place = spl_dataset_find_place(dataset, id);
     bool found = place.tables && read_splat(dataset, &place, id, splat);
+    spl_place_finish(&place);
+    return found;
+}
+
+bool spl_dataset_find_chunk(const struct spl_dataset *dataset, uint64_t id, struct spl_chunk *chunk, double origin[3])
+{
+    struct spl_place place = spl_dataset_find_place(dataset, id);
+    const struct spl_tables *tables = place.tables;
+    bool found = tables;
+    if (found) {
+        uint64_t number = tables->first_chunk + (uint64_t)(place.chunk - tables->chunks);
+        uint32_t n = 0;
+        while (number >= tables->nodes[n].first_chunk + tables->nodes[n].chunk_count) // the tables' chunks are all nodes'
+            n++;
+        memcpy(origin, tables->nodes[n].origin, 3 * sizeof *origin);
+        *chunk = *place.chunk;
+    }
     spl_place_finish(&place);
     return found;
 }

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "dataset/block.h"
 #include "geom/polar.h"
 
 size_t spl_map_range_words(const struct spl_map_row *row)
@@ -45,6 +46,9 @@ const char *spl_map_judge(const struct spl_map_row *row)
     }
     if (!(turned < 1e-6))
         return "has a rotation that is none";
+    const double *r = row->rotation;
+    if (r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]) < 0)
+        return "has a rotation that mirrors";
     if (!row->side || row->side > SPL_MAP_SIDE_MAX || row->side % SPL_MAP_SIDE_STEP || !row->levels ||
         row->levels > SPL_MAP_LEVELS_MAX || !row->range_side || row->range_side > SPL_MAP_RANGE_SIDE_MAX)
         return "has sides or levels that no map can have";
@@ -90,22 +94,8 @@ double spl_map_range_of_code(const struct spl_map_row *row, uint16_t code)
     return row->near / (1 - (code - 1.0) / (SPL_MAP_FARTHEST - 1)); /* of the farthest code INFINITY too */
 }
 
-static void expand(uint32_t color, float out[3])
-{
-    uint32_t r = color >> 11 & 31, g = color >> 5 & 63, b = color & 31;
-    out[0] = (float)(r << 3 | r >> 2);
-    out[1] = (float)(g << 2 | g >> 4);
-    out[2] = (float)(b << 3 | b >> 2);
-}
-
 void spl_map_get_color(const uint32_t *words, uint32_t side, uint32_t x, uint32_t y, float color[3])
 {
     size_t across = spl_polar_width(side, SPL_MAP_APRON) / 4;
-    const uint32_t *block = words + 2 * (y / 4 * across + x / 4);
-    uint32_t code = block[1] >> 2 * (y % 4 * 4 + x % 4) & 3;
-    float share = code < 2 ? (float)code : (float)(code - 1) * (1.0f / 3.0f), a[3], b[3];
-    expand(block[0] & 0xffff, a);
-    expand(block[0] >> 16, b);
-    for (int c = 0; c < 3; c++)
-        color[c] = a[c] + (b[c] - a[c]) * share;
+    spl_block_get_color(words + 2 * (y / 4 * across + x / 4), y % 4 * 4 + x % 4, color);
 }

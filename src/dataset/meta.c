@@ -216,12 +216,23 @@ static int get_counts(struct spl_dataset *dataset, struct spl_error *err)
             dataset, err, "counts", json,
             "an object that says how many \"splats\", \"pieces\" and \"linear_chunks\" there are, and \"bits\" and "
             "\"stream_bits\" of each attribute");
-    if (counts->splats < info->leaf_splats)
-        return wrong(dataset, err, "counts.splats", json_object_get(json, "splats"), "at least \"leaf_splats\"");
+    if (counts->panel_points > info->leaf_splats)
+        return wrong(dataset, err, "counts.panel_points", json_object_get(json, "panel_points"),
+                     "at most \"leaf_splats\"");
+    if (counts->mesh_points > info->leaf_splats - counts->panel_points)
+        return wrong(dataset, err, "counts.mesh_points", json_object_get(json, "mesh_points"),
+                     "at most \"leaf_splats\" without \"panel_points\"");
+    if (counts->splats < info->leaf_splats - counts->panel_points - counts->mesh_points)
+        return wrong(dataset, err, "counts.splats", json_object_get(json, "splats"),
+                     "at least \"leaf_splats\" without \"panel_points\" and \"mesh_points\"");
     counts->leaf_splats = info->leaf_splats;
     counts->levels = info->levels;
     info->splats = counts->splats;
     info->pieces = counts->pieces;
+    info->panels = counts->panels;
+    info->panel_points = counts->panel_points;
+    info->meshes = counts->meshes;
+    info->mesh_points = counts->mesh_points;
     info->has_linear = counts->linear_chunks > 0;
     memcpy(info->attribute_bits, counts->bits, sizeof info->attribute_bits);
     for (uint32_t s = 0; s < info->stream_count; s++)

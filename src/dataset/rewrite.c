@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "dataset/chunk.h"
+#include "dataset/panels.h"
 #include "dataset/texture.h"
 #include "dataset/writer.h"
 
@@ -58,7 +59,7 @@ static int load_page(struct pass *p, uint32_t index, struct spl_error *err)
     return rc;
 }
 
-/* The words of chunk `index` of the old file with the colours wanted, and its header; returns how many were appended. */
+/* The words of chunk `index` of the old file with the colours wanted, and its header; returns how many it appended. */
 static uint32_t copy_chunk(struct pass *p, uint64_t index, struct spl_chunk *chunk, uint32_t *words)
 {
     uint64_t count;
@@ -67,7 +68,9 @@ static uint32_t copy_chunk(struct pass *p, uint64_t index, struct spl_chunk *chu
              streams = spl_dataset_get_stream_words(p->what->from, p->stream_count, index);
     const uint32_t *old = p->page + from->geometry_word;
     *chunk = *from;
-    if (p->what->colors)
+    if (p->what->colors && spl_kind_has_panels(spl_chunk_kind(from)))
+        used = spl_panels_recolor(from, p->page, p->what->colors + p->what->first_cell[index], chunk, words);
+    else if (p->what->colors)
         used = spl_chunk_recolor(from, p->page, p->what->colors + from->first_id, chunk, words);
     else
         memcpy(words, old, own * sizeof *words);
@@ -108,18 +111,26 @@ static void scale_radii(const struct pass *p, struct spl_chunk *chunk)
     chunk->radius_step *= p->what->leaf_radius;
 }
 
-/* A leaf's splats, whose words are still the node's. */
+static void count_radii(struct pass *p, float radius, uint32_t count)
+{
+    uint32_t bits;
+    memcpy(&bits, &radius, sizeof bits); // > 0
+    p->radii[bits >> radius_shift] += count;
+    p->leaf_splats += count;
+}
+
+/* A leaf's splats, whose words are still the node's, and what its panels are worth of them. */
 static void count_leaf(struct pass *p, const struct spl_chunk *chunks, uint32_t chunk_count)
 {
-    for (uint32_t c = 0; c < chunk_count; c++)
+    for (uint32_t c = 0; c < chunk_count; c++) {
+        if (spl_kind_has_panels(spl_chunk_kind(&chunks[c])))
+            count_radii(p, chunks[c].radius_min, spl_panels_get_points(&chunks[c]));
         for (uint32_t i = 0; i < chunks[c].count && spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS; i++) {
             struct spl_splat splat;
-            uint32_t bits;
             spl_chunk_decode(&chunks[c], p->words, i, &splat);
-            memcpy(&bits, &splat.radius, sizeof bits); // > 0
-            p->radii[bits >> radius_shift]++;
-            p->leaf_splats++;
+            count_radii(p, splat.radius, 1);
         }
+    }
 }
 
 static int write_node(struct pass *p, const struct spl_node *old, bool leaf, struct spl_error *err)
@@ -139,6 +150,8 @@ static int write_node(struct pass *p, const struct spl_node *old, bool leaf, str
             scale_radii(p, &chunks[i]);
         chunks[i].geometry_word = (uint32_t)used;
         used += count;
+        if (leaf && spl_kind_has_panels(spl_chunk_kind(&chunks[i])))
+            spl_panels_set_points(&chunks[i], spl_panels_count_discs(&chunks[i], p->words));
         if (!p->what->dictionary)
             continue;
         struct spl_chunk_code code = {0};

@@ -14,6 +14,8 @@
 struct spl_rewrite {
     const struct spl_dataset *from;          /* keeps all its tables; ids, nodes and chunks below are its own */
     const uint8_t (*colors)[3];              /* by splat id, info.ids of them; NULL: those that it has */
+    const uint64_t *first_cell; /* by chunk, of panels: where the colours of their cells begin in `colors`, panel by
+                                 * panel and row by row. NULL: there are no panels, or no colours */
     const struct spl_dictionary *dictionary; /* NULL: the textures that it has; one without atoms: none */
     /* Sets the codes of chunk `chunk`, whose splats are chunks[chunk].first_id on: called once for each that stays, in
      * rising order, from the calling thread. A return below 0 ends the writing with it. Not called without
@@ -32,9 +34,10 @@ struct spl_rewrite {
     int (*get_map)(void *context, uint32_t index, const uint32_t **words, struct spl_error *err);
     const json_t *about_maps; /* META's "maps": settings, statistics; NULL = none */
 
-    /* By node: its children are dropped with all below them, so that its splats are the finest there are; NULL = none.
-     * Nodes, chunks and ids of the new file are numbered without what is dropped. META then says "pruned", its radius
-     * is that of the new leaves; bounds and view stay those of the scan. */
+    /* By node: its children are dropped with all below them, so that its splats are the finest there are, and its
+     * panels stand for as many points as spl_panels_count_discs() says; NULL = none. Nodes, chunks and ids of the new
+     * file are numbered without what is dropped. META then says "pruned", its radius is that of the new leaves; bounds
+     * and view stay those of the scan. */
     const bool *leaf;
     float leaf_radius; /* radii of those nodes' discs are multiplied by it, what selection takes for their spacing is
                         * not; 0 = 1 */

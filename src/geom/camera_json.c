@@ -71,8 +71,8 @@ static int axes_from_name(const char *name)
     return !strcmp(name, "opencv") ? SPL_AXES_OPENCV : !strcmp(name, "opengl") ? SPL_AXES_OPENGL : -1;
 }
 
-/* EPSG:N alone, since longer texts can name files where they are understood. OGC:CRS84 is EPSG:4326 in the order in which
- * all are taken here. */
+/* EPSG:N alone, since longer texts can name files where they are understood. OGC:CRS84 is EPSG:4326 in the order in
+ * which all are taken here. */
 static int crs_from_text(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
     bool epsg = !strncasecmp(text, "EPSG:", 5);

@@ -35,12 +35,12 @@ void spl_polar_direction(uint32_t side, uint32_t apron, const double place[2], d
 /* Eqs. 4 to 6, corrected: the place, within a chart proper, that has direction `d`, of any length above 0. */
 void spl_polar_place(uint32_t side, uint32_t apron, const double d[3], double place[2]);
 
-/* Whether texel (x, y) has a direction of its own: aprons, and the corners of caps beyond 45 degrees, repeat what another
- * chart shows. */
+/* Whether texel (x, y) has a direction of its own: aprons, and the corners of caps beyond 45 degrees, repeat what
+ * another chart shows. */
 bool spl_polar_is_proper(uint32_t side, uint32_t apron, uint32_t x, uint32_t y);
 
-/* spl_polar_place() in floats, of a unit `d`: what kernels do (shaders/common/polar.glsl), step by step. Off by less than a
- * twentieth of a texel of side 2048. */
+/* spl_polar_place() in floats, of a unit `d`: what kernels do (shaders/common/polar.glsl), step by step. Off by less
+ * than a twentieth of a texel of side 2048. */
 void spl_polar_place_f(uint32_t side, uint32_t apron, const float d[3], float place[2]);
 
 #endif

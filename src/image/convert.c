@@ -127,6 +127,12 @@ void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb)
     }
 }
 
+void spl_convert_primitive(const uint32_t *primitives, size_t count, uint8_t *rgb)
+{
+    for (size_t i = 0; i < count; i++)
+        spl_shape_color((enum spl_shape)primitives[i], rgb + 3 * i);
+}
+
 void spl_convert_coverage(const float *values, size_t count, uint8_t *grey)
 {
     for (size_t i = 0; i < count; i++)
@@ -165,6 +171,8 @@ int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl
         spl_convert_normal(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_ID) {
         spl_convert_id(image->pixels, count, picture);
+    } else if (image->layer == SPL_LAYER_PRIMITIVE) {
+        spl_convert_primitive(image->pixels, count, picture);
     } else {
         return spl_convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
     }

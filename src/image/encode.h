@@ -36,6 +36,9 @@ void spl_convert_normal(const float *normals, size_t count, uint8_t *rgb);
 /* A colour by hash of the id, never black; nothing = black. */
 void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb);
 
+/* spl_shape_color() of each. */
+void spl_convert_primitive(const uint32_t *primitives, size_t count, uint8_t *rgb);
+
 void spl_convert_coverage(const float *values, size_t count, uint8_t *grey);
 
 /* round(value * scale) in 1..65535, nothing (negative or not a number) = 0. Returns how many were beyond 65535. */

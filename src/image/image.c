@@ -21,6 +21,17 @@ static const struct {
     [SPL_LAYER_COLOR] = {"color", SPL_PIXEL_RGBA8}, [SPL_LAYER_DEPTH] = {"depth", SPL_PIXEL_F32},
     [SPL_LAYER_RANGE] = {"range", SPL_PIXEL_F32},   [SPL_LAYER_NORMAL] = {"normal", SPL_PIXEL_F32X3},
     [SPL_LAYER_ID] = {"id", SPL_PIXEL_U32},         [SPL_LAYER_COVERAGE] = {"coverage", SPL_PIXEL_F32},
+    [SPL_LAYER_PRIMITIVE] = {"primitive", SPL_PIXEL_U32},
+};
+
+/* Colours of Okabe and Ito, which colour-blind people tell apart; the lightest is for lines, which are thin. */
+static const struct {
+    const char *name;
+    uint8_t color[3];
+} shapes[SPL_SHAPE_COUNT] = {
+    [SPL_SHAPE_NONE] = {"none", {0, 0, 0}},          [SPL_SHAPE_SPLAT] = {"splat", {86, 180, 233}},
+    [SPL_SHAPE_LINE] = {"line", {240, 228, 66}},     [SPL_SHAPE_PANEL] = {"panel", {213, 94, 0}},
+    [SPL_SHAPE_MESH] = {"mesh", {0, 158, 115}},
 };
 
 static const struct {
@@ -42,6 +53,17 @@ int spl_layer_from_name(const char *name)
         if (!strcmp(name, layers[i].name))
             return i;
     return -1;
+}
+
+const char *spl_shape_name(enum spl_shape shape)
+{
+    return (unsigned)shape < SPL_SHAPE_COUNT ? shapes[shape].name : "unknown";
+}
+
+void spl_shape_color(enum spl_shape shape, uint8_t rgb[3])
+{
+    static const uint8_t unknown[3] = {255, 255, 255};
+    memcpy(rgb, (unsigned)shape < SPL_SHAPE_COUNT ? shapes[shape].color : unknown, sizeof unknown);
 }
 
 const char *spl_format_name(enum spl_format format)

@@ -107,13 +107,16 @@ int spl_encode_png(const struct spl_image *image, const struct spl_encode_option
         return compress(image, &shape, options, out, err);
 
     size_t count = (size_t)image->width * image->height;
-    shape.color_type = image->layer == SPL_LAYER_NORMAL ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_GRAYSCALE;
-    shape.pixel_bytes = image->layer == SPL_LAYER_NORMAL ? 3 : image->layer == SPL_LAYER_COVERAGE ? 1 : 2;
+    bool colored = image->layer == SPL_LAYER_NORMAL || image->layer == SPL_LAYER_PRIMITIVE;
+    shape.color_type = colored ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_GRAYSCALE;
+    shape.pixel_bytes = colored ? 3 : image->layer == SPL_LAYER_COVERAGE ? 1 : 2;
     void *picture = spl_alloc_raw(count, shape.pixel_bytes, err);
     if (!picture)
         return SPL_E_NOMEM;
     if (image->layer == SPL_LAYER_NORMAL) {
         spl_convert_normal(image->pixels, count, picture);
+    } else if (image->layer == SPL_LAYER_PRIMITIVE) {
+        spl_convert_primitive(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_COVERAGE) {
         spl_convert_coverage(image->pixels, count, picture);
     } else {

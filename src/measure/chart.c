@@ -233,12 +233,15 @@ static void write_labels(struct layout *l)
                 write_label(l, &l->places[i]);
 }
 
-/* The curves' names in two rows under the title; what does not fit stays in the points' own texts. */
+/* The curves' names in two rows under the title, those that are not dashed first; what does not fit stays in the points'
+ * own texts. */
 static void write_legend(const struct layout *l, const struct spl_chart *chart)
 {
     double x = LEFT, y = 54;
-    for (size_t c = 0; c < chart->curve_count; c++) {
-        const struct spl_chart_curve *curve = &chart->curves[c];
+    for (size_t i = 0; i < 2 * chart->curve_count; i++) {
+        const struct spl_chart_curve *curve = &chart->curves[i % chart->curve_count];
+        if ((curve->dash % DASHES != 0) != (i >= chart->curve_count))
+            continue;
         double w = 34 + 6.8 * (double)strlen(curve->name) + 14;
         if (x + w > WIDTH && y > 54)
             break;

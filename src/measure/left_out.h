@@ -1,4 +1,5 @@
-/* Photographs left out of packing, compared with renders from their poses: what textures gain over coloured splats. */
+/* Photographs left out of packing, compared with renders from their poses: what textures or maps gain over coloured
+ * splats. */
 #ifndef SPL_MEASURE_LEFT_OUT_H
 #define SPL_MEASURE_LEFT_OUT_H
 

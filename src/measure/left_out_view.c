@@ -104,6 +104,14 @@ static int find_widths(const struct spl_dataset *dataset, const struct spl_camer
     return widths ? SPL_OK : SPL_E_NOMEM;
 }
 
+/* Maps cut off what a station saw past: there is nothing to compare. */
+static void leave_out_trimmed(const struct spl_frame *frame, float *widths)
+{
+    const struct spl_image *coverage = &frame->images[SPL_LAYER_COVERAGE];
+    for (size_t i = 0; i < (size_t)coverage->width * coverage->height; i++)
+        widths[i] = ((const float *)coverage->pixels)[i] > 0.999f ? widths[i] : NAN;
+}
+
 int spl_left_out_render(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                         const struct spl_named_view *named, double lod, struct spl_image render[SPL_LEFT_OUT_KINDS],
                         float **width_px, struct spl_error *err)
@@ -114,6 +122,7 @@ int spl_left_out_render(struct spl_renderer *renderer, const struct spl_dataset 
     view.camera = named->camera;
     view.lod = lod;
     view.disc.atoms = 0;
+    view.maps = SPL_MAPS_OFF;
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_DEPTH | 1u << SPL_LAYER_ID | 1u << SPL_LAYER_COVERAGE;
     *width_px = NULL;
     memset(render, 0, SPL_LEFT_OUT_KINDS * sizeof *render);
@@ -125,10 +134,12 @@ int spl_left_out_render(struct spl_renderer *renderer, const struct spl_dataset 
         frame.images[SPL_LAYER_COLOR] = (struct spl_image){0};
         spl_frame_finish(&frame);
         view.disc.atoms = 8;
-        view.layers = 1u << SPL_LAYER_COLOR;
+        view.maps = SPL_MAPS_ON;
+        view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE;
         rc = spl_renderer_render(renderer, dataset, &view, &frame, err);
     }
     if (!rc) {
+        leave_out_trimmed(&frame, *width_px);
         render[SPL_LEFT_OUT_TEXTURED] = frame.images[SPL_LAYER_COLOR];
         frame.images[SPL_LAYER_COLOR] = (struct spl_image){0};
     }

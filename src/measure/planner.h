@@ -41,7 +41,7 @@ struct spl_planner {
         double learned;     /* ln of this setting's own factor */
     } * candidates;
     size_t count;
-    bool atoms, maps; /* candidates name them; else every number of atoms, or maps on and off, is a candidate's setting */
+    bool atoms, maps; /* candidates name them; else any number of atoms, or maps on and off, is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
     uint64_t frames;                               /* learned from */
 };

@@ -79,10 +79,13 @@ static uint64_t find_chunk(const struct spl_tolerance *t, uint32_t id)
     return low && holds(&t->chunks[low - 1], id) ? low - 1 : t->chunk_count;
 }
 
+/* Of a panel: a cell of it, which stands for such a disc. */
 static double drawn_radius(const struct job *job, uint64_t index, uint32_t id, double z)
 {
     const struct spl_tolerance *t = job->tolerance;
     const struct spl_chunk *chunk = &t->chunks[index];
+    if (spl_kind_has_panels(spl_chunk_kind(chunk)))
+        return chunk->radius_mean;
     uint64_t node_count;
     const struct spl_node *node = spl_dataset_get_nodes(t->dataset, &node_count) + t->nodes[index];
     size_t bytes;

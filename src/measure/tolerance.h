@@ -1,4 +1,5 @@
-/* How far off a rendered depth may be and still be the right surface: the radius of the splat that the pixel shows. */
+/* How far off a rendered depth may be and still be the right surface: the radius of the splat that the pixel shows, or
+ * of the disc that a panel's cell stands for. */
 #ifndef SPL_MEASURE_TOLERANCE_H
 #define SPL_MEASURE_TOLERANCE_H
 

@@ -17,7 +17,7 @@ static const double coplanar = 0.25; /* slope within which a neighbour lies in t
 static const double at_border =
     0.5; /* spacings that the outermost neighbours lie beyond a point at the border, at most */
 static const double beyond_all = 0.5; /* spacings from the outermost neighbour to the line */
-enum { border_points = 8, directions = 32 };
+enum { border_points = 8, directions = SPL_CLIP_DIRECTIONS };
 
 struct lines {
     struct spl_points *points;
@@ -25,14 +25,21 @@ struct lines {
     const uint8_t *candidate;
     struct spl_stage *stage;
     unsigned wide;
-    double turn[directions][2];
+    struct spl_clip_turns turns;
 };
 
-/* The direction, as (u, v) of the tangent frame, and the end in metres of the line of point i; false = none. */
-static bool find_border(const struct lines *l, size_t i, const struct spl_nearest *near, const float u[3],
-                        const float v[3], double direction[2], double *end)
+void spl_clip_turns_init(struct spl_clip_turns *turns)
 {
-    const struct spl_points *p = l->points;
+    for (int k = 0; k < directions; k++) {
+        turns->at[k][0] = cos(k * 2 * M_PI / directions);
+        turns->at[k][1] = sin(k * 2 * M_PI / directions);
+    }
+}
+
+bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl_nearest *near,
+                          const struct spl_clip_turns *turns, bool of_plane, const float u[3], const float v[3],
+                          double direction[2], double *end)
+{
     const float *n = p->normal[i];
     double x[SPL_NEIGHBOURS_MAX], y[SPL_NEIGHBOURS_MAX], reach = 0, least = INFINITY;
     unsigned count = 0;
@@ -42,7 +49,8 @@ static bool find_border(const struct lines *l, size_t i, const struct spl_neares
             d[c] = p->axis[c][near->index[a]] - p->axis[c][i];
             height += d[c] * n[c];
         }
-        if (height * height > coplanar * coplanar * near->squared[a])
+        if (of_plane ? p->plane[near->index[a]] != p->plane[i]
+                     : height * height > coplanar * coplanar * near->squared[a])
             continue;
         x[count] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
         y[count++] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
@@ -53,18 +61,28 @@ static bool find_border(const struct lines *l, size_t i, const struct spl_neares
     for (int k = 0; k < directions; k++) {
         double most = 0;
         for (unsigned a = 0; a < count && most < least; a++) {
-            double out = l->turn[k][0] * x[a] + l->turn[k][1] * y[a];
+            double out = turns->at[k][0] * x[a] + turns->at[k][1] * y[a];
             most = out > most ? out : most;
         }
         if (most >= least)
             continue;
         least = most;
-        direction[0] = l->turn[k][0];
-        direction[1] = l->turn[k][1];
+        direction[0] = turns->at[k][0];
+        direction[1] = turns->at[k][1];
     }
     double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
     *end = least + beyond_all * spacing;
     return least <= at_border * spacing;
+}
+
+void spl_clip_set(struct spl_points *p, size_t i, const float u[3], const float v[3], const double direction[2],
+                  double end)
+{
+    if (!(end < (double)p->radius[i]))
+        return;
+    for (int c = 0; c < 3; c++)
+        p->clip[i].direction[c] = (int8_t)lround(127 * (direction[0] * (double)u[c] + direction[1] * (double)v[c]));
+    p->clip[i].offset = (uint8_t)(255 * end / (double)p->radius[i]);
 }
 
 static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
@@ -82,11 +100,8 @@ static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
             continue;
         spl_neighbours_find(l->neighbours, i, l->wide, &near);
         spl_tangent_frame(p->normal[i], u, v);
-        if (!find_border(l, i, &near, u, v, direction, &far) || !(far < p->radius[i]))
-            continue;
-        for (int c = 0; c < 3; c++)
-            p->clip[i].direction[c] = (int8_t)lround(127 * (direction[0] * u[c] + direction[1] * v[c]));
-        p->clip[i].offset = (uint8_t)(255 * far / p->radius[i]);
+        if (spl_clip_find_border(p, i, &near, &l->turns, false, u, v, direction, &far))
+            spl_clip_set(p, i, u, v, direction, far);
     }
     spl_stage_add(l->stage, end - begin, worker);
 }
@@ -96,10 +111,7 @@ int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neigh
 {
     struct lines lines = {
         .points = points, .neighbours = neighbours, .candidate = candidate, .stage = stage, .wide = wide};
-    for (int k = 0; k < directions; k++) {
-        lines.turn[k][0] = cos(k * 2 * M_PI / directions);
-        lines.turn[k][1] = sin(k * 2 * M_PI / directions);
-    }
+    spl_clip_turns_init(&lines.turns);
     points->clip = spl_alloc(points->count, sizeof *points->clip, err);
     if (!points->clip)
         return SPL_E_NOMEM;

@@ -10,4 +10,24 @@
 int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neighbours, unsigned wide,
                    const uint8_t *candidate, struct spl_stage *stage, struct spl_error *err);
 
+enum { SPL_CLIP_DIRECTIONS = 32 };
+
+/* The directions that are tried. */
+struct spl_clip_turns {
+    double at[SPL_CLIP_DIRECTIONS][2];
+};
+
+void spl_clip_turns_init(struct spl_clip_turns *turns);
+
+/* Whether point i lies at a border of its surface: which of the points in `near` continue it is said by their slope, or
+ * with `of_plane` by points->plane. Then *direction is where it ends, as (u, v) of the frame u, v, and *end how far
+ * off. Pure; any thread. */
+bool spl_clip_find_border(const struct spl_points *points, size_t i, const struct spl_nearest *near,
+                          const struct spl_clip_turns *turns, bool of_plane, const float u[3], const float v[3],
+                          double direction[2], double *end);
+
+/* Sets the line of point i, of which other threads know nothing; where it lies beyond the disc nothing changes. */
+void spl_clip_set(struct spl_points *points, size_t i, const float u[3], const float v[3], const double direction[2],
+                  double end);
+
 #endif

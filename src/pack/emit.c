@@ -13,7 +13,10 @@
 #include "pack/chunks.h"
 #include "pack/median.h"
 
-enum { batch_nodes = 256 };
+enum { batch_nodes = 256, spacing_sample = 1023 };
+static const float width_most = 1.4f; /* of a chunk's lines, as a multiple of the least */
+enum { widths_most = 36 };            /* chunks that begin for another width: lines are sorted by theirs */
+
 struct encoded { /* one node of the batch; owned by the batch */
     uint32_t *words;
     struct spl_chunk *chunks;
@@ -28,6 +31,7 @@ struct scratch { /* of one worker, for the largest node */
     uint32_t *words;
     size_t chunk_capacity; /* of `words` */
     float *radii;
+    float (*weighted)[2]; /* radii and how many have them, where there are panels */
     struct spl_node_lines lines;
 };
 
@@ -88,7 +92,8 @@ static void grow_box(struct spl_node *node, const struct spl_splat *splats, doub
     double slack = 1.001 * ((double)chunk->step + chunk->radius_step);
     for (uint32_t i = 0; i < chunk->count; i++)
         for (int c = 0; c < 3; c++) {
-            double reach = splats[i].radius + slack + 1e-6 * fabs(position[i][c]);
+            double reach =
+                fmax(splats[i].radius, spl_chunk_line_width(chunk) / 2) + slack + 1e-6 * fabs(position[i][c]);
             node->box_min[c] = fminf(node->box_min[c], (float)(position[i][c] - reach));
             node->box_max[c] = fmaxf(node->box_max[c], (float)(position[i][c] + reach));
         }
@@ -104,12 +109,15 @@ static void level_radii(struct spl_splat *splats, uint32_t count)
         splats[i].radius = (float)(sum / count);
 }
 
-/* Vertices from `at` on that a chunk takes: all of a line or, where it does not fit, what does; the next chunk begins
- * with the vertex that this one ends with. */
+/* Vertices from `at` on that a chunk takes, of lines of about one width: all of a line or, where it does not fit, what
+ * does; the next chunk begins with the vertex that this one ends with. */
 static uint32_t cut_lines(const struct spl_node_lines *lines, size_t at)
 {
     const struct spl_wire_vertex *v = lines->vertices + at;
     uint32_t count = lines->count - at < SPL_CHUNK_SPLATS ? (uint32_t)(lines->count - at) : SPL_CHUNK_SPLATS;
+    for (uint32_t i = 1; i < count; i++)
+        if (v[i - 1].point == SPL_WIRE_END && v[i].width > width_most * v->width)
+            return i;
     bool begins = v[count - 1].point != SPL_WIRE_END && v[count - 2].point == SPL_WIRE_END;
     return begins ? count - 1 : count;
 }
@@ -142,6 +150,7 @@ static void encode_lines(struct emit *e, struct scratch *w, const struct spl_tre
         uint32_t count = cut_lines(lines, at);
         struct spl_chunk *chunk = &out->chunks[out->chunk_count++];
         load_vertices(lines->vertices + at, count, node, vertices, position);
+        options.width = (double)lines->vertices[at + count / 2].width;
         uint32_t words = spl_chunk_encode(vertices, (const double(*)[3])position, count, &options, chunk,
                                           w->words + out->word_count, NULL);
         grow_box(header, vertices, position, chunk);
@@ -151,10 +160,34 @@ static void encode_lines(struct emit *e, struct scratch *w, const struct spl_tre
     }
 }
 
-/* Makes room for the discs' and the lines' chunks; each of these but the last takes at least so many vertices on. */
-static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, uint32_t streams, struct encoded *out)
+/* Adds the node's panels to its chunks, with what their points have beside colour. */
+static void add_panels(const struct emit *e, const struct spl_node_panels *panels, struct scratch *w,
+                       struct spl_node *header, struct encoded *out)
 {
-    size_t most = discs + vertices / (SPL_CHUNK_SPLATS - 2) + 1;
+    size_t first = 0;
+    for (uint32_t i = 0; i < panels->chunk_count; i++) {
+        uint32_t *words = w->words + out->word_count, used = spl_chunk_words(&panels->chunks[i]);
+        struct spl_chunk *chunk = &out->chunks[out->chunk_count];
+        *chunk = panels->chunks[i];
+        memcpy(words, panels->words + chunk->geometry_word, used * sizeof *words);
+        chunk->geometry_word = (uint32_t)out->word_count;
+        used += spl_emitted_streams_encode_panels(&e->out->streams, panels, first, chunk->count,
+                                                  out->codes[out->chunk_count++], words + used);
+        out->word_count += used;
+        first += chunk->count;
+    }
+    for (int c = 0; c < 3; c++) {
+        header->box_min[c] = fminf(header->box_min[c], panels->box_min[c]);
+        header->box_max[c] = fmaxf(header->box_max[c], panels->box_max[c]);
+    }
+}
+
+/* Makes room for the chunks of discs, lines and panels; each of the lines' but the last takes at least so many vertices
+ * on. */
+static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, size_t panels, uint32_t streams,
+                           struct encoded *out)
+{
+    size_t most = discs + vertices / (SPL_CHUNK_SPLATS - 2) + 1 + (vertices ? widths_most : 0) + panels;
     if (most > w->chunk_capacity) {
         free(w->words);
         w->chunk_capacity = 0;
@@ -165,8 +198,37 @@ static bool reserve_chunks(struct scratch *w, size_t discs, size_t vertices, uin
         w->chunk_capacity = most;
     }
     out->chunks = spl_alloc_raw(most, sizeof *out->chunks, NULL);
-    out->codes = spl_alloc(most, sizeof *out->codes, NULL); /* those of lines stay 0: vertices have no attributes */
+    out->codes = spl_alloc(most, sizeof *out->codes, NULL); /* those of lines stay 0: they have no attributes */
     return out->chunks && out->codes;
+}
+
+static int compare_spacings(const void *a, const void *b)
+{
+    const float *x = a, *y = b;
+    return (x[0] > y[0]) - (x[0] < y[0]);
+}
+
+/* The median radius of `count` discs, of which w->radii has `sample`, and of those that cells of panels stand for. */
+static float median_with_panels(struct scratch *w, uint32_t sample, uint32_t count,
+                                const struct spl_node_panels *panels)
+{
+    double total = 0, sum = 0;
+    uint32_t at = 0;
+    for (uint32_t i = 0; i < sample; i++) {
+        w->weighted[at][0] = w->radii[i];
+        w->weighted[at++][1] = (float)count / (float)sample;
+    }
+    for (uint32_t i = 0; i < panels->chunk_count && i < SPL_NODE_CHUNKS_MAX; i++) {
+        w->weighted[at][0] = panels->chunks[i].radius_mean;
+        w->weighted[at++][1] = (float)panels->cells[i];
+    }
+    qsort(w->weighted, at, sizeof *w->weighted, compare_spacings);
+    for (uint32_t i = 0; i < at; i++)
+        total += (double)w->weighted[i][1];
+    for (uint32_t i = 0; i < at; i++)
+        if (2 * (sum += (double)w->weighted[i][1]) >= total)
+            return w->weighted[i][0];
+    return w->weighted[at - 1][0];
 }
 
 static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct encoded *out)
@@ -180,24 +242,29 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         header->box_min[c] = INFINITY;
         header->box_max[c] = -INFINITY;
     }
-    for (uint32_t i = 0; i < count; i++) {
-        float radius = leaf ? p->radius[node->begin + i] : node->splats[i].radius;
+    for (uint32_t i = 0, at = 0; i < count; at++) {
+        if (leaf && spl_panels_has_point(p, node->begin + at))
+            continue;
+        float radius = leaf ? p->radius[node->begin + at] : node->splats[at].radius;
         for (int c = 0; c < 3; c++) {
             w->items[i].position[c] =
-                leaf ? (float)(p->axis[c][node->begin + i] - node->origin[c]) : node->splats[i].position[c];
+                leaf ? (float)(p->axis[c][node->begin + at] - node->origin[c]) : node->splats[at].position[c];
         }
-        w->items[i].index = i;
-        w->radii[i] = radius;
+        w->items[i].index = at;
+        w->radii[i++] = radius;
     }
-    uint32_t sample = count < 1023 ? count : 1023;
+    uint32_t sample = count < spacing_sample ? count : spacing_sample;
     for (uint32_t i = 0; i < sample; i++)
         w->radii[i] = w->radii[(uint64_t)i * count / sample];
-    header->spacing = spl_median(w->radii, sample) / SPL_RADIUS_SPACING;
+    header->spacing =
+        (node->panels ? median_with_panels(w, sample, count, node->panels) : spl_median(w->radii, sample)) /
+        SPL_RADIUS_SPACING;
 
     spl_chunks_cut(w->items, count);
     out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
     if (!spl_wires_get_node(e->wires, node->begin, node->end, leaf ? 0 : header->spacing, &w->lines) ||
-        !reserve_chunks(w, out->chunk_count, w->lines.count, e->out->streams.count, out))
+        !reserve_chunks(w, out->chunk_count, w->lines.count, node->panels ? node->panels->chunk_count : 0,
+                        e->out->streams.count, out))
         return false;
     for (uint32_t c = 0; c < out->chunk_count; c++) {
         struct spl_splat splats[SPL_CHUNK_SPLATS];
@@ -225,6 +292,8 @@ static bool encode_node(struct emit *e, struct scratch *w, size_t index, struct 
         out->error.normal_radians += error.normal_radians;
     }
     encode_lines(e, w, node, header, out);
+    if (node->panels)
+        add_panels(e, node->panels, w, header, out);
     out->words = spl_alloc_raw(out->word_count, sizeof *out->words, NULL);
     if (!out->words)
         return false;
@@ -253,6 +322,15 @@ static int reserve(struct spl_emitted *out, size_t wanted, size_t *capacity, str
     return *capacity > before ? spl_emitted_streams_reserve(&out->streams, *capacity, err) : SPL_OK;
 }
 
+static void add_panel_chunk(struct spl_emitted *out, const struct spl_chunk *chunk, bool leaf)
+{
+    bool mesh = spl_chunk_kind(chunk) == SPL_CHUNK_MESHES;
+    if (!spl_kind_has_panels(spl_chunk_kind(chunk)))
+        return;
+    *(mesh ? &out->meshes : &out->panels) += chunk->count;
+    *(mesh ? &out->mesh_points : &out->panel_points) += leaf ? spl_panels_get_points(chunk) : 0;
+}
+
 static int write_node(struct emit *e, size_t index, struct encoded *encoded, struct spl_dataset_writer *writer,
                       size_t *chunk_capacity, struct spl_emitted *out, struct spl_error *err)
 {
@@ -263,6 +341,7 @@ static int write_node(struct emit *e, size_t index, struct encoded *encoded, str
         out->ids += encoded->chunks[c].count;
         out->splats += spl_chunk_kind(&encoded->chunks[c]) == SPL_CHUNK_DISCS ? encoded->chunks[c].count : 0;
         out->pieces += spl_chunk_count_pieces(&encoded->chunks[c]);
+        add_panel_chunk(out, &encoded->chunks[c], !from->child_count);
         spl_chunk_add_bits(&encoded->chunks[c], out->bits);
     }
     if (from->depth > UINT8_MAX)
@@ -312,7 +391,7 @@ static void unite_boxes(struct spl_node *nodes, uint32_t count)
 
 static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *err)
 {
-    size_t largest = 0;
+    size_t largest = 1; /* there may be panels alone */
     for (uint32_t i = 0; i < e->tree->count; i++)
         largest = e->tree->nodes[i].splat_count > largest ? e->tree->nodes[i].splat_count : largest;
     size_t chunks = (largest + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
@@ -326,7 +405,9 @@ static int allocate(struct emit *e, struct spl_emitted *out, struct spl_error *e
         struct scratch *w = &e->scratch[t];
         w->items = spl_alloc_raw(largest, sizeof *w->items, err);
         w->radii = spl_alloc_raw(largest, sizeof *w->radii, err);
-        if (!w->items || !w->radii)
+        if (e->points->plane)
+            w->weighted = spl_alloc_raw(spacing_sample + SPL_NODE_CHUNKS_MAX, sizeof *w->weighted, err);
+        if (!w->items || !w->radii || (e->points->plane && !w->weighted))
             return SPL_E_NOMEM;
     }
     return 0;
@@ -374,6 +455,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     for (unsigned t = 0; e.scratch && t < stage->threads; t++) {
         free(e.scratch[t].items);
         free(e.scratch[t].radii);
+        free(e.scratch[t].weighted);
         free(e.scratch[t].words);
         spl_node_lines_finish(&e.scratch[t].lines);
     }

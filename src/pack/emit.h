@@ -13,7 +13,7 @@ struct spl_emitted {
     struct spl_chunk *chunks;
     uint64_t chunk_count;
     uint32_t pages;
-    uint64_t splats, pieces, ids; /* as in struct spl_dataset_info */
+    uint64_t splats, pieces, panels, panel_points, meshes, mesh_points, ids; /* as in struct spl_dataset_info */
     uint64_t bits[SPL_ATTRIBUTE_COUNT];
     struct spl_emitted_streams streams;
     struct spl_chunk_error error; /* sums over all splats */

@@ -7,7 +7,7 @@
 #include "base/memory.h"
 #include "pack/kept.h"
 
-/* What an attribute of the dataset is of a point, and of an inner node's splat. */
+/* What an attribute of the dataset is of a point, of an inner node's splat and of a panel. */
 static double class_of_point(const struct spl_points *points, size_t i)
 {
     return points->color_class[i] >> 24;
@@ -18,6 +18,11 @@ static double class_of_inner(const struct spl_inner_splat *splat)
     return splat->color_class >> 24;
 }
 
+static double class_of_panel(const struct spl_panel_values *values)
+{
+    return values->classification;
+}
+
 static double uncertainty_of_point(const struct spl_points *points, size_t i)
 {
     return (double)points->uncertainty[i];
@@ -26,6 +31,11 @@ static double uncertainty_of_point(const struct spl_points *points, size_t i)
 static double uncertainty_of_inner(const struct spl_inner_splat *splat)
 {
     return (double)splat->uncertainty;
+}
+
+static double uncertainty_of_panel(const struct spl_panel_values *values)
+{
+    return values->uncertainty;
 }
 
 static bool has_class(const struct spl_points *points)
@@ -42,9 +52,10 @@ static const struct attribute {
     bool (*has)(const struct spl_points *points);
     double (*of_point)(const struct spl_points *points, size_t i);
     double (*of_inner)(const struct spl_inner_splat *splat);
+    double (*of_panel)(const struct spl_panel_values *values);
 } attributes[SPL_STREAM_KNOWN_COUNT] = {
-    [SPL_STREAM_CLASS] = {has_class, class_of_point, class_of_inner},
-    [SPL_STREAM_UNCERTAINTY] = {has_surface, uncertainty_of_point, uncertainty_of_inner},
+    [SPL_STREAM_CLASS] = {has_class, class_of_point, class_of_inner, class_of_panel},
+    [SPL_STREAM_UNCERTAINTY] = {has_surface, uncertainty_of_point, uncertainty_of_inner, uncertainty_of_panel},
 };
 
 void spl_emitted_streams_init(struct spl_emitted_streams *streams, const struct spl_points *points)
@@ -109,6 +120,24 @@ uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, c
         else
             take_scalar(&points->scalar[streams->which[s] - SPL_STREAM_KNOWN_COUNT], s - first_scalar,
                         streams->scalar_count, node, items, count, values);
+        used +=
+            spl_stream_encode(spl_stream_type_from_name(streams->list[s].type), values, count, &codes[s], words + used);
+    }
+    return used;
+}
+
+uint32_t spl_emitted_streams_encode_panels(const struct spl_emitted_streams *streams,
+                                           const struct spl_node_panels *panels, size_t first, uint32_t count,
+                                           struct spl_stream_code *codes, uint32_t *words)
+{
+    uint32_t used = 0;
+    uint32_t first_scalar = streams->count - streams->scalar_count;
+    for (uint32_t s = 0; s < streams->count; s++) {
+        double values[SPL_PANELS_MAX];
+        for (uint32_t i = 0; i < count; i++)
+            values[i] = s < first_scalar
+                            ? attributes[streams->which[s]].of_panel(&panels->values[first + i])
+                            : panels->numbers[(first + i) * streams->scalar_count + s - first_scalar];
         used +=
             spl_stream_encode(spl_stream_type_from_name(streams->list[s].type), values, count, &codes[s], words + used);
     }

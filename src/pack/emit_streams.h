@@ -25,6 +25,11 @@ uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, c
                                     const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count,
                                     struct spl_stream_code *codes, uint32_t *words);
 
+/* The same of a chunk of panels: `count` of the node's from its `first` on. */
+uint32_t spl_emitted_streams_encode_panels(const struct spl_emitted_streams *streams,
+                                           const struct spl_node_panels *panels, size_t first, uint32_t count,
+                                           struct spl_stream_code *codes, uint32_t *words);
+
 /* Room for the codes of `chunks` chunks. */
 int spl_emitted_streams_reserve(struct spl_emitted_streams *streams, size_t chunks, struct spl_error *err);
 

@@ -288,6 +288,8 @@ void spl_points_finish(struct spl_points *points)
     free(points->uncertainty);
     free(points->linear);
     free(points->clip);
+    free(points->plane);
     free(points->stations);
+    free(points->eyes);
     *points = (struct spl_points){0};
 }

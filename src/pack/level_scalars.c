@@ -8,12 +8,7 @@
 #include "base/memory.h"
 #include "dataset/streams.h"
 
-struct spl_scalar_mix {
-    double sum, weight;
-    uint32_t number, votes; /* the majority by pairing off */
-};
-
-static void add(struct spl_scalar_mix *mix, uint32_t number, double weight)
+void spl_scalar_mix_add(struct spl_scalar_mix *mix, uint32_t number, double weight)
 {
     if (number == SPL_STREAM_NONE)
         return;
@@ -24,45 +19,47 @@ static void add(struct spl_scalar_mix *mix, uint32_t number, double weight)
     mix->votes += mix->number == number ? 1 : -1u;
 }
 
-static uint32_t finish(const struct spl_scalar_mix *mix, bool votes)
+uint32_t spl_scalar_mix_finish(const struct spl_scalar_mix *mix, bool votes)
 {
     if (!(mix->weight > 0))
         return SPL_STREAM_NONE;
     return votes ? mix->number : (uint32_t)(mix->sum / mix->weight + 0.5);
 }
 
-bool spl_scalars_mix(struct spl_scalar_mixer *mixer, const struct spl_points *points, const struct spl_tree *tree,
-                     struct spl_tree_node *node, const uint32_t *of, const struct spl_inner_splat *inputs)
+unsigned spl_scalars_take_point(const struct spl_points *points, size_t i, uint32_t *numbers)
 {
     int scalars[SPL_POINT_SCALARS];
     unsigned count = spl_points_list_scalars(points, scalars);
-    size_t splats = node->splat_count;
-    if (!count)
+    for (unsigned s = 0; s < count; s++)
+        numbers[s] = spl_scalar_number(&points->scalar[scalars[s]], i);
+    return count;
+}
+
+bool spl_scalars_mix(struct spl_scalar_mixer *mixer, const struct spl_points *points, const uint32_t *numbers,
+                     const uint32_t *of, const struct spl_inner_splat *inputs, size_t count, size_t splats,
+                     uint32_t **out)
+{
+    int scalars[SPL_POINT_SCALARS];
+    unsigned scalar_count = spl_points_list_scalars(points, scalars);
+    *out = NULL;
+    if (!scalar_count)
         return true;
     if (splats > mixer->capacity) {
         free(mixer->mixes);
         mixer->mixes = spl_alloc_raw(splats, sizeof *mixer->mixes, NULL);
         mixer->capacity = mixer->mixes ? splats : 0;
     }
-    node->numbers = spl_alloc_raw(splats * count, sizeof *node->numbers, NULL);
-    if (!mixer->mixes || !node->numbers)
+    *out = spl_alloc_raw(splats * scalar_count, sizeof **out, NULL);
+    if (!mixer->mixes || !*out)
         return false;
-    for (unsigned s = 0; s < count; s++) {
-        const struct spl_scalar_values *scalar = &points->scalar[scalars[s]];
-        size_t input = 0;
+    for (unsigned s = 0; s < scalar_count; s++) {
         memset(mixer->mixes, 0, splats * sizeof *mixer->mixes);
-        for (uint32_t c = 0; c < node->child_count; c++) {
-            const struct spl_tree_node *child = &tree->nodes[node->first_child + c];
-            for (uint32_t i = 0; i < child->splat_count; i++, input++) {
-                double radius = (double)inputs[input].radius;
-                add(&mixer->mixes[of[input] - 1],
-                    child->child_count ? child->numbers[(size_t)i * count + s]
-                                       : spl_scalar_number(scalar, child->begin + i),
-                    radius * radius);
-            }
+        for (size_t i = 0; i < count; i++) {
+            double radius = (double)inputs[i].radius;
+            spl_scalar_mix_add(&mixer->mixes[of[i] - 1], numbers[i * scalar_count + s], radius * radius);
         }
         for (size_t k = 0; k < splats; k++)
-            node->numbers[k * count + s] = finish(&mixer->mixes[k], scalar->votes);
+            (*out)[k * scalar_count + s] = spl_scalar_mix_finish(&mixer->mixes[k], points->scalar[scalars[s]].votes);
     }
     return true;
 }

@@ -47,9 +47,12 @@ struct scratch { /* of one worker */
     struct cluster *clusters;
     uint32_t *table; /* cell -> cluster + 1 */
     uint32_t *of;    /* input -> cluster */
+    uint32_t *numbers; /* of each input its scalars */
     struct spl_scalar_mixer mixer;
-    float *radii;
-    size_t input_capacity, table_size;
+    size_t input_capacity, cluster_capacity, table_size;
+    struct spl_panel_left left; /* points that were in panels below the node, and are splats from it on */
+    struct spl_inner_splat *left_splats;
+    uint32_t *left_numbers, left_count;
 };
 
 struct levels {
@@ -58,35 +61,48 @@ struct levels {
     struct spl_stage *stage;
     struct scratch *scratch;
     const uint32_t *order; /* inner nodes of the depth at work */
+    size_t scalars;        /* how many the points have */
     atomic_bool failed;
 };
 
-/* The child's splats, their positions relative to the parent's origin. */
-static size_t take_child(const struct spl_points *p, const struct spl_tree_node *parent,
-                         const struct spl_tree_node *child, struct spl_inner_splat *out)
+/* A point as a splat of `parent`. */
+static void load_point(const struct spl_points *p, const struct spl_tree_node *parent, size_t i,
+                       struct spl_inner_splat *out)
+{
+    for (int c = 0; c < 3; c++) {
+        out->position[c] = (float)(p->axis[c][i] - parent->origin[c]);
+        out->normal[c] = p->normal[i][c];
+    }
+    out->radius = p->radius[i];
+    out->uncertainty = p->uncertainty[i];
+    out->color_class = p->color_class[i];
+    out->linear = p->linear && p->linear[i];
+}
+
+/* Puts the child's splats into w->input from `at` on, their positions relative to the parent's origin, and their scalars
+ * beside them. Returns where they end. */
+static size_t take_child(const struct levels *l, struct scratch *w, const struct spl_tree_node *parent,
+                         const struct spl_tree_node *child, size_t at)
 {
     if (child->child_count) {
         double shift[3];
         for (int c = 0; c < 3; c++)
             shift[c] = child->origin[c] - parent->origin[c];
-        for (uint32_t i = 0; i < child->splat_count; i++) {
-            out[i] = child->splats[i];
+        for (uint32_t i = 0; i < child->splat_count; i++, at++) {
+            w->input[at] = child->splats[i];
             for (int c = 0; c < 3; c++)
-                out[i].position[c] = (float)(shift[c] + child->splats[i].position[c]);
+                w->input[at].position[c] = (float)(shift[c] + child->splats[i].position[c]);
+            for (size_t k = 0; k < l->scalars; k++)
+                w->numbers[at * l->scalars + k] = child->numbers[(size_t)i * l->scalars + k];
         }
-        return child->splat_count;
+        return at;
     }
-    for (size_t i = child->begin; i < child->end; i++, out++) {
-        for (int c = 0; c < 3; c++) {
-            out->position[c] = (float)(p->axis[c][i] - parent->origin[c]);
-            out->normal[c] = p->normal[i][c];
+    for (size_t i = child->begin; i < child->end; i++)
+        if (!spl_panels_has_point(l->points, i)) {
+            load_point(l->points, parent, i, &w->input[at]);
+            spl_scalars_take_point(l->points, i, w->numbers + at++ * l->scalars);
         }
-        out->radius = p->radius[i];
-        out->uncertainty = p->uncertainty[i];
-        out->color_class = p->color_class[i];
-        out->linear = p->linear && p->linear[i];
-    }
-    return child->splat_count;
+    return at;
 }
 
 static double median_radius(const struct spl_inner_splat *splats, size_t count, float *radii)
@@ -231,40 +247,85 @@ static void finish_cluster(const struct cluster *k, double cell, struct spl_inne
         out->color_class |= (uint32_t)(k->color[c] / weight + 0.5) << 8 * c;
 }
 
-static bool reserve(struct scratch *w, size_t count)
+/* Room for `count` inputs and their clusters, of which there may be `clusters`. */
+static bool reserve(struct scratch *w, size_t count, size_t clusters, size_t scalars)
 {
-    if (count <= w->input_capacity)
-        return true;
-    size_t table = 256;
-    while (table < count)
-        table *= 2;
-    free(w->input);
-    free(w->clusters);
-    free(w->table);
-    free(w->of);
-    w->input_capacity = 0;
-    w->input = spl_alloc_raw(count, sizeof *w->input, NULL);
-    w->clusters = spl_alloc_raw(count / 3 + 8, sizeof *w->clusters, NULL);
-    w->table = spl_alloc_raw(table, sizeof *w->table, NULL);
-    w->of = spl_alloc_raw(count, sizeof *w->of, NULL);
-    if (!w->input || !w->clusters || !w->table || !w->of)
-        return false;
-    w->input_capacity = count;
-    w->table_size = table;
-    return true;
+    if (count > w->input_capacity) {
+        size_t table = 256;
+        while (table < count)
+            table *= 2;
+        free(w->input);
+        free(w->table);
+        free(w->of);
+        free(w->numbers);
+        w->input_capacity = 0;
+        w->input = spl_alloc_raw(count, sizeof *w->input, NULL);
+        w->table = spl_alloc_raw(table, sizeof *w->table, NULL);
+        w->of = spl_alloc_raw(count, sizeof *w->of, NULL);
+        w->numbers = spl_alloc_raw(count * scalars + 1, sizeof *w->numbers, NULL);
+        if (!w->input || !w->table || !w->of || !w->numbers)
+            return false;
+        w->input_capacity = count;
+        w->table_size = table;
+    }
+    if (clusters > w->cluster_capacity) {
+        free(w->clusters);
+        w->clusters = spl_alloc_raw(clusters, sizeof *w->clusters, NULL);
+        w->cluster_capacity = w->clusters ? clusters : 0;
+    }
+    return w->cluster_capacity >= clusters;
 }
 
-static bool build_node(struct levels *l, struct scratch *w, struct spl_tree_node *node)
+/* Points that the node's panels have left become splats of their children's spacing: parts of its own. */
+static bool make_left(struct levels *l, struct scratch *w, const struct spl_tree_node *node)
 {
+    const struct spl_panel_left *left = &w->left;
+    free(w->left_splats);
+    free(w->left_numbers);
+    w->left_splats = NULL;
+    w->left_numbers = NULL;
+    w->left_count = 0;
+    if (!left->count)
+        return true;
+    if (!reserve(w, left->count, left->count + 2, l->scalars))
+        return false;
+    for (size_t i = 0; i < left->count; i++) {
+        load_point(l->points, node, left->points[i], &w->input[i]);
+        spl_scalars_take_point(l->points, left->points[i], w->numbers + i * l->scalars);
+    }
+    size_t clusters = cluster(w, left->count, left->cell, left->count, l->tree->for_pruning);
+    w->left_splats = spl_alloc_raw(clusters, sizeof *w->left_splats, NULL);
+    if (!w->left_splats)
+        return false;
+    for (size_t k = 0; k < clusters; k++)
+        finish_cluster(&w->clusters[k + 1], left->cell, &w->left_splats[k]);
+    w->left_count = (uint32_t)clusters;
+    return spl_scalars_mix(&w->mixer, l->points, w->numbers, w->of, w->input, left->count, clusters, &w->left_numbers);
+}
+
+static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *node)
+{
+    struct scratch *w = &l->scratch[worker];
     const struct spl_tree_node *children = l->tree->nodes + node->first_child;
     size_t count = 0, at = 0, clusters = 0;
     float radii[255];
-    for (uint32_t c = 0; c < node->child_count; c++)
-        count += children[c].splat_count;
-    if (!reserve(w, count))
+    if (l->tree->panels &&
+        (!spl_panels_make_inner(l->tree->panels, node, worker, &w->left) || !make_left(l, w, node)))
         return false;
     for (uint32_t c = 0; c < node->child_count; c++)
-        at += take_child(l->points, node, &children[c], w->input + at);
+        count += children[c].splat_count;
+    count += w->left_count;
+    if (!count)
+        return true; /* of panels alone */
+    if (!reserve(w, count, count / 3 + 8, l->scalars))
+        return false;
+    for (uint32_t c = 0; c < node->child_count; c++)
+        at = take_child(l, w, node, &children[c], at);
+    if (w->left_count) {
+        memcpy(w->input + at, w->left_splats, w->left_count * sizeof *w->input);
+        for (size_t k = 0; k < w->left_count * l->scalars; k++)
+            w->numbers[at * l->scalars + k] = w->left_numbers[k];
+    }
 
     bool surfaces = l->tree->for_pruning;
     double base = fmin((double)count, (surfaces ? pruned_inner_most : inner_most) / most);
@@ -289,7 +350,7 @@ static bool build_node(struct levels *l, struct scratch *w, struct spl_tree_node
     for (size_t k = 0; k < clusters; k++)
         finish_cluster(&w->clusters[k + 1], cell, &node->splats[k]);
     node->splat_count = (uint32_t)clusters;
-    return spl_scalars_mix(&w->mixer, l->points, l->tree, node, w->of, w->input);
+    return spl_scalars_mix(&w->mixer, l->points, w->numbers, w->of, w->input, count, clusters, &node->numbers);
 }
 
 static void build_nodes(void *context, size_t begin, size_t end, unsigned worker)
@@ -297,7 +358,7 @@ static void build_nodes(void *context, size_t begin, size_t end, unsigned worker
     struct levels *l = context;
     for (size_t i = begin; i < end; i++) {
         struct spl_tree_node *node = &l->tree->nodes[l->order[i]];
-        if (!build_node(l, &l->scratch[worker], node))
+        if (!build_node(l, worker, node))
             atomic_store(&l->failed, true);
         if (atomic_load(&l->failed) || spl_stage_is_cancelled(l->stage))
             return;
@@ -318,6 +379,8 @@ int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, str
         goto done;
     }
     l.order = order;
+    int scalars[SPL_POINT_SCALARS];
+    l.scalars = spl_points_list_scalars(points, scalars);
     for (uint32_t i = 0; i < tree->count; i++)
         if (tree->nodes[i].child_count)
             order[inner++] = i;
@@ -342,6 +405,10 @@ done:
         free(l.scratch[t].clusters);
         free(l.scratch[t].table);
         free(l.scratch[t].of);
+        free(l.scratch[t].numbers);
+        free(l.scratch[t].left.points);
+        free(l.scratch[t].left_splats);
+        free(l.scratch[t].left_numbers);
         spl_scalar_mixer_finish(&l.scratch[t].mixer);
     }
     free(l.scratch);

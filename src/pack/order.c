@@ -253,8 +253,8 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
 {
     struct order o = {.points = points, .count = points->count, .stage = stage};
     int rc = SPL_E_NOMEM;
-    o.pieces = stage->threads;
-    o.piece = (o.count + o.pieces - 1) / o.pieces;
+    o.piece = (o.count + stage->threads - 1) / stage->threads;
+    o.pieces = (unsigned)((o.count + o.piece - 1) / o.piece); // fewer than threads, where there are few points
     spl_stage_begin(stage, "ordering", "points", o.count);
     o.key = spl_alloc_raw(o.count, sizeof *o.key, err);
     o.key_to = spl_alloc_raw(o.count, sizeof *o.key, err);

@@ -269,8 +269,8 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
                             spl_alloc_raw(count, 1, err), spl_alloc_raw(count, sizeof *forest.best, err),
                             (uint32_t)count};
     struct spl_orient_edge *spare = spl_alloc_raw(edge_count, sizeof *spare, err);
-    double *up = spl_alloc(count, sizeof *up, err);
-    bool enough = forest.parent && forest.flip && forest.anchored && forest.best && spare && up;
+    double *outward = spl_alloc(count, sizeof *outward, err);
+    bool enough = forest.parent && forest.flip && forest.anchored && forest.best && spare && outward;
     for (size_t i = 0; enough && i < count; i++) {
         forest.parent[i] = (uint32_t)i;
         forest.anchored[i] = components[i].anchored;
@@ -280,18 +280,18 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
     for (size_t i = 0; enough && i < count; i++) {
         uint8_t sign;
         uint32_t root = find_root(&forest, (uint32_t)i, &sign);
-        up[root] += sign ? -components[i].up : components[i].up;
+        outward[root] += sign ? -components[i].outward : components[i].outward;
     }
     for (size_t i = 0; enough && i < count; i++) {
         uint8_t sign;
         uint32_t root = find_root(&forest, (uint32_t)i, &sign);
-        components[i].flip = sign ^ (!forest.anchored[root] && up[root] < 0);
+        components[i].flip = sign ^ (!forest.anchored[root] && outward[root] < 0);
     }
     free(forest.parent);
     free(forest.flip);
     free(forest.anchored);
     free(forest.best);
     free(spare);
-    free(up);
+    free(outward);
     return enough ? SPL_OK : SPL_E_NOMEM;
 }

@@ -6,7 +6,7 @@
 
 /* A set of points whose normals have settled signs relative to each other: all within one block. */
 struct spl_component {
-    double up;     /* sum of the normals' components upwards */
+    double outward; /* sum over its normals of spl_eyes_get_outward() */
     bool anchored; /* holds a point whose normal was given or faces its station: the set is never turned */
     uint8_t flip;  /* result of spl_orient_components(): 1 = turn the set's normals */
 };
@@ -39,7 +39,7 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
                           const uint32_t *neighbours, unsigned k);
 
 /* Decides component.flip over all blocks, from the edges between their components, which it moves and unites in place:
- * anchored components stay, the others go upwards on the whole. */
+ * anchored components stay, the others show outwards on the whole. */
 int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
                           size_t edge_count, struct spl_error *err);
 

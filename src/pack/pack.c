@@ -1,9 +1,11 @@
 /* spl_pack(): the stages in a row, and what the file says about itself.
  *
  * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 59 while neighbours are
- * found, 63 while clip lines are, and the inner levels' 12 on top of 54 while encoding. Each scalar adds the 1 to 8 of
- * its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes 60 more while wires are joined, and
- * besides about 50 of pairs, or of the vertex that becomes of it and stays until the end.
+ * found, 63 while clip lines are, and the inner levels' 12 on top of 54 while encoding. Where planes are looked for, 93
+ * meanwhile and 4 more from then on; outlining them for an export takes 4, and each thread 60 MB and 20 a point of a
+ * plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes 60
+ * more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until the
+ * end. Stations have seen points, not panels: where there are both, the scan is written once more without panels.
  * The output's temporary file is made first, so that an unwritable place is known before hours of work, and is gone
  * unless the last rename succeeded. Runs on the caller's thread; parallel loops end before it goes on. */
 #include <splatd/pack.h>
@@ -12,26 +14,29 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/dataset.h"
-#include "dataset/rewrite.h"
 #include "geom/unit.h"
+#include "pack/check.h"
 #include "pack/emit.h"
+#include "pack/export/export.h"
+#include "pack/eyes.h"
 #include "pack/kept.h"
 #include "pack/linear.h"
 #include "pack/maps/maps.h"
 #include "pack/median.h"
 #include "pack/part.h"
+#include "pack/passes.h"
+#include "pack/planes/planes.h"
 #include "pack/prune.h"
 #include "pack/system.h"
 #include "pack/texture/pass.h"
-#include "pack/texture/photographs.h"
 #include "pack/up.h"
 #include "pack/view.h"
 #include "pack/wires/wires.h"
@@ -46,58 +51,13 @@ struct pack {
     struct spl_system system;
     const char *up_from; // static; NULL: z is up, because nobody says otherwise
     struct spl_points points;
+    struct spl_planes planes; /* none unless options->primitives */
     struct spl_wires wires;
+    struct spl_panel_maker panels;
     struct spl_tree tree;
     struct spl_emitted emitted;
     struct spl_dataset_writer *writer;
 };
-
-/* What there is to put onto the scan: photographs, pictures for maps. Loaded before anything is packed. */
-struct passes {
-    const struct spl_pack_options *options;
-    struct spl_stage *stage;
-    struct spl_map_options with; /* of maps, where the scans bring pictures along */
-    struct spl_view_list photographs, pictures;
-    struct spl_photo_report photos;
-    struct spl_map_report maps;
-};
-
-static int check_options(struct pack *p, struct spl_error *err)
-{
-    const struct spl_pack_options *o = p->options;
-    if (!o->input_count)
-        return spl_fail_field(err, SPL_E_USAGE, "inputs", "name at least one scan to pack");
-    if (!o->output || !o->output[0])
-        return spl_fail_field(err, SPL_E_USAGE, "output", "name the dataset to write, such as scan.spld");
-    p->neighbours = o->neighbours ? o->neighbours : 12;
-    if (p->neighbours < 3 || p->neighbours > SPL_NEIGHBOURS_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "neighbours", "%u neighbours; 3 to %d can be used", p->neighbours,
-                              SPL_NEIGHBOURS_MAX);
-    double position = o->position_error != 0 ? o->position_error : 0.016;
-    double normal = o->normal_error != 0 ? o->normal_error : 1;
-    if (!(position >= 1e-6 && position <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "position-error",
-                              "%g; the mean error is a share of the splat radius, "
-                              "1e-6 to 1",
-                              position);
-    if (!(normal >= 0.01 && normal <= 30))
-        return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
-                              normal);
-    if (!(isfinite(o->up[0]) && isfinite(o->up[1]) && isfinite(o->up[2])))
-        return spl_fail_field(err, SPL_E_USAGE, "up", "%g, %g, %g; up is a direction of three finite numbers", o->up[0],
-                              o->up[1], o->up[2]);
-    p->chunk = (struct spl_chunk_options){
-        .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05};
-    struct stat output, input;
-    if (stat(o->output, &output) == 0) {
-        for (size_t i = 0; i < o->input_count; i++)
-            if (stat(o->inputs[i], &input) == 0 && input.st_dev == output.st_dev && input.st_ino == output.st_ino)
-                return spl_fail_field(err, SPL_E_USAGE, "output", "%s is an input too; choose another name", o->output);
-        if (!S_ISREG(output.st_mode))
-            return spl_fail_field(err, SPL_E_USAGE, "output", "%s exists and is no file", o->output);
-    }
-    return 0;
-}
 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
@@ -115,6 +75,12 @@ static int median_radius(const struct spl_points *points, double *median, struct
 static json_t *json_vector(const double v[3])
 {
     return json_pack("[f, f, f]", v[0], v[1], v[2]);
+}
+
+/* Of all splats; 0 where panels have taken the place of all of them. */
+static double mean_error(const struct pack *p, double sum)
+{
+    return p->emitted.splats ? sum / (double)p->emitted.splats : 0;
 }
 
 static json_t *make_meta(const struct pack *p, double radius, const struct spl_default_view *view)
@@ -145,8 +111,8 @@ static json_t *make_meta(const struct pack *p, double radius, const struct spl_d
                      spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",
                      p->chunk.position_error, "normal_error_bound", p->chunk.normal_error * 180 / M_PI,
                      "points_skipped", (json_int_t)points->points_skipped, "duplicates", (json_int_t)points->duplicates,
-                     "position_error", p->emitted.error.position_over_radius / (double)p->emitted.splats,
-                     "normal_error", p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI);
+                     "position_error", mean_error(p, p->emitted.error.position_over_radius),
+                     "normal_error", mean_error(p, p->emitted.error.normal_radians) * 180 / M_PI);
 }
 
 static int write_dataset(struct pack *p, struct spl_error *err)
@@ -172,6 +138,11 @@ static int write_dataset(struct pack *p, struct spl_error *err)
                             json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));
     if (p->scans.inputs->left_out_count)
         json_object_set_new(meta, "skipped", spl_scans_describe_left_out(&p->scans));
+    if (p->options->primitives != SPL_PRIMITIVES_OFF)
+        json_object_set_new(meta, "primitives",
+                            json_pack("{s:s, s:I, s:I, s:f, s:f}", "which", "all", "planes", (json_int_t)p->planes.flat,
+                                      "pieces", (json_int_t)(p->planes.count - p->planes.flat), "error_bound",
+                                      p->planes.bound, "noise", p->planes.noise));
     spl_stage_begin(p->stage, "writing", NULL, 0);
     rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);
@@ -189,12 +160,16 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
         .leaf_splats = p->points.count,
         .splats = p->emitted.splats,
         .pieces = p->emitted.pieces,
+        .panels = p->emitted.panels,
+        .panel_points = p->emitted.panel_points,
+        .meshes = p->emitted.meshes,
+        .mesh_points = p->emitted.mesh_points,
         .levels = p->tree.levels,
         .nodes = p->tree.count,
         .chunks = p->emitted.chunk_count,
         .pages = p->emitted.pages,
-        .position_error = p->emitted.error.position_over_radius / (double)p->emitted.splats,
-        .normal_error = p->emitted.error.normal_radians / (double)p->emitted.splats * 180 / M_PI,
+        .position_error = mean_error(p, p->emitted.error.position_over_radius),
+        .normal_error = mean_error(p, p->emitted.error.normal_radians) * 180 / M_PI,
         .seconds = (double)(spl_now_ns() - begin_ns) / 1e9,
         .part_of = spl_part_of(&p->scans),
     };
@@ -209,36 +184,106 @@ static void fill_report(const struct pack *p, uint64_t begin_ns, struct spl_pack
 }
 
 /* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
-static void plan(const struct pack *p, const struct passes *later)
+static void plan(const struct pack *p, const struct spl_passes *later)
 {
     static const struct {
         const char *name;
         double seconds;
         bool of_surface;
     } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
-                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"joining wires", 0.05, false},
-                 {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"planes", 0.5, true},
+                 {"joining wires", 0.05, false}, {"outlines", 0.2, true}, {"panels", 0.3, true},
+                 {"levels", 0.2, false}, {"encoding", 0.25, false}, {"writing", 0.3, false}};
     uint64_t points = 0;
+    bool twice = later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF; /* the end, without panels */
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (!parts[i].of_surface || !p->options->points_only)
-            spl_stage_plan(p->stage, parts[i].name, parts[i].seconds * 1e-6 * (double)points, i ? 0 : points);
+        if ((!parts[i].of_surface || !p->options->points_only) &&
+            ((strcmp(parts[i].name, "planes") && strcmp(parts[i].name, "panels")) ||
+             p->options->primitives != SPL_PRIMITIVES_OFF) &&
+            (strcmp(parts[i].name, "outlines") || p->options->export_primitives))
+            spl_stage_plan(p->stage, parts[i].name,
+                           (parts[i].seconds + (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
+                               (double)points,
+                           i ? 0 : points);
     if (later && later->photographs.count)
         spl_photos_plan(p->options->photos, p->stage, (uint32_t)later->photographs.count,
                         (uint64_t)(1.33 * (double)points), 0);
-    if (p->options->maps)
-        spl_maps_plan(p->stage, later ? (uint32_t)later->pictures.count : 0, points);
+    if (later && p->options->maps) /* scans say with their points how many stations they have */
+        spl_maps_plan(p->stage, &later->pictures, 1, points);
+}
+
+static int find_planes(struct pack *p, struct spl_error *err)
+{
+    double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
+    const struct spl_planes_options planes = {.error = p->options->error / unit, .relief = true};
+    if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
+        return 0;
+    return spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
+}
+
+/* The tree with its levels; panels first, which inner nodes are made of too. */
+static int build_tree(struct pack *p, struct spl_error *err)
+{
+    int rc = spl_tree_build(&p->tree, &p->points, err);
+    if (!rc && p->planes.count) {
+        p->tree.panels = &p->panels;
+        rc = spl_panel_maker_init(&p->panels, &p->points, &p->planes, p->stage->threads, err);
+        if (!rc)
+            rc = spl_panels_make_leaves(&p->panels, &p->tree, p->stage, err);
+    }
+    if (!rc)
+        rc = spl_levels_build(&p->tree, &p->points, p->stage, err);
+    spl_panel_maker_finish(&p->panels);
+    p->tree.panels = NULL;
+    return rc;
+}
+
+/* The dataset as it is without panels: what stations saw, for maps. After the other, of which nothing is left in *p. */
+static int write_points(const struct pack *p, const char *output, struct spl_error *err)
+{
+    struct pack discs = *p;
+    discs.points.plane = NULL;
+    discs.planes = (struct spl_planes){0};
+    discs.tree = (struct spl_tree){0};
+    discs.writer = NULL;
+    int rc = spl_dataset_writer_create(output, &discs.writer, err);
+    if (!rc)
+        rc = build_tree(&discs, err);
+    if (!rc)
+        rc = write_dataset(&discs, err);
+    spl_dataset_writer_destroy(discs.writer);
+    spl_emitted_finish(&discs.emitted);
+    spl_tree_finish(&discs.tree);
+    return rc;
 }
 
 static int join_wires(struct pack *p, struct spl_error *err)
 {
-    int rc = spl_wires_find(&p->wires, &p->points, p->stage, err);
+    double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
+    const struct spl_wires_options options = {.noise = p->planes.noise, .error = p->options->error / unit};
+    bool lines = p->options->primitives != SPL_PRIMITIVES_OFF && !p->options->points_only;
+    int rc = spl_wires_find(&p->wires, &p->points, lines ? &options : NULL, p->stage, err);
     if (!rc && p->wires.cut_short && p->options->warn)
         p->options->warn(p->options->progress_context,
                          "points on wires, poles and cables take more steps to join than those of a scan; the rest of "
                          "them stays open: pack with --no-linear if there are none");
     return rc;
+}
+
+/* The file of --export-primitives, which is written after the dataset. */
+struct drawing {
+    char *text; /* owned; NULL = none */
+    size_t length;
+};
+
+static int export_primitives(struct pack *p, struct drawing *drawing, struct spl_error *err)
+{
+    if (!p->options->export_primitives)
+        return 0;
+    return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
+                                 p->stage, &drawing->text, &drawing->length, err);
 }
 
 /* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */
@@ -268,14 +313,18 @@ static int gather(struct pack *p, struct spl_system_options *said, struct spl_er
     return spl_system_find(&p->system, &p->scans, said, err);
 }
 
+/* Where there are panels and `later` makes maps, *points becomes true and the scan without panels is written to
+ * `points_path`. */
 static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *inputs, const char *output,
-                     const struct passes *later, struct spl_stage *stage, struct spl_pack_report *report,
-                     struct spl_error *err)
+                     const char *points_path, bool *points, const struct spl_passes *later, struct drawing *drawing,
+                     struct spl_stage *stage, struct spl_pack_report *report, struct spl_error *err)
 {
     struct pack p = {.options = options, .stage = stage};
     struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
-    int rc = check_options(&p, err);
+    int rc = spl_pack_check(options, &p.neighbours, &p.chunk, err);
+    if (!rc && options->export_primitives)
+        rc = spl_export_check(options->export_primitives, (const char *const *)inputs->paths, inputs->count, err);
     if (!rc)
         rc = spl_kept_read(&p.keep, options->keep, err);
     if (!rc)
@@ -295,8 +344,12 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
         plan(&p, later);
         rc = gather(&p, &said, err);
     }
+    if (!rc && later && options->maps)
+        spl_maps_plan(stage, &later->pictures, p.points.station_count, p.points.count);
     if (!rc)
         settle_up(&p, later && options->photos ? &later->photographs : NULL);
+    if (!rc && later)
+        rc = spl_eyes_take(&p.points, later->photographs.count ? &later->photographs : &later->pictures, err);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
@@ -311,12 +364,14 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
         rc = options->points_only ? spl_bare_points(&p.points, stage, err)
                                   : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
     if (!rc)
+        rc = find_planes(&p, err);
+    if (!rc)
         rc = join_wires(&p, err);
+    if (!rc)
+        rc = export_primitives(&p, drawing, err);
     p.tree.for_pruning = options->prune > 1;
     if (!rc)
-        rc = spl_tree_build(&p.tree, &p.points, err);
-    if (!rc)
-        rc = spl_levels_build(&p.tree, &p.points, stage, err);
+        rc = build_tree(&p, err);
     if (!rc)
         rc = write_dataset(&p, err);
     if (!rc && report)
@@ -324,124 +379,16 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
     spl_dataset_writer_destroy(p.writer);
     spl_emitted_finish(&p.emitted);
     spl_tree_finish(&p.tree);
+    if (!rc && later && options->maps && p.planes.count) {
+        rc = write_points(&p, points_path, err);
+        *points = !rc;
+    }
     spl_wires_finish(&p.wires);
+    spl_planes_finish(&p.planes);
     spl_points_finish(&p.points);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
     return rc;
-}
-
-/* Two names of one file, which need not be there yet. */
-static bool is_same(const char *a, const char *b)
-{
-    const char *const paths[2] = {a, b}, *names[2];
-    struct stat files[2], folders[2];
-    bool there[2];
-    for (int i = 0; i < 2; i++) {
-        char folder[4096];
-        const char *slash = strrchr(paths[i], '/');
-        names[i] = slash ? slash + 1 : paths[i];
-        snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash + 1 - paths[i]) : 1, slash ? paths[i] : ".");
-        there[i] = stat(paths[i], &files[i]) == 0;
-        if (stat(folder, &folders[i]))
-            return false;
-    }
-    if (there[0] && there[1])
-        return files[0].st_dev == files[1].st_dev && files[0].st_ino == files[1].st_ino;
-    return !strcmp(names[0], names[1]) && folders[0].st_dev == folders[1].st_dev &&
-           folders[0].st_ino == folders[1].st_ino;
-}
-
-/* The file of textures replaces nothing that is read, nor the dataset. */
-static int check_kept(const struct spl_pack_options *o, const struct spl_view_list *photographs, struct spl_error *err)
-{
-    const char *kept = o->photos->keep_textures;
-    if (!kept)
-        return SPL_OK;
-    bool input = is_same(kept, o->photos->cameras);
-    for (size_t i = 0; i < o->input_count && !input; i++)
-        input = is_same(kept, o->inputs[i]);
-    for (size_t i = 0; i < photographs->count && !input; i++)
-        input = is_same(kept, photographs->views[i].photograph);
-    if (!input && !(o->output && is_same(kept, o->output)))
-        return SPL_OK;
-    return spl_fail_field(err, SPL_E_USAGE, "keep-textures", "--keep-textures %s is an %s too; choose another name",
-                          kept, input ? "input" : "output");
-}
-
-/* A dataset that the next pass reads, without its name, so that nothing of it is left when the process dies. */
-static int open_part(const char *path, struct spl_dataset **dataset, struct spl_error *err)
-{
-    int rc = spl_dataset_open_whole(path, false, dataset, err);
-    unlink(path);
-    return rc;
-}
-
-static int run_passes(struct passes *p, const char *part, struct spl_error *err)
-{
-    const struct spl_pack_options *o = p->options;
-    struct spl_dataset *dataset = NULL;
-    bool more = o->maps || o->prune > 1;
-    int rc = open_part(part, &dataset, err);
-    if (!rc && o->photos) {
-        rc = spl_photos_apply(o->photos, &p->photographs, dataset, more ? part : o->output, p->stage, &p->photos, err);
-        spl_dataset_close(dataset);
-        dataset = NULL;
-        if (!rc && more)
-            rc = open_part(part, &dataset, err);
-    }
-    bool maps = o->maps;
-    if (!rc && maps) {
-        struct spl_error why = {0};
-        rc = spl_maps_apply(o, &p->pictures, dataset, p->stage, &p->maps, &why);
-        if (rc == SPL_E_INPUT && o->maps->find) { /* nobody asked for what was found beside the scan */
-            if (o->warn)
-                o->warn(o->progress_context, why.message);
-            p->maps = (struct spl_map_report){0};
-            maps = false;
-            rc = SPL_OK;
-        } else if (rc)
-            spl_fail_field(err, rc, why.field, "%s", why.message);
-    }
-    if (!rc && !maps && more)
-        rc = o->prune > 1 ? spl_prune_apply(dataset, o->prune, o->output, NULL, p->stage, err)
-                          : spl_dataset_rewrite(&(struct spl_rewrite){.from = dataset}, o->output, err);
-    spl_dataset_close(dataset);
-    return rc;
-}
-
-static void warn_of_picture(void *context, const struct spl_error *why)
-{
-    const struct spl_pack_options *options = context;
-    if (options->warn)
-        options->warn(options->progress_context, why->message);
-}
-
-/* Options of maps and their pictures become those that the scans bring along, or none. Nobody asked for these, so what
- * is wrong with them fails nothing. */
-static int find_pictures(struct passes *p, struct spl_pack_options *options, struct spl_error *err)
-{
-    struct spl_map_sources found;
-    struct spl_error why = {0};
-    int rc = spl_map_sources_find(options->inputs, options->input_count, &found, &why);
-    p->with = *options->maps;
-    if (!p->with.refused) {
-        p->with.refused = warn_of_picture;
-        p->with.context = options;
-    }
-    if (!rc && !found.count && (p->with.export_to || p->with.edits))
-        rc = spl_fail_field(&why, SPL_E_USAGE, "panoramas",
-                            "these scans bring no panoramas along, so there are no maps to be edited: name --panoramas "
-                            "PATH, or scan");
-    if (!rc && found.count)
-        rc = spl_maps_load(&p->with, &found, &p->pictures, &p->maps, &why);
-    options->maps = p->pictures.count ? &p->with : NULL;
-    spl_map_sources_finish(&found);
-    if (rc && rc != SPL_E_NOMEM && rc != SPL_E_USAGE) {
-        warn_of_picture(options, &why);
-        return SPL_OK;
-    }
-    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
 /* What the file that was written last has. */
@@ -452,6 +399,10 @@ static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_
     report->leaf_splats = info->leaf_splats;
     report->splats = info->splats;
     report->pieces = info->pieces;
+    report->panels = info->panels;
+    report->panel_points = info->panel_points;
+    report->meshes = info->meshes;
+    report->mesh_points = info->mesh_points;
     report->levels = info->levels;
     report->nodes = info->nodes;
     report->chunks = info->chunks;
@@ -460,26 +411,27 @@ static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_
         report->streams[s].bits = info->streams[s].bits;
 }
 
-static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_pack_report *report,
-                       struct spl_error *err)
+static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct drawing *drawing,
+                       struct spl_pack_report *report, struct spl_error *err)
 {
     const struct spl_pack_options *options = p->options;
     struct spl_dataset *dataset = NULL;
     uint64_t begin_ns = spl_now_ns();
-    char *part = NULL;
-    int rc = SPL_OK;
-    if (options->photos && !(rc = spl_photos_load(options->photos, &p->photographs, &p->photos, err)))
-        rc = check_kept(options, &p->photographs, err);
-    if (!rc && options->maps && !p->pictures.count)
-        rc = spl_maps_load(options->maps, &(struct spl_map_sources){0}, &p->pictures, &p->maps, err);
+    char *part = NULL, *points_part = NULL;
+    bool points = false;
+    int rc = spl_passes_load(p, err);
     if (!rc && asprintf(&part, "%s.part-%ld-scan", options->output, (long)getpid()) < 0) {
         part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
+    if (!rc && asprintf(&points_part, "%s.part-%ld-points", options->output, (long)getpid()) < 0) {
+        points_part = NULL;
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
+    }
+    if (!rc && (rc = pack_scan(options, inputs, part, points_part, &points, p, drawing, p->stage, report, err)))
+        unlink(part); /* where the points alone failed */
     if (!rc)
-        rc = pack_scan(options, inputs, part, p, p->stage, report, err);
-    if (!rc)
-        rc = run_passes(p, part, err);
+        rc = spl_passes_run(p, part, points ? points_part : NULL, err);
     if (!rc && report && !(rc = spl_dataset_open(options->output, false, &dataset, err))) {
         fill_rewritten(spl_dataset_get_info(dataset), report);
         report->photos = p->photos;
@@ -488,6 +440,7 @@ static int pack_passes(struct passes *p, struct spl_inputs *inputs, struct spl_p
     }
     spl_dataset_close(dataset);
     free(part);
+    free(points_part);
     return rc;
 }
 
@@ -498,13 +451,18 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                               "photographs are put onto discs; pack without --points-only, or without --cameras");
     if (options->points_only && options->prune > 1)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
-                              "pruning weighs discs against each other; pack without --points-only, or without --prune");
+                              "pruning weighs discs against each other; pack without --points-only, or without "
+                              "--prune");
     if (options->prune > SPL_PRUNE_FACTOR_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "prune", "%u; of so many splats about one stays, 1 to %d",
                               options->prune, SPL_PRUNE_FACTOR_MAX);
     if (options->points_only && options->maps && !options->maps->find)
         return spl_fail_field(err, SPL_E_USAGE, "points-only",
-                              "maps of stations are put onto discs; pack without --points-only, or without --panoramas");
+                              "maps of stations are put onto discs; pack without --points-only, or without "
+                              "--panoramas");
+    int rc = spl_pack_check_primitives(options, err);
+    if (rc)
+        return rc;
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
                               .threads = spl_thread_count(options->threads),
@@ -512,26 +470,30 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     const struct spl_inputs_listener listener = {options->warn, options->left_out, options->progress_context};
     struct spl_pack_options found = *options;
     struct spl_inputs inputs;
-    int rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
+    rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
     if (rc)
         return rc;
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
-    struct passes p = {.options = &found, .stage = &stage};
+    struct spl_passes p = {.options = &found, .stage = &stage};
+    struct drawing drawing = {0};
     if (found.maps && found.maps->find && options->points_only)
         found.maps = NULL;
     if (found.maps)
         rc = spl_maps_check(found.maps, err);
     if (!rc && found.maps && found.maps->find && !found.maps->panoramas)
-        rc = find_pictures(&p, &found, err);
+        rc = spl_passes_find_pictures(&p, &found, err);
     if (!rc && found.prune > 1 && !found.maps && found.warn)
         found.warn(found.progress_context, "without maps of stations (--panoramas) the colours of the splats that "
                                            "pruning drops are lost");
     if (!rc)
-        rc = found.photos || found.maps || found.prune > 1 ? pack_passes(&p, &inputs, report, err)
-                                        : pack_scan(&found, &inputs, found.output, NULL, &stage, report, err);
-    spl_view_list_finish(&p.photographs);
-    spl_view_list_finish(&p.pictures);
+        rc = found.photos || found.maps || found.prune > 1
+                 ? pack_passes(&p, &inputs, &drawing, report, err)
+                 : pack_scan(&found, &inputs, found.output, NULL, NULL, NULL, &drawing, &stage, report, err);
+    if (!rc && drawing.text)
+        rc = spl_file_replace(found.export_primitives, drawing.text, drawing.length, err);
+    free(drawing.text);
+    spl_passes_finish(&p);
     spl_inputs_finish(&inputs);
     return rc;
 }

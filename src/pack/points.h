@@ -30,11 +30,14 @@ struct spl_points {
     struct spl_scalar_values scalar[SPL_POINT_SCALARS]; /* settled by spl_points_gather() */
     const struct spl_keep *keep;                        /* what they are called; borrowed */
     struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */
+    uint32_t *plane;             /* made by spl_planes_find(): index or SPL_NO_PLANE; NULL: not looked for */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
     size_t station_capacity;
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
+    double (*eyes)[3]; /* set by spl_eyes_take() */
+    size_t eye_count;
     double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */
     uint64_t points_read, points_skipped, duplicates;
 };

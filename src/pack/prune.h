@@ -7,7 +7,8 @@
  * where s is the share that maps show: those put the colour right, but only on a surface that is where it was. A scan's
  * points lie evenly over the directions that it was made from, and so do their radii: a splat is a piece of the image
  * there, u is an error in its own widths, on a wall far away as on a near one, and a hole is a distance too. Vertices
- * of lines count as splats do, from the nearest piece.
+ * of lines count as splats do, from the nearest piece. Two cells of a panel count as a splat, and lose what the disc
+ * does that a cell stands for: panels and discs of a node together are its picture.
  *
  * The cut is the one that loses least, sum of w over all leaf splats, among those of its number of splats: of every
  * node that is kept, its children save less than `slope` a splat, of every node that is split, they save more (optimal
@@ -33,7 +34,7 @@ struct spl_prune_options {
 
 enum { SPL_PRUNE_STEPS = 16 };
 struct spl_prune_report {
-    uint64_t before, after;            /* leaf splats; lines are not counted */
+    uint64_t before, after;            /* leaf splats, and half the cells of leaves' panels; lines are not counted */
     uint64_t by_steps[SPL_PRUNE_STEPS]; /* of those after: by how many levels their node lies above its lowest leaf */
     uint64_t dense;                    /* of those after: in nodes that keep more than twice 1 / factor */
     double slope;                      /* w that a splat saved costs, at the cut's edge; 0 = nothing was dropped */

@@ -1,8 +1,9 @@
 /* How far leaf splats lie off what a node draws.
  *
  * A node's discs are laid out chunk by chunk with a box each, which are compact, so that a chunk of leaf splats is held
- * against the few whose boxes are near it. Positions are floats from the node's origin, as the container has them.
- * Pieces of lines are kept in the same way as discs, as a second set. Any thread, with shapes of its own. */
+ * against the few whose boxes are near it; cells of panels are discs too, panel by panel. Positions are floats from the
+ * node's origin, as the container has them. Pieces of lines are kept in the same way as discs, as a second set. Any
+ * thread, with shapes of its own. */
 #include "pack/prune_loss.h"
 
 #include <math.h>
@@ -11,7 +12,7 @@
 
 #include "base/array.h"
 #include "base/memory.h"
-#include "dataset/chunk.h"
+#include "dataset/panels.h"
 
 /* Own radii from which on a splat is as good as lost. */
 static const float reach_radii = 6;
@@ -33,8 +34,14 @@ struct block { /* the shapes of a chunk */
 struct spl_prune_shapes {
     struct shape *list;
     struct block *blocks;
-    size_t count, capacity, block_count, block_capacity;
-    uint32_t near[SPL_NODE_CHUNKS_MAX];
+    uint32_t *near; /* of blocks */
+    size_t count, capacity, block_count, block_capacity, near_capacity;
+};
+
+/* A panel's cells, as the discs that they stand for. */
+struct cells {
+    struct spl_splat splats[SPL_PANEL_SIDE * SPL_PANEL_SIDE];
+    uint32_t count;
 };
 
 struct found {
@@ -53,21 +60,52 @@ void spl_prune_shapes_destroy(struct spl_prune_shapes *shapes)
         return;
     free(shapes->list);
     free(shapes->blocks);
+    free(shapes->near);
     free(shapes);
 }
 
+/* Of discs, or of what panels stand for. */
 static bool is_discs(const struct spl_chunk *chunk)
 {
-    return spl_chunk_kind(chunk) == SPL_CHUNK_DISCS;
+    return spl_chunk_kind(chunk) != SPL_CHUNK_LINES;
+}
+
+static bool is_panels(const struct spl_chunk *chunk)
+{
+    return spl_kind_has_panels(spl_chunk_kind(chunk));
 }
 
 uint64_t spl_prune_count(const struct spl_prune_loss *loss, uint64_t node)
 {
     uint64_t count = 0;
+    size_t bytes;
     const struct spl_chunk *chunks = loss->chunks + loss->nodes[node].first_chunk;
+    const uint32_t *page = spl_dataset_get_page(loss->dataset, loss->nodes[node].page, &bytes);
     for (uint32_t i = 0; i < loss->nodes[node].chunk_count; i++)
-        count += is_discs(&chunks[i]) ? chunks[i].count : 0;
+        count += is_panels(&chunks[i])  ? spl_panels_count_discs(&chunks[i], page)
+                 : is_discs(&chunks[i]) ? chunks[i].count
+                                        : 0;
     return count;
+}
+
+static void get_cells(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct cells *cells)
+{
+    struct spl_panel_frame frame;
+    struct spl_panel panel;
+    struct spl_relief relief;
+    spl_panels_get_frame(chunk, &frame);
+    spl_panels_decode(chunk, page, i, &panel);
+    spl_panels_get_relief(chunk, page, i, &relief);
+    cells->count = 0;
+    for (uint32_t cell = 0; cell < SPL_PANEL_SIDE * SPL_PANEL_SIDE; cell++) {
+        uint32_t x = cell % SPL_PANEL_SIDE, y = cell / SPL_PANEL_SIDE;
+        if (!(panel.cells[y] >> x & 1))
+            continue;
+        struct spl_splat *s = &cells->splats[cells->count++];
+        *s = (struct spl_splat){.radius = chunk->radius_min};
+        memcpy(s->color, panel.color[y][x], sizeof s->color);
+        spl_panels_place(&frame, &panel, &relief, (float)x + 0.5f, (float)y + 0.5f, s->position, s->normal);
+    }
 }
 
 static void add_shape(struct spl_prune_shapes *shapes, struct block *block, const struct spl_splat *splat,
@@ -85,24 +123,53 @@ static void add_shape(struct spl_prune_shapes *shapes, struct block *block, cons
     block->count++;
 }
 
-/* The shapes of the node's chunks of one kind. */
+static struct block begin_block(const struct spl_prune_shapes *shapes)
+{
+    return (struct block){.low = {INFINITY, INFINITY, INFINITY},
+                          .high = {-INFINITY, -INFINITY, -INFINITY},
+                          .first = (uint32_t)shapes->count};
+}
+
+/* A block for each panel. */
+static int lay_out_panels(const struct spl_chunk *chunk, const uint32_t *page, struct spl_prune_shapes *shapes)
+{
+    if (spl_array_reserve(shapes->blocks, shapes->block_capacity, shapes->block_count + chunk->count, NULL))
+        return SPL_E_NOMEM;
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        struct cells cells;
+        struct block block = begin_block(shapes);
+        get_cells(chunk, page, i, &cells);
+        if (spl_array_reserve(shapes->list, shapes->capacity, shapes->count + cells.count, NULL))
+            return SPL_E_NOMEM;
+        for (uint32_t k = 0; k < cells.count; k++)
+            add_shape(shapes, &block, &cells.splats[k], NULL);
+        if (block.count)
+            shapes->blocks[shapes->block_count++] = block;
+    }
+    return SPL_OK;
+}
+
+/* The shapes of the node's chunks: of discs and panels, or of lines. */
 static int lay_out(const struct spl_prune_loss *loss, const struct spl_node *node, bool discs,
                    struct spl_prune_shapes *shapes)
 {
     size_t bytes;
     const uint32_t *page = spl_dataset_get_page(loss->dataset, node->page, &bytes);
     shapes->count = shapes->block_count = 0;
-    if (spl_array_reserve(shapes->list, shapes->capacity, (size_t)node->chunk_count * SPL_CHUNK_SPLATS, NULL) ||
-        spl_array_reserve(shapes->blocks, shapes->block_capacity, node->chunk_count, NULL))
-        return SPL_E_NOMEM;
     for (uint32_t i = 0; i < node->chunk_count; i++) {
         const struct spl_chunk *chunk = &loss->chunks[node->first_chunk + i];
         struct spl_splat splats[SPL_CHUNK_SPLATS];
-        struct block block = {.low = {INFINITY, INFINITY, INFINITY},
-                              .high = {-INFINITY, -INFINITY, -INFINITY},
-                              .first = (uint32_t)shapes->count};
+        struct block block = begin_block(shapes);
         if (is_discs(chunk) != discs)
             continue;
+        if (is_panels(chunk)) {
+            if (lay_out_panels(chunk, page, shapes))
+                return SPL_E_NOMEM;
+            continue;
+        }
+        if (spl_array_reserve(shapes->list, shapes->capacity, shapes->count + chunk->count, NULL) ||
+            spl_array_reserve(shapes->blocks, shapes->block_capacity, shapes->block_count + 1, NULL))
+            return SPL_E_NOMEM;
         for (uint32_t k = 0; k < chunk->count; k++)
             spl_chunk_decode(chunk, page, k, &splats[k]);
         for (uint32_t k = 0; k < chunk->count; k++)
@@ -111,7 +178,7 @@ static int lay_out(const struct spl_prune_loss *loss, const struct spl_node *nod
         if (block.count)
             shapes->blocks[shapes->block_count++] = block;
     }
-    return SPL_OK;
+    return spl_array_reserve(shapes->near, shapes->near_capacity, shapes->block_count, NULL);
 }
 
 static float dot(const float a[3], const float b[3])
@@ -180,20 +247,14 @@ static double lost(const struct spl_splat *splat, const struct found *found, dou
     return 1 - (1 - geometry) * (1 - (1 - seen) * color);
 }
 
-/* The loss of a chunk below, of whose splats a share is looked at. */
-static double chunk_loss(const struct spl_prune_loss *loss, const struct spl_node *own, const struct spl_node *leaf,
-                         uint64_t chunk, double share, struct spl_prune_shapes *shapes)
+/* The sum of w over splats of a chunk or panel below, which are moved from `leaf`'s origin to the node's. */
+static double sum_losses(const struct spl_node *own, const struct spl_node *leaf, struct spl_splat *splats,
+                        uint32_t taken, bool discs, double seen, struct spl_prune_shapes *shapes)
 {
-    const struct spl_chunk *header = &loss->chunks[chunk];
-    const struct spl_prune_options *options = loss->options;
-    struct spl_splat splats[SPL_CHUNK_SPLATS];
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, reach = 0;
-    double seen = options->seen ? options->seen[chunk] : options->no_maps ? 0 : 1, sum = 0;
-    uint32_t taken = (uint32_t)fmin(fmax(ceil(header->count * share), 1), header->count), near = 0;
-    size_t bytes;
-    const uint32_t *page = spl_dataset_get_page(loss->dataset, leaf->page, &bytes);
+    uint32_t near = 0;
+    double sum = 0;
     for (uint32_t i = 0; i < taken; i++) {
-        spl_chunk_decode(header, page, i * header->count / taken, &splats[i]);
         reach = fmaxf(reach, reach_radii * splats[i].radius);
         for (int a = 0; a < 3; a++) {
             float *at = &splats[i].position[a];
@@ -207,10 +268,42 @@ static double chunk_loss(const struct spl_prune_loss *loss, const struct spl_nod
             shapes->near[near++] = b;
     for (uint32_t i = 0; i < taken; i++) {
         float most = reach_radii * splats[i].radius;
-        struct found found = find(shapes, near, is_discs(header), splats[i].position, most * most);
+        struct found found = find(shapes, near, discs, splats[i].position, most * most);
         sum += lost(&splats[i], &found, seen);
     }
-    return sum * header->count / taken;
+    return sum;
+}
+
+static uint32_t share_of(uint32_t count, double share)
+{
+    return (uint32_t)fmin(fmax(ceil(count * share), 1), count);
+}
+
+/* The loss of a chunk below, of whose splats, or two cells for one, a share is looked at. */
+static double chunk_loss(const struct spl_prune_loss *loss, const struct spl_node *own, const struct spl_node *leaf,
+                         uint64_t chunk, double share, struct spl_prune_shapes *shapes)
+{
+    const struct spl_chunk *header = &loss->chunks[chunk];
+    const struct spl_prune_options *options = loss->options;
+    struct spl_splat splats[SPL_CHUNK_SPLATS];
+    double seen = options->seen ? options->seen[chunk] : options->no_maps ? 0 : 1, sum = 0;
+    uint32_t taken = share_of(header->count, share);
+    size_t bytes;
+    const uint32_t *page = spl_dataset_get_page(loss->dataset, leaf->page, &bytes);
+    for (uint32_t i = 0; i < header->count && is_panels(header); i++) {
+        struct cells cells;
+        get_cells(header, page, i, &cells);
+        if (!(taken = share_of(cells.count, share / 2)))
+            continue;
+        for (uint32_t k = 0; k < taken; k++)
+            cells.splats[k] = cells.splats[k * cells.count / taken];
+        sum += sum_losses(own, leaf, cells.splats, taken, true, seen, shapes) * cells.count / taken / 2;
+    }
+    if (is_panels(header))
+        return sum;
+    for (uint32_t i = 0; i < taken; i++)
+        spl_chunk_decode(header, page, i * header->count / taken, &splats[i]);
+    return sum_losses(own, leaf, splats, taken, is_discs(header), seen, shapes) * header->count / taken;
 }
 
 /* Of the leaves among nodes [begin, end), their chunks of one kind. */

@@ -17,7 +17,7 @@ struct spl_prune_loss {
 struct spl_prune_shapes *spl_prune_shapes_create(struct spl_error *err);
 void spl_prune_shapes_destroy(struct spl_prune_shapes *shapes);
 
-/* Splats of the node's discs. */
+/* The node's splats, and what its panels are worth of them. */
 uint64_t spl_prune_count(const struct spl_prune_loss *loss, uint64_t node);
 
 /* The loss of a node that has children; of `below` leaf splats. Looks at an even part of them, in proportion to its

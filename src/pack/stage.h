@@ -11,7 +11,7 @@
 
 #include "base/work.h"
 
-enum { SPL_STAGE_PARTS_MAX = 16 };
+enum { SPL_STAGE_PARTS_MAX = 24 };
 
 /* Work that is planned: `work` in seconds of the machine that it was measured on. Only ratios matter once some of it is
  * done. A part is every stage whose name begins with its own; `total` items of all of them, 0 = one stage. */

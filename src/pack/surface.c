@@ -16,6 +16,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/clip.h"
+#include "pack/eyes.h"
 #include "pack/orient.h"
 #include "pack/radius.h"
 #include "pack/settle.h"
@@ -87,8 +88,7 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
         return false;
     for (size_t i = begin; i < end; i++) {
         struct spl_component *c = &block->components[o->label[i - begin]];
-        for (int k = 0; k < 3; k++)
-            c->up += s->points->up[k] * s->points->normal[i][k];
+        c->outward += spl_eyes_get_outward(s->points, i);
         c->anchored |= o->anchored[i - begin];
         s->label[i] = o->label[i - begin];
     }

@@ -129,6 +129,9 @@ void spl_tree_finish(struct spl_tree *tree)
     for (uint32_t i = 0; i < tree->count; i++) {
         free(tree->nodes[i].splats);
         free(tree->nodes[i].numbers);
+        if (tree->nodes[i].panels)
+            spl_node_panels_finish(tree->nodes[i].panels);
+        free(tree->nodes[i].panels);
     }
     free(tree->nodes);
     *tree = (struct spl_tree){0};

@@ -2,6 +2,7 @@
 #ifndef SPL_PACK_TREE_H
 #define SPL_PACK_TREE_H
 
+#include "pack/panels/panels.h"
 #include "pack/points.h"
 
 /* Most points of a leaf, and of one where nodes are what pruning chooses among: there are enough of them to choose. */
@@ -25,13 +26,15 @@ struct spl_tree_node {
     uint32_t depth;                 /* of the tree: cubes that hold all points of their parent are skipped */
     struct spl_inner_splat *splats; /* of an inner node, made by spl_levels_build() */
     uint32_t *numbers;    /* likewise, splat by splat: of the scalars that the points have; NULL = they have none */
-    uint32_t splat_count; /* leaf: end - begin */
+    uint32_t splat_count; /* leaf: end - begin, without the points that panels stand for */
+    struct spl_node_panels *panels; /* made by spl_panels_make_leaves() and spl_levels_build(); NULL = none */
 };
 
 struct spl_tree {
     struct spl_tree_node *nodes; /* breadth first, siblings consecutive */
     uint32_t count, levels;
     bool for_pruning; /* said before it is built: inner nodes are drawn for good, see levels.c */
+    struct spl_panel_maker *panels; /* of points on planes, borrowed while levels are built; NULL: none are made */
 };
 
 /* Splits until no leaf has more than SPL_LEAF_POINTS points, for pruning SPL_PRUNED_LEAF_POINTS, or is too wide for

@@ -27,9 +27,16 @@ static uint32_t splats(const struct spl_draw_chunk *chunk)
     return chunk->count & ((1u << SPL_COUNT_BITS) - 1);
 }
 
-static uint32_t runs(const struct spl_draw_chunk *chunk)
+static uint32_t runs(uint32_t kind, const struct spl_draw_chunk *chunk)
 {
-    return (splats(chunk) + SPL_RUN_SPLATS - 1) / SPL_RUN_SPLATS;
+    const uint32_t run = spl_kind_has_panels(kind) ? SPL_RUN_PANELS : SPL_RUN_SPLATS;
+    return (splats(chunk) + run - 1) / run;
+}
+
+/* What a chunk counts of the halves of what is drawn. */
+static uint64_t worth(uint32_t kind, const struct spl_draw_chunk *chunk)
+{
+    return kind == SPL_CHUNK_LINES ? 0 : (uint64_t)splats(chunk) * (spl_kind_has_panels(kind) ? SPL_PANEL_WORTH : 1);
 }
 
 /* Phases are told when all chunks are there. */
@@ -40,7 +47,7 @@ static struct spl_draw_key key_of(const struct spl_draw_origin *origin, const st
                                  .trims = origin->trims,
                                  .planes = (uint8_t)(chunk->texture >> SPL_CHUNK_TEXTURE_PLANES),
                                  .smooth = chunk->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1,
-                                 .apart = chunk->color_bits >> SPL_COLOR_CLIP};
+                                 .apart = chunk->color_bits >> SPL_COLOR_CLIP || origin->lined};
 }
 
 static uint64_t word_of(const struct spl_draw_key *key)
@@ -52,7 +59,7 @@ static uint64_t word_of(const struct spl_draw_key *key)
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
-    list->splats = list->listed_splats = list->sample_splats = 0;
+    list->splats = list->listed_splats = list->sample_splats = list->sample_panels = 0;
     list->nodes = 0;
     list->complete = true;
 }
@@ -69,7 +76,8 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
                       const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds,
                       struct spl_error *err)
 {
-    int rc = check_entries(list, runs(chunk), err);
+    uint32_t entries = runs(origin->kind, chunk);
+    int rc = check_entries(list, entries, err);
     if (rc)
         return rc;
     if (list->chunk_count == list->chunk_capacity) {
@@ -83,8 +91,8 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
     list->key_of_chunk[list->chunk_count++] = key_of(origin, chunk);
-    list->entry_count += runs(chunk);
-    list->listed_splats += origin->kind == SPL_CHUNK_DISCS ? splats(chunk) : 0;
+    list->entry_count += entries;
+    list->listed_splats += worth(origin->kind, chunk);
     return SPL_OK;
 }
 
@@ -145,14 +153,14 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, s
         struct spl_draw_key *key = &list->key_of_chunk[i];
         if (2 * before >= list->listed_splats && list->first_back_chunk == list->chunk_count)
             list->first_back_chunk = i;
-        before += key->kind == SPL_CHUNK_DISCS ? splats(&list->chunks[i]) : 0;
+        before += worth(key->kind, &list->chunks[i]);
         key->back = i >= list->first_back_chunk;
         if (i && word_of(key) == word_of(key - 1)) /* most are */
             batch_of_chunk[i] = batch_of_chunk[i - 1];
         else
             rc = get_batch(list, &table, key, &batch_of_chunk[i], err);
         if (!rc)
-            list->batches[batch_of_chunk[i]].entries += runs(&list->chunks[i]);
+            list->batches[batch_of_chunk[i]].entries += runs(key->kind, &list->chunks[i]);
     }
     free(table.batch);
     return rc;
@@ -174,7 +182,7 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
     }
     for (size_t i = 0; i < list->chunk_count && !rc; i++) {
         struct spl_draw_batch *batch = &list->batches[batch_of_chunk[i]];
-        for (uint32_t run = 0; run < runs(&list->chunks[i]); run++)
+        for (uint32_t run = 0; run < runs(batch->key.kind, &list->chunks[i]); run++)
             list->entries[batch->first_entry + batch->entries++] = (uint32_t)i << SPL_RUN_BITS | run;
     }
     free(batch_of_chunk);
@@ -192,19 +200,42 @@ int spl_draw_list_add_map(struct spl_draw_list *list, uint32_t station, uint32_t
     return rc;
 }
 
-uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
-                                    uint64_t most_lines)
+static uint64_t most_entries(const struct spl_draw_key *key, const struct spl_draw_rounds *most)
+{
+    uint64_t own = key->smooth                      ? most->summed
+                   : key->kind == SPL_CHUNK_LINES   ? most->lines
+                   : spl_kind_has_panels(key->kind) ? most->panels
+                                                    : most->splats;
+    own = own < most->splats ? own : most->splats;
+    return own < ENTRIES_MAX ? own : ENTRIES_MAX;
+}
+
+uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, const struct spl_draw_rounds *most)
 {
     uint64_t rounds = 0;
-    most = most < ENTRIES_MAX ? most : ENTRIES_MAX;
     for (size_t i = 0; i < list->batch_count; i++) {
         struct spl_draw_batch *batch = &list->batches[i];
         batch->first_round = (uint32_t)rounds;
-        uint64_t own = batch->key.smooth ? most_summed : batch->key.kind == SPL_CHUNK_LINES ? most_lines : most;
-        batch->round_entries = (uint32_t)(own < most ? own : most);
+        batch->round_entries = (uint32_t)most_entries(&batch->key, most);
         rounds += (batch->entries + batch->round_entries - 1) / batch->round_entries;
     }
     return rounds;
+}
+
+bool spl_draw_list_has(const struct spl_draw_list *list, uint32_t kind)
+{
+    for (size_t i = 0; i < list->batch_count; i++)
+        if (list->batches[i].key.kind == kind)
+            return true;
+    return false;
+}
+
+bool spl_draw_list_trims(const struct spl_draw_list *list, uint32_t kind)
+{
+    for (size_t i = 0; i < list->batch_count; i++)
+        if (list->batches[i].key.kind == kind && list->batches[i].key.trims)
+            return true;
+    return false;
 }
 
 void spl_draw_list_finish(struct spl_draw_list *list)

@@ -1,5 +1,5 @@
-/* What one tile of a frame draws: chunks, and their splats in runs of SPL_RUN_SPLATS as the kernels take them.
- * Owned by the renderer; its arrays are reused from tile to tile. */
+/* What one tile of a frame draws: chunks, and their splats in runs of SPL_RUN_SPLATS, and panels of
+ * SPL_RUN_PANELS, as the kernels take them. Owned by the renderer; its arrays are reused from tile to tile. */
 #ifndef SPL_RENDER_DRAW_LIST_H
 #define SPL_RENDER_DRAW_LIST_H
 
@@ -10,6 +10,9 @@
 #include "base/error.h"
 #include "shared.h"
 
+/* For the halves of what is drawn a panel is so many splats: about as much work. */
+enum { SPL_PANEL_WORTH = 32 };
+
 /* What one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
  * phase. */
 struct spl_draw_key {
@@ -17,7 +20,7 @@ struct spl_draw_key {
     uint8_t kind;   /* enum spl_chunk_kind */
     uint8_t planes; /* of atoms; 0 = no textures */
     bool smooth;    /* texels are interpolated, of sums */
-    bool apart;     /* chunks with clip lines */
+    bool apart;     /* chunks with clip lines, or linear splats that are not drawn */
     bool back;
     uint16_t trims; /* the station whose map trims them, plus 1; 0 = none does */
 };
@@ -45,10 +48,12 @@ struct spl_draw_list {
     size_t chunk_count, entry_count, batch_count, map_count;
     size_t chunk_capacity, entry_capacity, batch_capacity, map_capacity;
     struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
-    uint64_t splats;                   /* that are drawn */
-    uint64_t listed_splats;            /* the same, once for every window that they are drawn in */
+    uint64_t splats;                   /* that are drawn, and panels */
+    uint64_t listed_splats;            /* the same, once for every window that they are drawn in; a panel counts as
+                                          SPL_PANEL_WORTH */
     uint32_t nodes;                    /* that the chunks came from */
     uint64_t sample_splats;            /* upper bound of the splats that reach any one sample */
+    uint64_t sample_panels;            /* the same of panels that are drawn as such */
     bool complete;                     /* false: a coarser node stood in for pages that are not resident */
 };
 
@@ -57,8 +62,9 @@ void spl_draw_list_clear(struct spl_draw_list *list);
 
 /* Where a chunk comes from. */
 struct spl_draw_origin {
-    uint32_t page, kind; /* enum spl_chunk_kind; of lines `count` are vertices */
+    uint32_t page, kind; /* enum spl_chunk_kind; `count` are vertices of lines, panels, and meshes */
     uint16_t trims;      /* as in spl_draw_key */
+    bool lined;          /* its linear splats are not drawn: lines stand for them */
 };
 
 /* Appends a chunk. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
@@ -73,11 +79,21 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err);
  * which the caller appends. SPL_E_NOMEM, SPL_E_LIMIT. */
 int spl_draw_list_add_map(struct spl_draw_list *list, uint32_t station, uint32_t cells, struct spl_error *err);
 
-/* Cuts every batch into rounds, each a dispatch with parameters of its own, of `most` entries at most, of `most_summed`
- * where texels are interpolated, of `most_lines` of lines (all 1 and more), and returns how many there are. All passes
+/* Entries of a round at most, all 1 and more: of splats; where their texels are interpolated; of lines; of panels and
+ * meshes. */
+struct spl_draw_rounds {
+    uint64_t splats, summed, lines, panels;
+};
+
+/* Cuts every batch into rounds, each a dispatch with parameters of its own, and returns how many there are. All passes
  * share them, so that a page takes at most one for each of its kinds of chunks, whatever layers a view has. */
-uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, uint64_t most, uint64_t most_summed,
-                                    uint64_t most_lines);
+uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, const struct spl_draw_rounds *most);
+
+/* Is any chunk of kind enum spl_chunk_kind drawn? Of a list that is laid out. */
+bool spl_draw_list_has(const struct spl_draw_list *list, uint32_t kind);
+
+/* Does a map trim any chunk of the kind? Of a list that is laid out. */
+bool spl_draw_list_trims(const struct spl_draw_list *list, uint32_t kind);
 
 void spl_draw_list_finish(struct spl_draw_list *list);
 

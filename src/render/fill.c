@@ -58,7 +58,7 @@ void spl_fill_set_params(struct spl_tile *tile)
     p->fill_margin = (float)(margin_spacings / SPL_RADIUS_SPACING);
     p->fill_threshold = (float)(8 * view->fill.threshold);
     p->fill_levels = plan->rings;
-    p->fill_keep = view->fill.visibility == SPL_VISIBILITY_NONE;
+    p->flags |= view->fill.visibility == SPL_VISIBILITY_NONE ? SPL_FRAME_KEEP : 0;
 }
 
 struct planes {

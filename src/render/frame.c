@@ -4,11 +4,11 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/map_cells.h"
 #include "render/method.h"
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/slot.h"
-#include "render/map_cells.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -16,6 +16,7 @@
 static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_COLOR] = SPL_SUMS_COLOR,   [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
     [SPL_LAYER_NORMAL] = SPL_SUMS_NORMAL, [SPL_LAYER_ID] = SPL_SUMS_ID,       [SPL_LAYER_COVERAGE] = SPL_SUMS_COLOR,
+    [SPL_LAYER_PRIMITIVE] = SPL_SUMS_PRIMITIVE,
 };
 
 /* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same
@@ -89,7 +90,9 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .lod = job->view->lod,
         .low_pass = SPL_LOW_PASS + (maps & SPL_MAP_COLORS ? SPL_MAP_CELLS_PAD : 0),
         .discs = method->discs,
-        .lines = method->lines,
+        .panels = spl_view_draws_panels(job->view),
+        .meshes = spl_view_draws_meshes(job->view),
+        .lines = method->lines || spl_view_draws_lines(job->view),
         .tables = ask_tables,
         .resident = ask_page,
         .atoms = textured ? job->view->disc.atoms : 0,
@@ -131,11 +134,11 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
         return waits;
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats);
+    tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats, r->list.sample_panels);
     if (!tile->params.weight_max && method->sums)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
                               "at lod %g up to %llu splats would blend in one pixel; raise lod", job->view->lod,
-                              (unsigned long long)r->list.sample_splats);
+                              (unsigned long long)(r->list.sample_splats + r->list.sample_panels));
     return SPL_OK;
 }
 

@@ -17,7 +17,8 @@ enum { made_at_start = 32 };
 
 static bool is_same(const struct spl_kernel_key *a, const struct spl_kernel_key *b)
 {
-    return a->wide == b->wide && a->trims == b->trims && !memcmp(a->constants, b->constants, sizeof a->constants) && !strcmp(a->name, b->name);
+    return a->wide == b->wide && a->trims == b->trims && !strcmp(a->name, b->name) &&
+           !memcmp(a->constants, b->constants, sizeof a->constants);
 }
 
 static int make(struct spl_gpu *gpu, const struct spl_kernel_key *key, struct spl_gpu_kernel **out,

@@ -60,6 +60,23 @@ int spl_maps_from_name(const char *name)
     return find_name(maps_names, SPL_MAPS_COUNT, name);
 }
 
+static const char *const shapes_names[SPL_SHAPES_COUNT] = {
+    [SPL_SHAPES_OFF] = "off",
+    [SPL_SHAPES_LINES] = "lines",
+    [SPL_SHAPES_PANELS] = "panels",
+    [SPL_SHAPES_ALL] = "all",
+};
+
+const char *spl_shapes_name(enum spl_shapes shapes)
+{
+    return (unsigned)shapes < SPL_SHAPES_COUNT ? shapes_names[shapes] : "unknown";
+}
+
+int spl_shapes_from_name(const char *name)
+{
+    return find_name(shapes_names, SPL_SHAPES_COUNT, name);
+}
+
 /* spl_PREFIX_name() of an int, for each choice. */
 #define NOTHING(...)
 #define CHOICE_NAME(name, field, prefix, ...)                                                                          \
@@ -71,6 +88,7 @@ SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
 #define CHOICE_MOST_maps (SPL_MAPS_COUNT - 1)
+#define CHOICE_MOST_shapes (SPL_SHAPES_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {
 #define REAL(id, field, low, high, value, change, text)                                                                \
     {.name = #id,                                                                                                      \
@@ -127,9 +145,10 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
 
 bool spl_method_param_counts(const struct spl_method_param_info *param, const struct spl_dataset_info *dataset)
 {
-    return param->changes == SPL_CHANGES_TEXTURES ? dataset->atoms > 0
-           : param->changes == SPL_CHANGES_MAPS   ? dataset->maps > 0
-                                                  : true;
+    return param->changes == SPL_CHANGES_TEXTURES     ? dataset->atoms > 0
+           : param->changes == SPL_CHANGES_MAPS       ? dataset->maps > 0
+           : param->changes == SPL_CHANGES_PRIMITIVES ? dataset->panels || dataset->meshes || dataset->pieces
+                                                      : true;
 }
 
 double spl_view_get_param(const struct spl_view *view, enum spl_method_param param)

@@ -22,7 +22,7 @@ struct spl_method_row {
 
     /* How it selects. */
     bool discs;     /* splats have their radius; else each falls on one sample */
-    bool lines;     /* wires are drawn as lines, and linear splats are marked */
+    bool lines;     /* wires are drawn as lines, and linear splats are marked, by methods without discs */
     bool sums;      /* adds up fragments: the weight is chosen so that no sum can wrap; else the nearest wins */
     uint32_t apron; /* samples around a tile that act on those in it; prepare() may set more */
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "shared.h"
 
 enum { cell = 16 };
 
@@ -61,8 +62,11 @@ uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy)
     return most + occupancy->everywhere;
 }
 
-uint32_t spl_occupancy_weight(uint64_t splats)
+uint32_t spl_occupancy_weight(uint64_t splats, uint64_t panels)
 {
-    uint64_t weight = UINT32_MAX / (512 * (splats ? splats : 1));
+    const uint64_t most = UINT32_MAX / 512, cells = SPL_PANEL_SIDE * SPL_PANEL_SIDE;
+    if (panels >= most / cells || splats > most)
+        return 0;
+    uint64_t all = splats + panels, weight = (most - panels * cells) / (all ? all : 1);
     return weight > 255 ? 255 : (uint32_t)weight;
 }

@@ -23,8 +23,9 @@ void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t spla
 /* The largest cell. Call once, after the last add. */
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy);
 
-/* The largest weight of a fragment such that the sums over `splats` splats stay below 2^32: each adds at most 512
- * weight to any word (shaders/splat_shade.comp). 0 when even weight 1 is too much. */
-uint32_t spl_occupancy_weight(uint64_t splats);
+/* The largest weight of a fragment such that the sums over `splats` splats and `panels` panels stay below 2^32: each
+ * fragment adds at most 512 weight to any word (shaders/splat_shade.comp). A panel may add one, and for each of its
+ * cells one of weight 1 (shaders/common/panel_draw.glsl). 0 when even weight 1 is too much. */
+uint32_t spl_occupancy_weight(uint64_t splats, uint64_t panels);
 
 #endif

@@ -1,17 +1,18 @@
 /* The geometry of picks, shared by the library and the service. The world position is the point on the pixel's ray at
- * the depth that was rendered, so it agrees with the depth layer to the bit; the class is that of the nearest splat.
- * Pure functions; any thread. */
+ * the depth that was rendered, so it agrees with the depth layer to the bit; class and primitive are those of the
+ * nearest splat, panel or mesh; a mesh lies on no plane that a pick could name. Pure functions; any thread. */
 #include "render/pick.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "dataset/dataset.h"
+#include "dataset/panels.h"
 
 void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
 {
     *out = *view;
-    out->layers = (1u << SPL_LAYER_COUNT) - 1;
+    out->layers = ((1u << SPL_LAYER_COUNT) - 1) & ~(1u << SPL_LAYER_PRIMITIVE);
     out->disc.atoms = 0; // its colour is the splat's
     out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
     out->camera.cx += 0.5 - x;
@@ -35,6 +36,31 @@ static int32_t classification(const struct spl_dataset *dataset, uint32_t id)
     return known ? (int32_t)fmin(value, INT32_MAX) : -1;
 }
 
+/* As what `id` is stored is what it is drawn as, since each kind of chunk has its own kernels. */
+static void find_primitive(const struct spl_dataset *dataset, uint32_t id, struct spl_pick *pick)
+{
+    static const enum spl_shape shapes[SPL_CHUNK_KINDS] = {
+        [SPL_CHUNK_DISCS] = SPL_SHAPE_SPLAT, [SPL_CHUNK_LINES] = SPL_SHAPE_LINE, [SPL_CHUNK_PANELS] = SPL_SHAPE_PANEL,
+        [SPL_CHUNK_MESHES] = SPL_SHAPE_MESH};
+    struct spl_pick_plane *plane = &pick->plane;
+    struct spl_panel_frame frame;
+    struct spl_chunk chunk;
+    double origin[3];
+    if (!dataset || !spl_dataset_find_chunk(dataset, id, &chunk, origin))
+        return;
+    pick->primitive = shapes[spl_chunk_kind(&chunk)]; // one of these: opening has judged it
+    if (pick->primitive != SPL_SHAPE_PANEL)
+        return;
+    spl_panels_get_frame(&chunk, &frame);
+    for (int i = 0; i < 3; i++) {
+        plane->point[i] = origin[i] + (double)frame.origin[i];
+        plane->normal[i] = (double)frame.normal[i];
+    }
+    plane->error_mean = (double)spl_panels_get_error_mean(&chunk);
+    plane->error_most = (double)spl_panels_get_error_most(&chunk);
+    plane->points = spl_panels_get_points(&chunk);
+}
+
 void spl_pick_read(const struct spl_camera *camera, double x, double y, const struct spl_frame *frame,
                    const struct spl_dataset *dataset, struct spl_pick *pick)
 {
@@ -54,4 +80,6 @@ void spl_pick_read(const struct spl_camera *camera, double x, double y, const st
     bool named = id != UINT32_MAX;
     pick->splat = named ? (int64_t)id : -1;
     pick->classification = named ? classification(dataset, id) : -1;
+    if (named)
+        find_primitive(dataset, id, pick);
 }

@@ -17,12 +17,14 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
         if (rc)
             return rc;
         spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
-        struct spl_kernel_key lines = {"fill_lines", true, {group, pass}};
-        if (filled && (rc = spl_kernels_get(&r->kernels, r->gpu, &lines, &kernel.of[0], err)))
+        rc = spl_tile_dispatch_panels(
+            tile, &(struct spl_panel_kernels){.panel_cells = "points_cells", .mesh_cells = "points_mesh_cells"}, key,
+            SPL_PHASE_BOTH, err);
+        if (rc)
             return rc;
-        if (filled)
-            spl_tile_dispatch_splats(tile, &kernel,
-                                     &(struct spl_dispatch){.phases = SPL_PHASE_BOTH, .kind = SPL_CHUNK_LINES});
+        struct spl_kernel_key lines = {"fill_lines", true, {group, pass}};
+        if (filled && (rc = spl_tile_dispatch_lines(tile, lines, SPL_PHASE_BOTH, err)))
+            return rc;
         spl_gpu_barrier(r->gpu);
         spl_tile_stamp(tile, pass ? SPL_STAGE_SHADE : SPL_STAGE_DEPTH);
     }

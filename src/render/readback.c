@@ -14,6 +14,7 @@ enum spl_pixel_type spl_readback_type(enum spl_layer layer)
     case SPL_LAYER_NORMAL:
         return SPL_PIXEL_F32X3;
     case SPL_LAYER_ID:
+    case SPL_LAYER_PRIMITIVE:
         return SPL_PIXEL_U32;
     default:
         return SPL_PIXEL_F32;

@@ -100,11 +100,12 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
                               struct spl_error *err);
 
 enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
-/* Records the kernel of each chunk once per page of the draw list (and per the device's largest dispatch), for the given phases and
- * chunks. */
+/* Records the kernel of each chunk once per page of the draw list (and per the device's largest dispatch), for the
+ * given phases and chunks. */
 struct spl_dispatch {
     enum spl_phase phases;
     uint32_t kind;   /* enum spl_chunk_kind */
+    uint32_t lanes;  /* invocations that share an entry; 0 = as of its kind */
     bool by_texture; /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
@@ -112,6 +113,20 @@ struct spl_dispatch {
 };
 void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
                               const struct spl_dispatch *what);
+/* The same by the kernel of `key`, which is made where the tile has chunks of lines alone. */
+int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, enum spl_phase phases,
+                            struct spl_error *err);
+/* panels.c: records panels and meshes of the given phases, as such where the view draws them so and `names` has a
+ * kernel, else their cells; by kernels with the constants of `key`, whose own name does not matter. Nothing where there
+ * are none.
+ */
+enum { SPL_CELL_POINT_LANES = SPL_RUN_PANELS * SPL_LANES, SPL_CELL_DISC_LANES = SPL_RUN_PANELS * 32 };
+struct spl_panel_kernels {
+    const char *panels, *meshes; /* NULL = none */
+    const char *panel_cells, *mesh_cells;
+};
+int spl_tile_dispatch_panels(struct spl_tile *tile, const struct spl_panel_kernels *names, struct spl_kernel_key key,
+                             enum spl_phase phases, struct spl_error *err);
 /* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides; `wide`: of words of 64 bits.
  */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err);

@@ -3,8 +3,8 @@
  * Front to back from the root: a node outside the frustum is dropped; one whose splats are at most `lod` samples apart,
  * or that has no children, is drawn; else its children are. Inside a drawn node every chunk is culled on its own and
  * drawn with the fraction (spacing / lod)^2 of its splats, 1/4 at least, radii scaled by 1/sqrt(fraction): continuous
- * detail (prune and scale of the textured-splats-panoramas paper). Pure but for the residency callback; the renderer's
- * thread. */
+ * detail (prune and scale of the textured-splats-panoramas paper). Lines, panels and meshes are drawn whole. Pure but
+ * for the residency callback; the renderer's thread. */
 #ifndef SPL_RENDER_SELECT_H
 #define SPL_RENDER_SELECT_H
 
@@ -28,7 +28,10 @@ struct spl_select_params {
     double lod;                                     /* samples; 0 = leaves in full */
     double low_pass;                                /* samples around the image whose chunks are drawn, too */
     bool discs;                                     /* splats have an extent: chunks may be drawn by windows */
-    bool lines;                                     /* chunks of lines are drawn, and which splats are linear matters */
+    bool panels;                                    /* chunks of panels are drawn as such; else each cell is a splat */
+    bool meshes;                                    /* the same of chunks of meshes */
+    bool lines; /* chunks of lines are drawn, and which splats are linear matters; with discs, lines that have a width
+                   are, and linear splats of their nodes are not */
     /* Tables of a page that the dataset does not keep: of YES in *tables, valid until the selection ends. May ask for
      * them; may be NULL where all are kept. */
     enum spl_select_answer (*tables)(void *context, uint32_t page, const struct spl_tables **tables);
@@ -48,6 +51,26 @@ enum { SPL_MAP_TRIMS = 1, SPL_MAP_COLORS = 2 };
 static inline bool spl_view_is_textured(const struct spl_view *view)
 {
     return spl_method_has_textures(view->method) && view->disc.atoms && view->layers >> SPL_LAYER_COLOR & 1;
+}
+
+/* Does the view draw panels as such? */
+static inline bool spl_view_draws_panels(const struct spl_view *view)
+{
+    return spl_method_get_params(view->method) & SPL_PARAM_BIT(primitives) &&
+           (view->shapes == SPL_SHAPES_PANELS || view->shapes == SPL_SHAPES_ALL);
+}
+
+/* The same of meshes. */
+static inline bool spl_view_draws_meshes(const struct spl_view *view)
+{
+    return spl_method_get_params(view->method) & SPL_PARAM_BIT(primitives) && view->shapes == SPL_SHAPES_ALL;
+}
+
+/* Does the view draw lines that have a width as such, by methods that draw discs? */
+static inline bool spl_view_draws_lines(const struct spl_view *view)
+{
+    return spl_method_get_params(view->method) & SPL_PARAM_BIT(primitives) &&
+           (view->shapes == SPL_SHAPES_LINES || view->shapes == SPL_SHAPES_ALL);
 }
 
 /* What a view draws maps for, where the dataset has any: SPL_MAP_*. */

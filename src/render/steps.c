@@ -23,7 +23,7 @@
 enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
-enum { mapped_samples = 1 << 20 };
+enum { mapped_samples = 1 << 19 };
 
 struct spl_frame_steps {
     const struct spl_dataset *dataset;
@@ -116,7 +116,8 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     const struct spl_method_row *method = spl_method_row(view->method);
     bool mapped = spl_dataset_get_info(steps->dataset)->maps && spl_view_get_maps(view) & SPL_MAP_COLORS;
     uint64_t samples = job->renderer->scratch.samples;
-    job->tiling.reach = (struct spl_reach){.align = 1, .apron = method->apron + (mapped ? 1 : 0)}; // normals look so far
+    uint32_t apron = method->apron + (mapped ? 1 : 0); // normals look so far
+    job->tiling.reach = (struct spl_reach){.align = 1, .apron = apron};
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);

@@ -52,19 +52,25 @@ static int next_params(struct spl_tile *tile, const struct spl_frame_params *par
     return SPL_OK;
 }
 
-/* A piece may be as long as the image, so that each has an invocation of its own. */
-enum { entries_per_workgroup = SPL_WORKGROUP / SPL_LANES, line_entries_per_workgroup = SPL_WORKGROUP / SPL_RUN_SPLATS };
+/* Invocations that share an entry. A piece may be as long as the image, so that each has one of its own; a panel has
+ * SPL_LANES, the discs of its cells four times as many. */
+static uint32_t lanes_of(const struct spl_dispatch *what)
+{
+    return what->lanes ? what->lanes : what->kind == SPL_CHUNK_LINES ? SPL_RUN_SPLATS : SPL_LANES;
+}
 
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
 {
     uint64_t workgroups = spl_gpu_get_limits(tile->renderer->gpu)->workgroups, size = tile->params.texture_size;
     uint64_t words = spl_gpu_buffer_get_bytes(tile->renderer->scratch.small) / sizeof(uint32_t);
-    uint64_t most = workgroups * entries_per_workgroup,
-             summed = workgroups * SPL_WORKGROUP / (SPL_RUN_SPLATS * SPL_LANES);
+    uint64_t invocations = workgroups * SPL_WORKGROUP, summed = invocations / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
         summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
-    uint64_t rounds =
-        spl_draw_list_count_rounds(&tile->renderer->list, most, summed, workgroups * line_entries_per_workgroup);
+    uint64_t rounds = spl_draw_list_count_rounds(
+        &tile->renderer->list, &(struct spl_draw_rounds){.splats = invocations / SPL_LANES,
+                                                         .summed = summed,
+                                                         .lines = invocations / SPL_RUN_SPLATS,
+                                                         .panels = invocations / SPL_CELL_DISC_LANES});
     if (rounds > SPL_PARAMS_MAX)
         return too_many(err);
     tile->params_used = (uint32_t)rounds;
@@ -86,7 +92,7 @@ void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kerne
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
-    const uint32_t per_workgroup = what->kind == SPL_CHUNK_LINES ? line_entries_per_workgroup : entries_per_workgroup;
+    const uint32_t lanes = lanes_of(what);
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
     spl_tile_bind(tile, bindings);
     for (size_t i = 0; i < list->batch_count; i++) {
@@ -115,9 +121,21 @@ void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kerne
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
             spl_gpu_dispatch(tile->renderer->gpu, kernel ? kernel : kernels->of[0], bindings,
-                             (params.entries + per_workgroup - 1) / per_workgroup);
+                             (uint32_t)(((uint64_t)params.entries * lanes + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
         }
     }
+}
+
+int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, enum spl_phase phases,
+                            struct spl_error *err)
+{
+    struct spl_disc_kernels kernel = {0};
+    if (!spl_draw_list_has(&tile->renderer->list, SPL_CHUNK_LINES))
+        return SPL_OK;
+    int rc = spl_kernels_get(&tile->renderer->kernels, tile->renderer->gpu, &key, &kernel.of[0], err);
+    if (!rc)
+        spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = phases, .kind = SPL_CHUNK_LINES});
+    return rc;
 }
 
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,
@@ -163,6 +181,12 @@ int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool 
     spl_tile_end_area(tile, SPL_AREA_OCCLUDERS);
     return rc;
 }
+
+_Static_assert((int)SPL_LAYER_PRIMITIVE == SPL_RESOLVE_PRIMITIVE && SPL_LAYER_COUNT == SPL_RESOLVE_PRIMITIVE + 1,
+               "the kernel knows each layer by its number");
+_Static_assert((int)SPL_SHAPE_SPLAT == SPL_DRAWN_SPLAT && (int)SPL_SHAPE_LINE == SPL_DRAWN_LINE &&
+                   (int)SPL_SHAPE_PANEL == SPL_DRAWN_PANEL && (int)SPL_SHAPE_MESH == SPL_DRAWN_MESH,
+               "what kernels draw is told apart by the same numbers");
 
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err)
 {

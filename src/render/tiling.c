@@ -58,6 +58,7 @@ static void set_params(struct spl_tile *tile)
 {
     const struct spl_camera *camera = &tile->camera;
     const struct spl_view *view = tile->view;
+    const struct spl_dataset_info *info = spl_dataset_get_info(tile->resident->dataset);
     const uint8_t *b = view->background;
     tile->params = (struct spl_frame_params){
         .fx = (float)camera->fx,
@@ -72,10 +73,11 @@ static void set_params(struct spl_tile *tile)
         .inverse_fx = 1 / (float)camera->fx,
         .inverse_fy = 1 / (float)camera->fy,
         .inverse_low_pass_squared = 1 / (SPL_LOW_PASS * SPL_LOW_PASS),
-        .texture_size = spl_dataset_get_info(tile->resident->dataset)->texture_size,
+        .texture_size = info->texture_size,
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
         .crop_width = tile->width,
         .crop_height = tile->height,
+        .flags = info->panels || info->meshes || (info->maps && spl_view_get_maps(view)) ? SPL_FRAME_SIDED : 0,
     };
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)

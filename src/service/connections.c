@@ -31,9 +31,9 @@ void spl_connection_enter(struct connection *connection, enum phase phase)
     connection->since_ns = spl_now_ns();
 }
 
-/* libmicrohttpd closes the socket next. What is unread then (the next request of a pipeline behind "Connection: close", the
- * rest of a body that was refused) would have the kernel send a reset and drop what it still has to send of our last reply.
- * Never blocks: what comes later still resets the connection, but behind the reply. */
+/* libmicrohttpd closes the socket next. What is unread then (the next request of a pipeline behind "Connection: close",
+ * the rest of a body that was refused) would have the kernel send a reset and drop what it still has to send of our
+ * last reply. Never blocks: what comes later still resets the connection, but behind the reply. */
 static void read_to_the_end(const struct connection *connection)
 {
     enum { reads_max = 64 };

@@ -113,8 +113,8 @@ static void prepare_reply(struct request *request)
     spl_connection_enter(request->connection, PHASE_WRITING);
 }
 
-/* libmicrohttpd 0.9.75 asks too early where "Expect: 100-continue" stands before no body and another request lies behind:
- * it takes no reply yet, and asks again. */
+/* libmicrohttpd 0.9.75 asks too early where "Expect: 100-continue" stands before no body and another request lies
+ * behind: it takes no reply yet, and asks again. */
 static enum MHD_Result send_reply(struct request *request)
 {
     if (!request->response)

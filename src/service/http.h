@@ -79,8 +79,8 @@ void spl_connection_notify(void *service, struct MHD_Connection *handle, void **
 void spl_connection_enter(struct connection *connection, enum phase phase); /* its time begins */
 void spl_connections_watch(struct spl_service *service);                    /* from now on the slow ones are closed */
 
-/* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. `line` and `version`
- * are libmicrohttpd's method, where the request's bytes begin, and version. */
+/* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. `line` and
+ * `version` are libmicrohttpd's method, where the request's bytes begin, and version. */
 bool spl_check_framing(struct request *request, const char *line, const char *version);
 
 /* oversize.c: requests that libmicrohttpd would not answer are `abandoned`, answered past it. The first looks at the

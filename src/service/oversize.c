@@ -26,12 +26,12 @@ void spl_refuse_on_socket(struct request *request, unsigned status, const char *
 {
     bool head = !strcmp(request->method, MHD_HTTP_METHOD_HEAD); // the body's length is told all the same
     char *text = spl_problem_print(request, status, "limit", field, detail), *reply = NULL;
-    int length = !text ? -1
-                       : asprintf(&reply,
-                                  "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
-                                  "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %zu\r\n\r\n%s",
-                                  status, MHD_get_reason_phrase_for(status), request->id, strlen(text),
-                                  head ? "" : text);
+    int length = !text
+                     ? -1
+                     : asprintf(&reply,
+                                "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nConnection: close\r\n"
+                                "X-Content-Type-Options: nosniff\r\nX-Request-Id: %s\r\nContent-Length: %zu\r\n\r\n%s",
+                                status, MHD_get_reason_phrase_for(status), request->id, strlen(text), head ? "" : text);
     request->status = status;
     request->abandoned = true;
     if (length > 0 && send(request->connection->fd, reply, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT) == length)

@@ -1,5 +1,5 @@
-/* Requests that wait for views, or for the pool to read a path or look up a coordinate system: their MHD connection is suspended until all is ready,
- * the deadline passes or the client leaves.
+/* Requests that wait for views, or for the pool to read a path or look up a coordinate system: their MHD connection is
+ * suspended until all is ready, the deadline passes or the client leaves.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
  * closed its sending side counts as gone, as with nginx. Invariant: request->waits is set exactly while the request is

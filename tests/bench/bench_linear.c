@@ -2,7 +2,9 @@
  * alone and prints its time beside that of the normals and radii, which pack estimates anyway. With the exact scene
  * that the scan was made of (splatd synth) it prints, object by object, how many of the points on its cones (wires,
  * droppers, poles, struts) are marked, and how many of the marked points lie on any of them; a point lies on a cone
- * within five sigma of the scanner's noise. MARKED.ply has what is marked in red and the rest in grey. */
+ * within five sigma of the scanner's noise. Of a scan with classes it prints how many points of each are marked. Then
+ * the same of the points that lines with a width stand for, and with a scene how wide these lines are beside its cones.
+ * MARKED.ply has what is marked in red and the rest in grey. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +13,7 @@
 
 #include "pack/linear.h"
 #include "pack/points.h"
+#include "pack/wires/wires.h"
 #include "synth/scene.h"
 #include "synth/vector.h"
 
@@ -65,6 +68,75 @@ static void compare(const struct spl_points *p, const struct spl_scene *scene)
            100.0 * (double)right / (double)(marked ? marked : 1));
     free(on);
     free(found);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float p = *(const float *)a, q = *(const float *)b;
+    return (p > q) - (p < q);
+}
+
+/* Widths of lines beside those of the cones that they run along, and how far vertices lie off the middle of these. */
+static void compare_widths(const struct spl_wires *w, const struct spl_scene *scene)
+{
+    float *ratio = calloc(w->count, sizeof *ratio), *off = calloc(w->count, sizeof *off),
+          *width = calloc(w->count, sizeof *width);
+    for (size_t k = 0; ratio && off && width && k < scene->object_count; k++) {
+        size_t count = 0;
+        for (size_t i = 0; i < w->count; i++) {
+            const struct spl_primitive *best = NULL;
+            double at[3], least = 0.3, radius = 0;
+            for (int c = 0; c < 3; c++)
+                at[c] = w->vertices[i].position[c] - scene->offset[c];
+            for (size_t n = 0; n < scene->primitive_count; n++) {
+                const struct spl_primitive *p = &scene->primitives[n];
+                double from[3];
+                if (p->kind != SPL_PRIMITIVE_CONE)
+                    continue;
+                sub3(at, p->center, from);
+                double along = fmin(fmax(dot3(from, p->normal), 0), p->length);
+                mad3(from, -along, p->normal, from);
+                if (sqrt(dot3(from, from)) < least) {
+                    least = sqrt(dot3(from, from));
+                    radius = p->half[0] + (p->half[1] - p->half[0]) * along / p->length;
+                    best = p;
+                }
+            }
+            if (!best || best->object != k)
+                continue;
+            ratio[count] = w->vertices[i].width / (float)(2 * radius);
+            width[count] = w->vertices[i].width;
+            off[count++] = (float)least;
+        }
+        qsort(ratio, count, sizeof *ratio, compare_floats);
+        qsort(off, count, sizeof *off, compare_floats);
+        qsort(width, count, sizeof *width, compare_floats);
+        if (count)
+            printf("%-18s %8zu vertices, width %.1f mm, of the truth's %.2f (%.2f to %.2f), off its axis %.1f mm "
+                   "(90 %%: %.1f)\n",
+                   scene->objects[k], count, 1e3 * (double)width[count / 2], (double)ratio[count / 2],
+                   (double)ratio[count / 10], (double)ratio[count * 9 / 10],
+                   1e3 * (double)off[count / 2], 1e3 * (double)off[count * 9 / 10]);
+    }
+    free(ratio);
+    free(off);
+    free(width);
+}
+
+/* By the classes that the scan has: ASPRS 14 is a conductor, 15 a transmission tower. */
+static void compare_classes(const struct spl_points *p)
+{
+    size_t on[256] = {0}, found[256] = {0}, marked = 0;
+    for (size_t i = 0; i < p->count; i++) {
+        bool linear = p->linear && p->linear[i];
+        marked += linear;
+        on[p->color_class[i] >> 24]++;
+        found[p->color_class[i] >> 24] += linear;
+    }
+    for (int k = 0; k < 256; k++)
+        if (on[k])
+            printf("class %3d %8zu points, %6.2f %% of them marked, %5.1f %% of the marked ones\n", k, on[k],
+                   100.0 * (double)found[k] / (double)on[k], 100.0 * (double)found[k] / (double)(marked ? marked : 1));
 }
 
 static void write_ply(const struct spl_points *p, const char *path)
@@ -122,8 +194,27 @@ int main(int argc, char **argv)
            1e9 * (middle - begin) / (double)points.count, 1e9 * (processor_seconds() - middle) / (double)points.count);
     if (scene)
         compare(&points, scene);
+    else if (points.has_class)
+        compare_classes(&points);
     if (out)
         write_ply(&points, out);
+    struct spl_wires wires = {0};
+    const struct spl_wires_options with_widths = {.noise = scene ? scene->scanner.noise : 0};
+    size_t before = 0, after = 0;
+    for (size_t i = 0; points.linear && i < points.count; i++)
+        before += points.linear[i];
+    if (!spl_wires_find(&wires, &points, &with_widths, &stage, &err)) {
+        for (size_t i = 0; points.linear && i < points.count; i++)
+            after += points.linear[i];
+        printf("%zu pieces stand for %zu of %zu marked points\n", wires.piece_count, after, before);
+        if (scene)
+            compare(&points, scene);
+        else if (points.has_class)
+            compare_classes(&points);
+        if (scene)
+            compare_widths(&wires, scene);
+    }
+    spl_wires_finish(&wires);
     spl_scene_destroy(scene);
     spl_points_finish(&points);
     return 0;

@@ -240,6 +240,7 @@ def test_clicks_give_coordinates_and_a_distance():
         tab.until("document.querySelectorAll('#points dd').length === 3")
         had = tab.run("[...document.querySelectorAll('#attributes dt')].map(e => e.textContent)")
         assert had == [a["name"] for a in daemon.ask("/v1/datasets/wall").json()["attributes"]] and had, had
+        assert tab.run("[...document.querySelectorAll('#primitive dd')].map(e => e.textContent)") == ["splat"]
         a, b = points(tab)
         focal = tab.run("document.querySelector('#stage').clientHeight") / 2 / math.tan(math.radians(25))
         for (px, py, pz), (u, v) in zip((a, b), ((60, -40), (0, 0))):
@@ -266,6 +267,31 @@ def test_clicks_give_coordinates_and_a_distance():
         tab.until("document.querySelector('#said').textContent === 'Nothing there'")
 
 
+def test_picks_ask_for_what_the_picture_shows():
+    """Its method and what changes what is seen where; here of a wall that says it has primitives."""
+    dataset = {**daemon.ask("/v1/datasets/wall").json(),
+               "primitives": {"panels": 1, "panel_points": 9, "pieces": 0, "methods": ["splat", "nearest"]}}
+    script = f"""(usual => {{ const told = {json.dumps({"/v1/datasets/wall": dataset})}; window.asked = [];
+        window.fetch = (path, how) => {{
+            asked.push(path);
+            return path in told ? Promise.resolve(new Response(JSON.stringify(told[path]))) : usual(path, how);
+        }}; }})(fetch)"""
+    for wanted in {"method": "splat", "primitives": "off"}, {"method": "fill", "kernel": "9"}, {"method": "points"}:
+        with page(f"{SITE}/{FACING}&{urllib.parse.urlencode(wanted)}&lod=2", before=script) as tab:
+            tab.click(*middle(tab))
+            tab.until("document.querySelectorAll('#points dd').length === 1")
+            pick = next(path for path in tab.run("asked") if "/pick?" in path)
+            asked = dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(pick).query))
+            camera = {"x", "y", "eye", "target", "up", "fov", "width", "height"}
+            assert {name: value for name, value in asked.items() if name not in camera} == wanted, asked
+    with page(f"{SITE}/{FACING}&budget=400ms", before=script) as tab:
+        tab.until("document.querySelector('#chosen').textContent.startsWith('Chosen: ')")
+        tab.click(*middle(tab))
+        tab.until("document.querySelectorAll('#points dd').length === 1")
+        method = tab.text("#chosen").split()[1].rstrip(",")
+        assert any("/pick?" in path and f"method={method}" in path for path in tab.run("asked")), tab.run("asked")
+
+
 def test_layers_methods_and_budgets():
     with page() as tab:
         digest = settled(tab)
@@ -276,8 +302,15 @@ def test_layers_methods_and_budgets():
         assert all(x.endswith(" us-ft") for x in ends), ends
         near, distant = (float(x.split()[0]) for x in ends)
         assert 2.7 < near < distant < 3.3, (near, distant)
+        assert tab.run("document.querySelector('#primitives').hidden")
+        tab.choose("#layer", "primitive")
+        digest = settled(tab, digest)
+        assert tab.run("document.querySelector('#legend').hidden")
+        assert tab.text("#primitives").split() == ["splats", "lines", "panels", "meshes"]
+        tab.until("!document.querySelector('#primitives').hidden")
         tab.choose("#layer", "color")
         digest = settled(tab, digest)
+        assert tab.run("document.querySelector('#primitives').hidden")
         tab.choose("#method", "points")
         settled(tab, digest)
         assert link(tab)["method"] == "points" and tab.run("document.querySelector('#legend').hidden")
@@ -551,11 +584,13 @@ def test_atoms_are_offered_where_there_are_textures():
 def test_maps_are_offered_where_there_are_any():
     with page() as tab:
         assert tab.run("document.querySelector('#parameter-maps').hidden") and "maps" not in tab.run("location.hash")
+        assert tab.text("#about").startswith("1\u202f600 points, 0.3"), tab.text("#about")
     look = FACING.replace("dataset=wall", "dataset=wall-mapped")
     with Daemon(REAL, datasets=[WALL, MAPPED]) as other:
         site = f"http://127.0.0.1:{other.port}"
         with page(f"{site}/{look}") as tab:
             assert "maps" in shown(tab) and tab.text("[for=parameter-maps]") == "Maps"
+            assert "points, maps of 1 station, 0.3" in tab.text("#about"), tab.text("#about")
             assert tab.run("[...document.querySelector('#parameter-maps').options].map(o => o.text)") == ["on", "off"]
             tab.choose("#parameter-maps", "off")
             tab.until(f"location.hash.includes('maps=off') && {REST}")
@@ -569,6 +604,20 @@ def test_maps_are_offered_where_there_are_any():
             assert tab.run("document.querySelector('#parameter-maps').value") == "off"
         with page(f"{site}/embed/wall-mapped{look}&maps=off") as tab:
             assert any("maps=off" in name for name, *_ in tab.run(VIEWS))
+
+
+def test_a_pruned_dataset_says_what_is_left():
+    with tempfile.TemporaryDirectory() as folder:
+        for command in ("synth", "courtyard", "--points", "30000", "--format", "ply", "-o", folder), (
+                "pack", f"{folder}/courtyard.ply", "--prune", "10", "-o", f"{folder}/left.spld"):
+            subprocess.run([REAL, *command], check=True, capture_output=True, timeout=120)
+        with Daemon(REAL, datasets=[f"{folder}/left.spld"]) as other:
+            about = other.ask("/v1/datasets/left").json()
+            assert about["leaf_splats"] < about["pruned"]["of"] / 5, about
+            assert daemon.ask("/v1/datasets/wall").json()["pruned"] is None
+            with page(f"http://127.0.0.1:{other.port}/") as tab:
+                left, whole = (f"{n:,}".replace(",", "\u202f") for n in (about["leaf_splats"], about["pruned"]["of"]))
+                assert tab.text("#about").startswith(f"{left} of {whole} points, "), tab.text("#about")
 
 
 FILL = ("visibility", "kernel", "threshold", "pyramid")
@@ -638,7 +687,8 @@ def test_controls_are_those_of_the_table():
         assert tab.run("document.querySelector('#method').value") == table["default"]
         for method in table["methods"]:
             tab.choose("#method", method["name"])
-            lacks = {name for name, parameter in parameters.items() if parameter["textures"] or parameter["maps"]}  # the wall
+            lacks = {name for name, parameter in parameters.items()  # the wall
+                     if parameter["textures"] or parameter["maps"] or parameter["primitives"]}
             names = {name for name in method["parameters"] if name not in lacks}
             assert shown(tab) == names, method["name"]
             assert tab.text("#method-help") == method["description"]
@@ -719,6 +769,28 @@ def refuse(tab, status, problem, retry):
 
     chromium.listeners[tab.session] = hear
     tab.send("Fetch.enable", patterns=[{"urlPattern": "*/view?*"}])
+
+
+def test_a_link_outlives_the_frames_before_it():
+    """What is on its way when the fragment changes neither puts the old camera back into it nor opens it anew."""
+    hold = """window.usual ??= fetch; window.fetch = (path, how) => path !== '/v1/datasets' ? usual(path, how)
+        : new Promise(done => { window.release = () => done(usual(path, how)); });"""
+    with page(complaints="400") as tab:
+        tab.run(f"{hold} location.hash = '#dataset=wall&eye=4,1,2&target=0,0,1'")
+        tab.until("Boolean(window.release)")
+        tab.run("window.facts = document.querySelector('#facts').firstChild")
+        tab.choose("#lod", "2")
+        tab.until(f"document.querySelector('#facts').firstChild !== facts && {REST}", "a frame of the old camera")
+        assert link(tab)["eye"] == [4, 1, 2]
+        tab.run("release()")
+        next_link(tab, lambda now: "layer" in now)  # which the page adds
+        assert link(tab)["eye"] == [4, 1, 2] and link(tab)["target"] == [0, 0, 1]
+        tab.run(f"{hold} delete window.release; location.hash = '#dataset=wall&eye=0,0,1&target=0,0,1'")
+        tab.until("Boolean(window.release)")
+        tab.choose("#lod", "2")
+        tab.until(REST)
+        tab.run("release()")
+        tab.until("document.querySelector('#notice p').textContent.startsWith('Refused: ')")
 
 
 def test_trouble_is_told_and_passes():

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -125,6 +126,24 @@ static void test_terminate(void **state)
     }
 }
 
+/* A file that may not grow is told as a full disk is; it ends nothing by a signal, and leaves nothing. */
+static void test_a_limit_of_files_is_an_error(void **state)
+{
+    (void)state;
+    struct rlimit before, small = {.rlim_cur = 200000};
+    int status;
+    unlink(output);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    small.rlim_max = before.rlim_max;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    pid_t pid = start_pack();
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    assert_true(waitpid(pid, &status, 0) == pid);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 1);
+    assert_int_equal(access(output, F_OK), -1);
+    assert_int_equal(parts(false), 0);
+}
+
 /* What a killed pack leaves is gone after the next one; what a living one writes stays. */
 static void test_leftovers_are_swept(void **state)
 {
@@ -175,6 +194,7 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_kill), cmocka_unit_test(test_terminate),
+                                       cmocka_unit_test(test_a_limit_of_files_is_an_error),
                                        cmocka_unit_test(test_leftovers_are_swept)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

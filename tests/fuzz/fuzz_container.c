@@ -3,10 +3,10 @@
  * to the last splat, from pages copied to blocks of their exact size.
  *
  * Input: one byte of flags (1 = fresh hashes after patching, 2 = verify, 4 = textures, 8 = tables are read by page, 16
- * = two pages, 32 = maps of one station, 64 = of two), one byte n, n patches of three bytes (offset low, high; xor) into header and table, a little-endian 32
- * bit size for each section, then the sections, of those sizes (shortened or missing as the input ends; pages and maps
- * keep their size up to 64 KiB, with zeroes): META, PDIR, each page's HEAD, each PAGE, with textures ATOM and each page's
- * TEXP, with maps PANO and each station's PMAP. */
+ * = two pages, 32 = maps of one station, 64 = of two), one byte n, n patches of three bytes (offset low, high; xor)
+ * into header and table, a little-endian 32 bit size for each section, then the sections, of those sizes (shortened or
+ * missing as the input ends; pages and maps keep their size up to 64 KiB, with zeroes): META, PDIR, each page's HEAD,
+ * each PAGE, with textures ATOM and each page's TEXP, with maps PANO and each station's PMAP. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -19,6 +19,7 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "dataset/dictionary.h"
+#include "dataset/panels.h"
 #include "dataset/texture.h"
 #include "geom/polar.h"
 
@@ -201,7 +202,7 @@ static void decode_streams(const struct spl_dataset *dataset, const struct spl_t
                            : isfinite(value) && (value >= 0 || type == SPL_STREAM_STEPS));
             bool known = spl_dataset_find_stream(dataset, streams[s].name) == (int)s;
             spl_assert(known == (type != SPL_STREAM_UNKNOWN));
-            if (known && i % 64 == 0 && spl_chunk_kind(chunk) == SPL_CHUNK_DISCS)
+            if (known && i % 64 == 0 && spl_chunk_kind(chunk) != SPL_CHUNK_LINES)
                 spl_assert(spl_dataset_find_value(dataset, (int)s, chunk->first_id + i, &found) &&
                            (found == value || (isnan(found) && isnan(value))));
         }
@@ -223,6 +224,33 @@ static void decode_chunk(const struct spl_chunk *chunk, const uint32_t *page, bo
     }
 }
 
+/* Cells of any page, also of one that nobody checked: within the grid, on a plane that is finite. */
+static void decode_panels(const struct spl_chunk *chunk, const uint32_t *page)
+{
+    struct spl_panel_frame frame;
+    uint32_t columns, rows;
+    spl_panels_get_frame(chunk, &frame);
+    spl_panels_get_extent(chunk, &columns, &rows);
+    spl_assert(columns <= 256 && rows <= 256 && frame.cell > 0);
+    spl_assert(spl_panels_get_error_mean(chunk) >= 0 && spl_panels_get_error_most(chunk) >= 0);
+    for (int a = 0; a < 3; a++)
+        spl_assert(isfinite(frame.origin[a] + frame.cell * (float)SPL_PANEL_SIDE *
+                                                  ((float)columns * frame.u[a] + (float)rows * frame.v[a])));
+    const float reach = spl_panels_get_reach(chunk);
+    spl_assert(reach >= 0 && isfinite(reach));
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        struct spl_relief relief;
+        spl_panels_get_relief(chunk, page, i, &relief);
+        for (int h = 0; h < SPL_RELIEF_POINTS(relief.level); h++)
+            spl_assert(fabsf(relief.height[h]) <= reach);
+        struct spl_panel panel, again;
+        spl_panels_decode(chunk, page, i, &panel);
+        memset(&again, 0xff, sizeof again);
+        spl_panels_decode(chunk, page, i, &again);
+        spl_assert(!memcmp(&panel, &again, sizeof panel));
+    }
+}
+
 /* A page whose tables can be read. Children, on whatever page, have larger numbers than their parent. */
 static void decode_page(const struct spl_dataset *dataset, const struct spl_tables *tables, uint64_t *linear)
 {
@@ -241,6 +269,8 @@ static void decode_page(const struct spl_dataset *dataset, const struct spl_tabl
         for (uint32_t c = first; c < first + node->chunk_count; c++) {
             decode_streams(dataset, tables, c, page);
             decode_chunk(&tables->chunks[c], page, !node->child_count, linear);
+            if (spl_kind_has_panels(spl_chunk_kind(&tables->chunks[c])))
+                decode_panels(&tables->chunks[c], page);
         }
     }
     free(page);

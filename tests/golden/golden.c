@@ -1,4 +1,5 @@
-/* Golden images: fixed views of the synthetic courtyard against stored PNGs, on each backend and between them.
+/* Golden images: fixed views of the synthetic courtyard, and of meshes, against stored PNGs, on each backend and
+ * between them.
  *
  *   golden vulkan|egl    that backend against images/; then one request a hundred times, for the same bytes
  *   golden backends      Vulkan against EGL, every view and layer
@@ -17,6 +18,7 @@
 #include <splatd/render.h>
 
 #include "picture.h"
+#include "support/make_sheet.h"
 #include "support/make_textures.h"
 #include "support/mapped_dataset.h"
 #include "synth/synth.h"
@@ -66,13 +68,55 @@ static struct spl_dataset *make_courtyard(void)
     return mapped;
 }
 
+/* Waves of every lattice, coloured by their place, before a wall of panels. */
+static struct spl_dataset *make_relief(void)
+{
+    enum { sheets = 5 };
+    struct make_sheet *sheet = calloc(sheets, sizeof *sheet);
+    struct make_panels made[sheets];
+    if (!sheet)
+        return NULL;
+    for (unsigned i = 0; i < sheets; i++) {
+        const bool wall = i == 4;
+        make_sheet_begin(&sheet[i], (float[]){0.1f * (float)(i % 2), -0.6f - 0.2f * wall, 0.79f - 0.19f * wall},
+                         (double[]){wall ? 0 : i % 2 ? 0.34 : -0.34, wall ? 0.5 : 0, wall ? 0 : i > 1 ? 0.33 : -0.33},
+                         wall ? 5 : 2, wall ? 0.025 : 0.02, i % 4);
+        make_sheet_waves(&sheet[i], 5, 1.3, (double[]){0.3 * i, 1});
+        for (size_t p = 0; p < sheet[i].made.count; p++)
+            for (int k = 0; k < SPL_PANEL_SIDE * SPL_PANEL_SIDE; k++) {
+                int x = k % SPL_PANEL_SIDE, y = k / SPL_PANEL_SIDE;
+                uint8_t *color = sheet[i].panels[p].color[y][x];
+                color[i % 3] = (uint8_t)(60 + 12 * x);
+                color[1] = (uint8_t)(color[1] / 2 + 4 * y + (x / 4 + y / 4) % 2 * 40);
+                if (wall && x * y % 7 == 3)
+                    sheet[i].panels[p].cells[y] &= (uint16_t)~(1u << x);
+            }
+        made[i] = sheet[i].made;
+        if (wall)
+            made[i].reliefs = NULL;
+    }
+    struct spl_dataset *dataset = make_dataset_panels(NULL, 0, made, sheets, 1);
+    free(sheet);
+    return dataset;
+}
+
+/* What goldens are views of. */
+struct places {
+    struct spl_dataset *courtyard, *relief;
+};
+
+static const struct spl_dataset *place_of(const struct places *places, const struct golden *golden)
+{
+    return golden->relief ? places->relief : places->courtyard;
+}
+
 /* NULL with a message where this machine or build lacks the backend. */
-static struct spl_renderer *open_backend(const char *backend, const struct spl_dataset *dataset)
+static struct spl_renderer *open_backend(const char *backend, const struct places *places)
 {
     struct spl_renderer *renderer = NULL;
     struct spl_error err = {0};
     if (spl_renderer_create(&SPL_SIZED(spl_renderer_options, .device = backend), &renderer, &err) ||
-        spl_renderer_add(renderer, dataset, &err)) {
+        spl_renderer_add(renderer, places->courtyard, &err) || spl_renderer_add(renderer, places->relief, &err)) {
         printf("%s: %s\n", backend, err.message);
         spl_renderer_destroy(renderer);
         return NULL;
@@ -195,7 +239,7 @@ static bool judge(const char *name, const char *backend, const struct spl_encode
     return good;
 }
 
-static bool against_goldens(struct spl_renderer *renderer, const struct spl_dataset *dataset, const char *backend)
+static bool against_goldens(struct spl_renderer *renderer, const struct places *places, const char *backend)
 {
     bool good = true;
     for (int i = 0; i < GOLDEN_COUNT; i++) {
@@ -203,7 +247,7 @@ static bool against_goldens(struct spl_renderer *renderer, const struct spl_data
         struct spl_encoded made, wanted = {0};
         char path[512];
         golden_path(&goldens[i], path);
-        if (!render(renderer, dataset, &view, goldens[i].layer, &made))
+        if (!render(renderer, place_of(places, &goldens[i]), &view, goldens[i].layer, &made))
             return false;
         good =
             read_file(path, &wanted) && judge(goldens[i].name, backend, &made, &wanted, goldens[i].tolerance) && good;
@@ -272,7 +316,7 @@ static bool red_is_red(struct spl_renderer *renderer, const struct spl_dataset *
 }
 
 /* Every view in every layer but the id, whose ties two drivers may break differently. */
-static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const struct spl_dataset *dataset)
+static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const struct places *places)
 {
     static const struct tolerance one_level = {1, 0.0001};
     bool good = true;
@@ -285,6 +329,7 @@ static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const
             char name[64];
             view.layers = 1u << layer;
             snprintf(name, sizeof name, "%s-%s", goldens[i].name, spl_layer_name((enum spl_layer)layer));
+            const struct spl_dataset *dataset = place_of(places, &goldens[i]);
             if (!render(a, dataset, &view, (enum spl_layer)layer, &left) ||
                 !render(b, dataset, &view, (enum spl_layer)layer, &right))
                 return false;
@@ -318,7 +363,7 @@ static bool check_names(char **names, int count)
     return known;
 }
 
-static bool update(struct spl_renderer *renderer, const struct spl_dataset *dataset, char **names, int count)
+static bool update(struct spl_renderer *renderer, const struct places *places, char **names, int count)
 {
     for (int i = 0; i < GOLDEN_COUNT; i++) {
         bool wanted = false;
@@ -330,7 +375,7 @@ static bool update(struct spl_renderer *renderer, const struct spl_dataset *data
         struct spl_encoded png;
         char path[512];
         golden_path(&goldens[i], path);
-        if (!render(renderer, dataset, &view, goldens[i].layer, &png) || !write_file(path, &png))
+        if (!render(renderer, place_of(places, &goldens[i]), &view, goldens[i].layer, &png) || !write_file(path, &png))
             return false;
         printf("  %s: %zu bytes\n", path, png.length);
         spl_encoded_finish(&png);
@@ -399,21 +444,23 @@ int main(int argc, char **argv)
     }
     if (updating && !check_names(argv + 2, argc - 2))
         return 2;
-    struct spl_dataset *dataset = make_courtyard();
-    if (!dataset)
+    const struct places places = {make_courtyard(), make_relief()};
+    if (!places.courtyard || !places.relief)
         return 1;
     int rc = SKIPPED;
-    struct spl_renderer *first = open_backend(both || updating ? "vulkan" : mode, dataset), *second = NULL;
+    struct spl_renderer *first = open_backend(both || updating ? "vulkan" : mode, &places), *second = NULL;
     if (first && both)
-        second = open_backend("egl", dataset);
+        second = open_backend("egl", &places);
     if (updating && first)
-        rc = !update(first, dataset, argv + 2, argc - 2);
+        rc = !update(first, &places, argv + 2, argc - 2);
     else if (both && second)
-        rc = !backends_agree(first, second, dataset);
+        rc = !backends_agree(first, second, &places);
     else if (!both && first)
-        rc = against_goldens(first, dataset, mode) + red_is_red(first, dataset) + repeats_itself(first, dataset) < 3;
+        rc = against_goldens(first, &places, mode) + red_is_red(first, places.courtyard) +
+             repeats_itself(first, places.courtyard) < 3;
     spl_renderer_destroy(second);
     spl_renderer_destroy(first);
-    spl_dataset_close(dataset);
+    spl_dataset_close(places.courtyard);
+    spl_dataset_close(places.relief);
     return rc;
 }

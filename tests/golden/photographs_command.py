@@ -81,11 +81,15 @@ with tempfile.TemporaryDirectory() as folder:
                      r" +constant: the other ([\d,]+) points", told)
     assert seen and sum(int(n.replace(",", "")) for n in seen.groups()) == 101 * 101, told
 
-    # exposures: the darker half is evened out with the brighter one, without a step
+    # exposures: the darker half is evened out with the brighter one, without a step, in maps of both too
     write_png("images/left.png", 64, 48, bytes((160, 80, 40)))
     pack()
     seen = [color_at((x, -2, 0), (x, 0, 0)) for x in (-1.8, -1, -0.1, 0.1, 1, 1.8)]
     assert all(abs(a - b) <= 6 for one in seen for a, b in zip(one, seen[0])), seen
+
+    run("pack", "wall.xyz", "--panoramas", "views.json", "-o", "wall.spld")
+    seen = [color_at((x, -2, 0), (x, 0, 0)) for x in (-1.8, -1, -0.1, 0.1, 1, 1.8)]
+    assert all(abs(a - b) <= 10 for one in seen for a, b in zip(one, seen[0])), seen  # blocks' colours are 8 apart
 
     # what cannot be used is named, and fails the packing; nothing is left behind, the old file stays
     before = pathlib.Path("wall.spld").read_bytes()
@@ -196,13 +200,18 @@ with tempfile.TemporaryDirectory() as folder:
     assert row[0] == "rings" and float(table[-1][24:].split()[3]) > 1, table
     assert sorted(os.listdir("compared")) == ["rings.coloured.png", "rings.photograph.png", "rings.textured.png"]
     shutil.rmtree("compared")
+    said = run("pack", "wall.xyz", "--panoramas", "views.json", "-o", "mapped.spld")
+    assert "maps of 1 station from 1 picture" in said, said
+    table = run("bench", "--left-out", "mapped.spld", "--cameras", "views.json").splitlines()
+    assert float(table[-1][24:].split()[3]) > 1, table
+    os.remove("mapped.spld")
     for arguments, words in (((), "--cameras"), (("--cameras", "nowhere"), "nowhere"),
                              (("--cameras", "views.json", "--lod", "x"), "--lod")):
         done = subprocess.run([SPLATD, "bench", "--left-out", "wall.spld", *arguments], stderr=subprocess.PIPE, text=True)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
     run("pack", "wall.xyz", "--points-only", "-o", "bare.spld")
     done = subprocess.run([SPLATD, "bench", "--left-out", "bare.spld", "--cameras", "views.json"], stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 2 and "bare.spld has no textures" in done.stderr, done.stderr
+    assert done.returncode == 2 and "bare.spld has no textures or maps" in done.stderr, done.stderr
     os.remove("bare.spld")
 
     # the textures as they were before: coders beside each other, the photograph itself on the splats, a view that was

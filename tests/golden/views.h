@@ -23,6 +23,7 @@ struct golden {
     struct tolerance tolerance;
     uint32_t atoms;           /* of the textures that every splat has; 0 = its colour */
     bool maps;                /* those of the station are drawn */
+    bool relief;              /* of meshes, else of the courtyard */
 };
 
 static const struct golden goldens[] = {
@@ -58,6 +59,12 @@ static const struct golden goldens[] = {
     /* colours of a map on the ground, splats' own where it did not look, and what it saw through is gone */
     {"overview-mapped", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.004}, .maps = true},
+    /* triangles of every lattice, their colours, creases and outlines, before panels */
+    {"relief-splat", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002}, .relief = true},
+    /* the same by the nearest alone: each triangle has one normal */
+    {"relief-normal", {0.4, -1.2, 0.7}, {0, 0, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_NORMAL, 0, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002}, .relief = true},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

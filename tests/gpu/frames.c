@@ -43,11 +43,13 @@ struct tally compare(const struct spl_frame *a, const struct spl_frame *b)
     const float *ca = a->images[SPL_LAYER_COVERAGE].pixels, *cb = b->images[SPL_LAYER_COVERAGE].pixels;
     const float *na = a->images[SPL_LAYER_NORMAL].pixels, *nb = b->images[SPL_LAYER_NORMAL].pixels;
     const uint32_t *ia = a->images[SPL_LAYER_ID].pixels, *ib = b->images[SPL_LAYER_ID].pixels;
+    const uint32_t *pa = a->images[SPL_LAYER_PRIMITIVE].pixels, *pb = b->images[SPL_LAYER_PRIMITIVE].pixels;
     const uint8_t *ra = a->images[SPL_LAYER_COLOR].pixels, *rb = b->images[SPL_LAYER_COLOR].pixels;
     t.pixels = (size_t)a->images[SPL_LAYER_DEPTH].width * a->images[SPL_LAYER_DEPTH].height;
     for (size_t i = 0; i < t.pixels; i++) {
         t.covered_differs += ca[i] != cb[i];
         t.id_differs += ia[i] != ib[i];
+        t.primitive_differs += pa[i] != pb[i];
         if (isnan(da[i]) != isnan(db[i])) {
             t.depth_differs++;
         } else if (!isnan(da[i])) {
@@ -82,11 +84,12 @@ void same_images(const struct spl_dataset *dataset, const struct spl_view *view,
     struct tally t = compare(&gpu, &cpu);
     size_t few = t.pixels / 10000 + 1;
     if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > few ||
-        t.normal_differs > few)
+        t.normal_differs > few || t.primitive_differs > few)
         fail_msg(
-            "%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu",
+            "%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu, "
+            "primitive %zu",
             what, t.pixels, t.covered_differs, t.depth_differs, t.depth_worst, t.color_differs, t.color_worst,
-            t.id_differs, t.normal_differs);
+            t.id_differs, t.normal_differs, t.primitive_differs);
     spl_frame_finish(&gpu);
     spl_frame_finish(&cpu);
 }

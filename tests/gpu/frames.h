@@ -29,7 +29,7 @@ int frames_seed(void **state);
 int frames_run(int argc, char **argv, const char *name, const struct CMUnitTest *tests, size_t count);
 
 struct tally {
-    size_t pixels, covered_differs, depth_differs, color_differs, id_differs, normal_differs;
+    size_t pixels, covered_differs, depth_differs, color_differs, id_differs, normal_differs, primitive_differs;
     double depth_worst;
     int color_worst;
 };

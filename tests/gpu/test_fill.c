@@ -33,8 +33,8 @@ static void what_method_fill_takes_matches(void **state)
     done(dataset);
 }
 
-/* Two wires of vertices seven pixels apart, one with a gap of eighty, and points on them that are linear: whole lines, one
- * pixel wide, and nothing between them. What is not fill does not draw them. */
+/* Two wires of vertices seven pixels apart, one with a gap of eighty, and points on them that are linear: whole lines,
+ * one pixel wide, and nothing between them. What is not fill does not draw them. */
 static void wires_are_lines_along_themselves(void **state)
 {
     (void)state;
@@ -93,11 +93,29 @@ static void wires_are_lines_along_themselves(void **state)
     done(dataset);
 }
 
+/* Points around the eye, which hide as far as the kernel reaches and lie beside the image as well as in it; pixels are
+ * no squares, so that points reach farther along one axis than along the other. */
+static void points_around_the_eye_match(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        random_state = 101 + (uint64_t)i;
+        struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
+        struct spl_view view = looking(origin, 0.1 + uniform(), 400, 240);
+        view.method = SPL_METHOD_FILL;
+        view.camera.cx += 31.7;
+        *(i % 2 ? &view.camera.fx : &view.camera.fy) *= 1.2;
+        same_images(dataset, &view, i % 2 ? "wide pixels" : "tall pixels");
+        done(dataset);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(what_method_fill_takes_matches),
         frames_test(wires_are_lines_along_themselves),
+        frames_test(points_around_the_eye_match),
     };
     return frames_run(argc, argv, "fill", tests, sizeof tests / sizeof *tests);
 }

@@ -14,6 +14,7 @@
 #include "gpu/frames.h"
 #include "shared.h"
 #include "support/mapped_dataset.h"
+#include "support/sanitised.h"
 
 static const double spheres[3] = {1.1, 0.7, 0.9};
 
@@ -32,12 +33,32 @@ static void look_anywhere(const struct make_map *map, const double d[3], double 
     *range = root > 0 && along > 0 ? fmax(along - sqrt(root), 0.06) : sin(20 * d[2]) > 0 ? INFINITY : NAN;
 }
 
-static struct spl_dataset *random_mapped(size_t count, double radius, int levels, uint32_t stations, bool trims)
+/* Turns a splat that turns its back to the eye of looking(), or nearly, towards it. */
+static void face_eye(struct make_splat *splat, double distance)
+{
+    const struct spl_view view = looking(origin, distance, 16, 16);
+    double towards = 0, along[3], length = 0;
+    for (int c = 0; c < 3; c++) {
+        along[c] = view.camera.eye[c] - splat->position[c];
+        towards += (double)splat->normal[c] * along[c];
+        length += along[c] * along[c];
+    }
+    length = sqrt(length);
+    for (int c = 0; c < 3; c++)
+        splat->normal[c] = fabs(towards) < 0.1 * length ? (float)(along[c] / length)
+                                                        : copysignf(1, (float)towards) * splat->normal[c];
+}
+
+/* Where `facing` is not 0, all face the eye of looking() at that distance: maps turn the backs of no discs away. */
+static struct spl_dataset *random_mapped(size_t count, double radius, int levels, uint32_t stations, bool trims,
+                                         double facing)
 {
     static const double places[4][3] = {{3, 0.5, 1}, {-1, -2.5, 0.2}, {0.1, 0.2, 0.05}, {0.5, 3, -2}};
     struct make_splat *splats = random_splats(count, origin, radius);
     for (size_t i = 0; i < count && i % 300 < 200; i += 3) /* some end at a line, too */
         splats[i].clip[0] = -splats[i].normal[1], splats[i].clip[1] = splats[i].normal[0], splats[i].clip_offset = 0.4f;
+    for (size_t i = 0; facing > 0 && i < count; i++)
+        face_eye(&splats[i], facing);
     struct spl_dataset *plain = make_dataset_levels(splats, count, levels);
     struct make_map maps[4];
     for (uint32_t i = 0; i < stations; i++)
@@ -63,11 +84,12 @@ static void maps_match_the_reference(void **state)
     } rows[] = {
         {"colours", 3000, 0.05, 3, 0, 1, 1, 1, 2, false}, {"trimmed", 3000, 0.05, 3, 0, 1, 1, 1, 3, true},
         {"pruned", 6000, 0.05, 6, 12, 2, 2, 1, 4, true},  {"among them", 3000, 0.03, 0.9, 1, 1, 1, 1, 4, true},
-        {"supersampled", 2000, 0.1, 3, 1, 0, 1, 2, 1, true},
+        {"supersampled", 2000, 0.1, 3, 1, 0, 1, 2, 1, true}, {"wide", 96, 1.5, 5, 0, 1, 1, 1, 1, true},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_dataset *dataset =
-            random_mapped(rows[i].splats, rows[i].radius, rows[i].levels, rows[i].stations, rows[i].trims);
+            random_mapped(rows[i].splats, rows[i].radius, rows[i].levels, rows[i].stations, rows[i].trims,
+                          rows[i].trims ? 0 : rows[i].distance);
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             struct spl_view view = looking(origin, rows[i].distance, 160, 120);
             char what[64];
@@ -162,6 +184,7 @@ static void colours_are_those_of_their_directions(void **state)
     enum { width = 120, height = 120 };
     static const double place[3] = {0.2, -0.1, 0.15}, eye[3] = {-0.1, 0.1, -0.2};
     (void)state;
+    skip_sanitised();
     struct make_map map = {.row = mapped_row(place, 0, 64, 1, 256), .look = look_in_room};
     struct spl_dataset *dataset = make_room(&map);
     uint32_t *words = malloc(spl_dataset_get_map_bytes(dataset, 0));
@@ -228,6 +251,7 @@ static void silhouettes_end_where_a_station_saw_through(void **state)
     enum { side = 20 };
     static const double place[3] = {0, 0, 0}, eye[3] = {-1, 0.3, 0.2}, target[3] = {2, 0, 0}, up[3] = {0, 0, 1};
     (void)state;
+    skip_sanitised();
     struct make_splat splats[side * side];
     for (int i = 0; i < side * side; i++)
         splats[i] = (struct make_splat){.position = {2, -(i % side + 0.5) / side, (i / side + 0.5) / side - 0.5},
@@ -273,6 +297,106 @@ static void silhouettes_end_where_a_station_saw_through(void **state)
         done(dataset);
     }
     spl_dataset_close(plain);
+}
+
+static void look_at_a_veil(const struct make_map *map, const double d[3], double color[3], double *range)
+{
+    (void)map;
+    (void)d;
+    color[0] = color[1] = color[2] = 0;
+    *range = 0.5;
+}
+
+static void look_at_nothing(const struct make_map *map, const double d[3], double color[3], double *range)
+{
+    (void)map;
+    (void)d;
+    color[0] = color[1] = color[2] = 0;
+    *range = NAN;
+}
+
+static void look_at_wall(const struct make_map *map, const double d[3], double color[3], double *range)
+{
+    double world = 0;
+    for (int j = 0; j < 3; j++)
+        world += map->row.rotation[j] * d[j];
+    color[0] = color[1] = color[2] = 200;
+    *range = world > 1e-6 ? (2 - map->row.position[0]) / world : INFINITY;
+}
+
+/* Something stood before a wall's own station: its colours are the next station's, and neither black nor its own. */
+static void what_the_own_station_does_not_see_another_colours(void **state)
+{
+    enum { side = 20 };
+    static const double eye[3] = {-1, 0.3, 0.2}, target[3] = {2, 0, 0}, up[3] = {0, 0, 1};
+    static const double places[2][3] = {{0, 0, 0}, {0.3, 0.2, -0.1}};
+    (void)state;
+    struct make_splat splats[side * side];
+    for (int i = 0; i < side * side; i++)
+        splats[i] = (struct make_splat){.position = {2, (i % side + 0.5) / side - 0.5, (i / side + 0.5) / side - 0.5},
+                                        .normal = {-1, 0, 0},
+                                        .radius = 0.1f,
+                                        .color = {50, 50, 50}};
+    struct spl_dataset *plain = make_dataset(splats, side * side);
+    const struct make_map maps[2] = {{.row = mapped_row(places[0], 0, 64, 2, 256), .look = look_at_a_veil},
+                                     {.row = mapped_row(places[1], 1, 64, 2, 256), .look = look_at_wall}};
+    uint64_t chunks;
+    spl_dataset_get_chunks(plain, &chunks);
+    struct spl_chunk_stations *seen = calloc(chunks, sizeof *seen);
+    for (uint64_t c = 0; c < chunks; c++)
+        seen[c] = (struct spl_chunk_stations){.seen_by = {1, 2}};
+    struct spl_dataset *dataset = make_mapped(plain, maps, 2, seen);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 1, 80, 60);
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct spl_frame frame;
+        view.method = method;
+        if (!(spl_method_get_params(method) & SPL_PARAM_BIT(maps)))
+            continue;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+        assert_in_range(((const uint8_t *)frame.images[SPL_LAYER_COLOR].pixels)[4 * (30 * 80 + 40)], 196, 204);
+        spl_frame_finish(&frame);
+    }
+    done(dataset);
+    spl_dataset_close(plain);
+    free(seen);
+}
+
+/* Two faces of a wall that is thinner than its discs are wide: the one that faces the eye hides the other. Alone the
+ * other is drawn, where it is. */
+static void backs_lie_behind(void **state)
+{
+    (void)state;
+    const struct make_map map = {.row = mapped_row(origin, 0, 64, 2, 64), .look = look_at_nothing};
+    for (int alone = 0; alone < 2; alone++) {
+        const struct make_splat splats[2] = {
+            {.position = {2.33, 0, 0}, .normal = {1, 0, 0}, .radius = 0.5f, .color = {0, 0, 250}},
+            {.position = {2.3, 0, 0}, .normal = {-1, 0, 0}, .radius = 0.5f, .color = {250, 0, 0}},
+        };
+        struct spl_dataset *plain = make_dataset(splats, alone ? 1 : 2);
+        struct spl_dataset *dataset = make_mapped_alike(plain, &map, 1, false);
+        assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+        struct spl_view view = looking(origin, 1, 80, 60);
+        const double eye[3] = {0, 0.01, 0.02}, target[3] = {2, 0, 0}, up[3] = {0, 0, 1};
+        assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+        for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+            struct spl_frame frame;
+            const size_t middle = 30 * 80 + 40;
+            view.method = method;
+            if (!(spl_method_get_params(method) & SPL_PARAM_BIT(maps)))
+                continue;
+            assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+            const uint8_t *color = (const uint8_t *)frame.images[SPL_LAYER_COLOR].pixels + 4 * middle;
+            float depth = ((const float *)frame.images[SPL_LAYER_DEPTH].pixels)[middle];
+            assert_in_range(color[alone ? 2 : 0], 240, 255);
+            assert_in_range(color[alone ? 0 : 2], 0, 10);
+            assert_true(fabsf(depth - (alone ? 2.33f : 2.3f)) < 0.01f);
+            spl_frame_finish(&frame);
+        }
+        done(dataset);
+        spl_dataset_close(plain);
+    }
 }
 
 /* A hundred stations, each chunk seen by others: the image is the same however it is cut, and when it is drawn again. */
@@ -339,7 +463,7 @@ static void stations_leave_no_seams(void **state)
 static void maps_count_as_memory(void **state)
 {
     (void)state;
-    struct spl_dataset *dataset = random_mapped(900, 0.1, 1, 4, true);
+    struct spl_dataset *dataset = random_mapped(900, 0.1, 1, 4, true, 3);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     struct spl_residency_info resident;
     struct spl_view view = looking(origin, 3, 64, 48);
@@ -385,6 +509,8 @@ int main(int argc, char **argv)
         frames_test(maps_match_the_reference),
         frames_test(colours_are_those_of_their_directions),
         frames_test(silhouettes_end_where_a_station_saw_through),
+        frames_test(what_the_own_station_does_not_see_another_colours),
+        frames_test(backs_lie_behind),
         frames_test(stations_leave_no_seams),
         frames_test(maps_count_as_memory),
     };

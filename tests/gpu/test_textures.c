@@ -8,26 +8,13 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include <splatd/render.h>
-
-#include "base/error.h"
-#include "dataset/dataset.h"
 #include "dataset/dictionary.h"
-#include "support/make_dataset.h"
+#include "gpu/frames.h"
 #include "support/make_textures.h"
 #include "support/reference.h"
 
-static struct spl_renderer *renderer;
-
-static uint64_t random_state = 1;
-static double uniform(void)
-{
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(random_state >> 11) / 9007199254740992.0;
-}
-
 /* Splats of every orientation around the origin, of up to ten times `radius`. */
-static struct spl_dataset *random_cube(size_t count, double radius, int levels)
+static struct spl_dataset *lined_cube(size_t count, double radius, int levels)
 {
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (size_t i = 0; i < count; i++) {
@@ -50,16 +37,11 @@ static struct spl_dataset *random_cube(size_t count, double radius, int levels)
     return dataset;
 }
 
-static struct spl_view looking(double distance, uint32_t width, uint32_t height)
+/* From aside, colours alone. */
+static struct spl_view colored(double distance, uint32_t width, uint32_t height)
 {
-    static const double center[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-    struct spl_view view;
-    spl_view_init(&view);
-    view.camera.near = 0.01;
-    view.camera.far = 1000;
-    double eye[3] = {distance * 0.6, -distance * 0.7, distance * 0.4};
-    assert_int_equal(spl_camera_look_at(&view.camera, eye, center, up, NULL), SPL_OK);
-    assert_int_equal(spl_camera_set_fov(&view.camera, 50, width, height, NULL), SPL_OK);
+    struct spl_view view = looking(origin, distance, width, height);
+    view.layers = 1 << SPL_LAYER_COLOR;
     return view;
 }
 
@@ -99,12 +81,6 @@ static void same_as_reference(const struct spl_dataset *dataset, const struct sp
     spl_frame_finish(&cpu);
 }
 
-static void done(struct spl_dataset *dataset)
-{
-    spl_renderer_remove(renderer, dataset);
-    spl_dataset_close(dataset);
-}
-
 static void textures_match_the_reference(void **state)
 {
     (void)state;
@@ -121,13 +97,13 @@ static void textures_match_the_reference(void **state)
         {"summed in rounds", 32, 50, 7, 900, 0.06, 1.2, 0, 1},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        struct spl_dataset *plain = random_cube(rows[i].splats, rows[i].radius, rows[i].levels);
+        struct spl_dataset *plain = lined_cube(rows[i].splats, rows[i].radius, rows[i].levels);
         struct spl_dictionary dictionary = make_dictionary(rows[i].atoms, rows[i].size, 4);
         struct spl_dataset *dataset = make_textured(plain, &dictionary, rows[i].planes, 11);
         spl_dataset_close(plain);
         spl_dictionary_finish(&dictionary);
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-        struct spl_view view = looking(rows[i].distance, 160, 120);
+        struct spl_view view = colored(rows[i].distance, 160, 120);
         view.lod = rows[i].lod;
         static const uint32_t atoms[2][3] = {{8, 3, 0}, {7, 5, 1}};
         for (int k = 0; k < 3; k++) {
@@ -147,12 +123,12 @@ static void textures_match_the_reference(void **state)
 static void textures_change_colours_only(void **state)
 {
     (void)state;
-    struct spl_dataset *plain = random_cube(3000, 0.03, 1);
+    struct spl_dataset *plain = lined_cube(3000, 0.03, 1);
     struct spl_dictionary dictionary = make_dictionary(200, 16, 4);
     struct spl_dataset *dataset = make_textured(plain, &dictionary, 8, 11);
     assert_int_equal(spl_renderer_add(renderer, plain, NULL), SPL_OK);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-    struct spl_view view = looking(2.5, 160, 120);
+    struct spl_view view = colored(2.5, 160, 120);
     view.layers = (1 << SPL_LAYER_COUNT) - 1;
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         view.method = method;
@@ -197,12 +173,13 @@ static void textures_change_colours_only(void **state)
  */
 static void textures_count_as_memory(void **state)
 {
-    struct spl_dataset *plain = random_cube(3000, 0.03, 1);
+    (void)state;
+    struct spl_dataset *plain = lined_cube(3000, 0.03, 1);
     struct spl_dictionary dictionary = make_dictionary(2000, 32, 4);
     struct spl_dataset *dataset = make_textured(plain, &dictionary, 8, 11);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     struct spl_residency_info resident;
-    struct spl_view view = looking(2.5, 64, 48);
+    struct spl_view view = colored(2.5, 64, 48);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     view.disc.atoms = 0;
     struct spl_frame frame = render(dataset, &view);
@@ -223,7 +200,7 @@ static void textures_count_as_memory(void **state)
     struct spl_renderer *small, *other = renderer;
     struct spl_renderer_options options = {
         .size = sizeof options,
-        .device = *state, .scratch_samples = 1 << 16, .memory_limit = resident.taken_bytes + info->page_bytes / 2};
+        .device = device, .scratch_samples = 1 << 16, .memory_limit = resident.taken_bytes + info->page_bytes / 2};
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     uint64_t base = spl_renderer_get_memory(small);
     spl_renderer_destroy(small);
@@ -249,28 +226,12 @@ static void textures_count_as_memory(void **state)
     spl_dataset_close(plain);
 }
 
-static char device[64];
-
-int main(void)
+int main(int argc, char **argv)
 {
-    const char *name = getenv("SPLATD_TEST_DEVICE");
-    struct spl_error err = {0};
-    strncpy(device, name ? name : "auto", sizeof device - 1);
-    struct spl_renderer_options options = {
-        .size = sizeof options, .device = device, .debug = true, .scratch_samples = 1 << 19};
-    int rc = spl_renderer_create(&options, &renderer, &err);
-    if (rc == SPL_E_NO_DEVICE)
-        return 77;
-    if (rc) {
-        print_error("%s\n", err.message);
-        return 1;
-    }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(textures_match_the_reference),
-        cmocka_unit_test(textures_change_colours_only),
-        cmocka_unit_test_prestate(textures_count_as_memory, device),
+        frames_test(textures_match_the_reference),
+        frames_test(textures_change_colours_only),
+        frames_test(textures_count_as_memory),
     };
-    int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    spl_renderer_destroy(renderer);
-    return failed;
+    return frames_run(argc, argv, "textures", tests, sizeof tests / sizeof *tests);
 }

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "gpu/frames.h"
+#include "support/sanitised.h"
 
 /* Says where two images of a tile each way differ first. */
 static void same_pixels(const struct spl_frame frames[2], int layer, const char *what, uint64_t seed)
@@ -43,7 +44,7 @@ static void same_pixels(const struct spl_frame frames[2], int layer, const char 
  * chooses each tile's largest weight, so of it only what has no sums is the same. */
 static void tiles_leave_no_seams(void **state)
 {
-    enum { count = 20000, seeds = 24 };
+    enum { count = 20000, seeds = TEST_SIZE(24, 8) };
     struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     (void)state;

@@ -10,24 +10,26 @@
 
 #include "support/make_dataset.h"
 #include "support/make_knot.h"
-#include "support/make_look_map.h"
 #include "support/make_textures.h"
 #include "support/make_tree.h"
+#include "support/mapped_dataset.h"
 
 enum { side_usual = 40, side_large = 600, map_side = 256 };
 
 static const double station[3] = {2, 0, 1};
 
-static void look(const double d[3], uint8_t color[3], double *range)
+static void look(const struct make_map *map, const double d[3], double color[3], double *range)
 {
-    double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), y = 0;
+    static const double stripes[2][3] = {{20, 200, 30}, {240, 30, 200}};
+    double y = 0;
+    (void)map;
     *range = INFINITY;
     for (int i = 0; i < 20 && d[0] < 0; i++) { /* to where the ray meets the wall */
-        *range = (0.2 * sin(y) - station[0]) * length / d[0];
-        y = *range * d[1] / length;
+        *range = (0.2 * sin(y) - station[0]) / d[0];
+        y = *range * d[1];
     }
     bool odd = (int)floor(2 * fmin(fmax(y, -9), 9)) & 1;
-    memcpy(color, odd ? (uint8_t[]){240, 30, 200} : (uint8_t[]){20, 200, 30}, 3);
+    memcpy(color, stripes[odd], sizeof stripes[odd]);
     if (y > 0.5)
         *range = INFINITY;
 }
@@ -70,9 +72,9 @@ int main(int argc, char **argv)
     }
     if (!strcmp(kind, "--mapped")) {
         struct spl_dataset *plain = make_dataset_levels(splats, (size_t)(side * side), 2);
-        struct spl_map_row row = make_look_row(station, map_side, map_side);
+        const struct make_map map = {.row = mapped_row(station, 0, map_side, SPL_MAP_LEVELS_MAX, map_side), .look = look};
         for (int i = 2; i < argc; i++)
-            make_look_file(plain, &row, look, argv[i]);
+            write_mapped_alike(plain, &map, 1, true, argv[i]);
         spl_dataset_close(plain);
         free(splats);
         return 0;

@@ -21,6 +21,7 @@ QUERIES = [
     ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
     ("background=rad", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"),
     ("margin=1e9", "margin"), ("atoms=9", "atoms"), ("atoms=1.5", "atoms"), ("atoms=-1", "atoms"), ("maps=no", "maps"),
+    ("primitives=some", "primitives"), ("primitives=on", "primitives"),
     ("budget=0", "budget"), ("budget=-5", "budget"), ("budget=fast", "budget"), ("budget=5m", "budget"),
     ("budget=", "budget"), ("budget=1e3", "budget"), ("budget=nan", "budget"), ("budget=601s", "budget"),
     ("budget=.", "budget"), ("budget=5%20ms", "budget"), ("budget=5&budget=6", "budget"), ("psnr=101", "psnr"),

@@ -11,7 +11,7 @@ from harness import FAKE, REAL, VIEW, Daemon, parts, run
 
 WEBP = os.environ["SPLATD_WEBP"] == "1"
 LOOK = dict(eye="3,0.2,1", target="0,0,1", width=64, height=48)
-LAYERS = ["color", "depth", "range", "normal", "id", "coverage"]
+LAYERS = ["color", "depth", "range", "normal", "id", "coverage", "primitive"]
 
 
 def each_part_is_the_layer_by_itself(d):

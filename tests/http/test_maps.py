@@ -2,8 +2,10 @@
 which ETag, and a memory limit that has no room for them. The wall's map has other colours than its splats, and its station saw
 through it from y = 0.5 on (make_wall.c)."""
 import contextlib
+import math
 import pathlib
 import struct
+import subprocess
 import tempfile
 
 from harness import FAKE, MAPPED, REAL, WALL, Daemon, eventually, run
@@ -31,6 +33,7 @@ def test_a_dataset_says_what_maps_it_has():
         maps = d.ask(f"/v1/datasets/{NAME}").json()["maps"]
         assert maps["stations"] == 1 and maps["texels"] == 6 * 256 * 256 and maps["methods"] == ["splat", "nearest"], maps
         assert maps["bytes"] / maps["texels"] < 3, maps  # ranges as many as colours: 2 bytes a texel and 0.68
+        assert maps["at_once"] == 1 and maps["limit_bytes"] > maps["bytes"], maps
         assert d.ask("/v1/datasets/wall").json()["maps"] is None
         table = {p["name"]: p for p in d.ask("/v1/methods").json()["parameters"]}
         assert [name for name, p in table.items() if p["maps"]] == ["maps"]
@@ -46,7 +49,7 @@ def test_maps_are_drawn_where_there_are_any():
         assert (red > 180 and blue > 140 and green < 90) or (green > 150 and red < 80 and blue < 80), at(drawn, SEEN)
         assert 70 < at(plain, SEEN)[2] < 110, at(plain, SEEN)  # the splats' own
         assert at(drawn, THROUGH)[:3] == (0, 0, 0) != at(plain, THROUGH)[:3], (at(drawn, THROUGH), at(plain, THROUGH))
-        for layer in "depth", "range", "normal", "id", "coverage":
+        for layer in "depth", "range", "normal", "id", "coverage", "primitive":
             one, other = (d.ask(f"{VIEW}?{LOOK}&layer={layer}&format=raw&maps={maps}") for maps in ("on", "off"))
             assert one.body != other.body and one.headers["ETag"] != other.headers["ETag"], layer
         body = {**BODY, "width": 64, "height": 48, "format": "raw", "maps": "off"}
@@ -123,6 +126,63 @@ def test_maps_without_room_are_left_out_and_that_is_said():
         assert plain.headers["Splatd-Complete"] == "true" and "ETag" in plain.headers
         assert 70 < at(pixels(reply), SEEN)[2] < 110, "the splats' own colours"
         assert plain.body == reply.body
+
+
+def test_what_never_has_room_is_said_once_with_the_limit_that_holds_it():
+    with without_room_for_maps() as d:
+        eventually(lambda: any("maps of 0 of its 1 stations" in line for line in d.lines))
+        d.ask(f"{VIEW}?{LOOK}&format=raw")
+        maps = d.ask(f"/v1/datasets/{NAME}").json()["maps"]
+        told = [line for line in d.lines if "maps of" in line]
+        assert len(told) == 1 and "memory-limit" in told[0] and NAME in told[0], d.lines
+        assert maps["at_once"] == 0 and f"--memory-limit {maps['limit_bytes'] >> 20}M" in told[0], (maps, told)
+    with Daemon(REAL, "--memory-limit", str(maps["limit_bytes"]), datasets=[MAPPED]) as d:
+        reply = d.ask(f"{VIEW}?{LOOK}&format=raw")
+        assert reply.headers["Splatd-Complete"] == "true" and d.ask(f"/v1/datasets/{NAME}").json()["maps"]["at_once"] == 1
+        assert not any("maps of" in line for line in d.lines), d.lines
+
+
+def test_a_limit_that_is_too_little_says_what_maps_take():
+    process = subprocess.run([REAL, "serve", MAPPED, "--listen", "127.0.0.1:0", "--ops-listen", "127.0.0.1:0", "--memory-limit",
+                              "1M"], capture_output=True, text=True, timeout=60)
+    assert process.returncode and "with the maps of all stations 2M more" in process.stderr, process.stderr
+
+
+def write_wall(path):
+    """A PTX of one station 3 m before a wall of waves, to the side of which nothing came back."""
+    lines = ["120", "90", "0 0 0", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"]
+    for column in range(120):
+        for row in range(90):
+            turn, rise = (column - 60) / 120, (row - 45) / 120
+            y, z = 3 * math.tan(turn), 3 * math.tan(rise) / math.cos(turn)
+            wave = int(128 + 100 * math.sin(7 * y))
+            lines.append(f"3 {y:.5f} {z:.5f} 0.5 {wave} {255 - wave} 90" if y < 1 else "0 0 0 0 0 0 0")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def test_maps_go_with_primitives():
+    with tempfile.TemporaryDirectory() as folder:
+        scan, packed = (pathlib.Path(folder) / name for name in ("flat.ptx", "flat.spld"))
+        write_wall(scan)
+        subprocess.run([REAL, "pack", scan, "--primitives", "all", "--panoramas", "scan", "-o", packed], check=True,
+                       capture_output=True, timeout=120)
+        look = "eye=0,0.4,0&target=3,0.4,0&up=0,0,1&fov=60&width=64&height=48&format=raw"
+        with Daemon(REAL, datasets=[packed]) as d:
+            assert d.ask("/v1/datasets/flat").json()["maps"]["stations"] == 1
+            seen = {}
+            for primitives in "all", "off":
+                for method in "splat", "nearest":
+                    views = [d.ask(f"/v1/datasets/flat/view?{look}&method={method}&primitives={primitives}&maps={maps}")
+                             for maps in ("on", "off")]
+                    assert all(v.status == 200 and v.headers["Splatd-Complete"] == "true" for v in views), views[0].body
+                    assert views[0].body != views[1].body and views[0].headers["ETag"] != views[1].headers["ETag"]
+                    seen[method, primitives] = pixels(views[0])
+            shapes = d.ask(f"/v1/datasets/flat/view?{look}&layer=primitive").body
+            assert 3 in shapes, "panels are drawn"
+            for method in "splat", "nearest":  # the map's colours, whatever the wall is drawn as
+                one, other = seen[method, "all"], seen[method, "off"]
+                off = [max(abs(a - b) for a, b in zip(one[y][x], other[y][x])) for y in range(8, 40) for x in range(8, 40)]
+                assert sum(o > 12 for o in off) < len(off) / 20, (method, sorted(off)[-60:])
 
 
 run(globals())

@@ -1,12 +1,13 @@
 """Picking: what lies under a pixel agrees with the layers and the camera of the image, sub-pixels included."""
 import json
 import math
+import os
 import pathlib
 import struct
 import subprocess
 import tempfile
 
-from harness import FAKE, REAL, VIEW, Daemon, eventually, run
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run
 
 PICK = VIEW.replace("/view", "/pick")
 WIDTH, HEIGHT = 160, 120
@@ -54,6 +55,7 @@ def a_pick_agrees_with_the_layers_and_the_camera(d):
             assert got["splat"] == ids[at][0] and got["class"] == 0
             assert got["attributes"].keys() == {"class", "uncertainty"} and got["attributes"]["class"] == 0, got
             assert got["attributes"]["uncertainty"] >= 0
+            assert got["primitive"] == "splat" and got["plane"] is None, got
             # the wall is x = 0.2 sin y, splats have a radius of 5 cm
             assert abs(got["position"][0] - 0.2 * math.sin(got["position"][1])) < 0.05, got
     assert hits > 25, hits
@@ -87,6 +89,55 @@ def picks_are_views_of_one_pixel(d):
         f"{PICK}?x=0.5&y=0.5&width=1&height=1", "HEAD").headers["ETag"]
     for x, y in ((0, 0), (1280, 720)):  # edges belong to the image
         assert d.ask(f"{PICK}?x={x}&y={y}").status == 200
+
+
+def every_pixel_of_primitives(d, where, view, count):
+    """Layer primitive, with the picks at `count` places of it."""
+    camera = f"eye={','.join(map(str, view['eye']))}&target={','.join(map(str, view['target']))}&fov={view['fov']}"
+    look = f"{camera}&width={WIDTH}&height={HEIGHT}"
+    seen = struct.unpack(f"<{WIDTH * HEIGHT}I", d.ask(f"{where}/view?{look}&layer=primitive&format=raw").body)
+    names, picked = ["none", "splat", "line", "panel", "mesh"], []
+    for at in range(37, WIDTH * HEIGHT, WIDTH * HEIGHT // count):
+        pick = d.ask(f"{where}/pick?{look}&x={at % WIDTH + 0.5}&y={at // WIDTH + 0.5}").json()
+        assert (pick["primitive"] or "none") == names[seen[at]], (pick, seen[at])
+        assert (pick["plane"] is not None) == (pick["primitive"] == "panel"), pick
+        picked.append(pick)
+    return seen, picked
+
+
+def test_picks_say_which_primitive_and_plane():
+    """A courtyard as panels and splats: what a pick says is what the layer shows, and it lies on the plane that it names."""
+    splatd = os.environ["SPLATD_BINARY"]
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([splatd, "synth", "courtyard", "--points", "40000", "--format", "ptx", "-o", folder], check=True,
+                       stdout=subprocess.DEVNULL)
+        subprocess.run([splatd, "pack", f"{folder}/courtyard.ptx", "--primitives", "all", "--no-panoramas", "-o",
+                        f"{folder}/yard.spld"], check=True, stdout=subprocess.DEVNULL)
+        with Daemon(REAL, datasets=[f"{folder}/yard.spld", WALL]) as d:
+            where = "/v1/datasets/yard"
+            view = d.ask(where).json()["default_view"]
+            seen, picked = every_pixel_of_primitives(d, where, view, 60)
+            assert seen.count(3) > len(seen) // 4 and seen.count(1) > 20, [seen.count(i) for i in range(5)]
+            planes = [p for p in picked if p["plane"]]
+            assert len(planes) > 10
+            offs = []
+            for pick in planes:
+                plane = pick["plane"]
+                assert abs(math.hypot(*plane["normal"]) - 1) < 1e-5
+                assert 0 <= plane["error_mean"] <= plane["error_most"] < 0.1 and plane["points"] > 0, plane
+                offs.append(abs(sum((a - b) * n for a, b, n in zip(pick["position"], plane["point"], plane["normal"]))))
+            # beside splats depths blend
+            assert sorted(offs)[len(offs) // 2] < 0.001 and max(offs) < 0.2, sorted(offs)
+            asked = f"{where}/view?width=32&height=24&layer=primitive"
+            assert d.ask(f"{asked}&primitives=off").headers["ETag"] != d.ask(asked).headers["ETag"]
+            told = d.ask(where).json()["primitives"]
+            assert told["panels"] > 0 and told["panel_points"] > 20000 and told["methods"] == ["splat", "nearest"], told
+            plain = "/v1/datasets/wall/view?width=8&height=8"  # where there are none, it makes no other reply
+            assert d.ask(f"{plain}&primitives=off").headers["ETag"] == d.ask(plain).headers["ETag"]
+            # a pick looks at the splats alone, asked in either way
+            alone = d.ask(f"{where}/pick?x=640&y=360&primitives=off").json()
+            posted = d.post({"x": 640, "y": 360, "primitives": "off"}, f"{where}/pick").json()
+            assert alone == posted and alone["primitive"] != "panel" and alone["plane"] is None, (alone, posted)
 
 
 def test_bad_picks_are_refused_by_name():

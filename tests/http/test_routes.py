@@ -18,7 +18,7 @@ PICK = VIEW.replace("/view", "/pick")
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
 WEBP = os.environ["SPLATD_WEBP"] == "1"
 COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
-              "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4)}
+              "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4), "primitive": ("<u4", 1, 4)}
 LOOK = dict(eye="3,0.2,1", target="0,0,1", up="0,0,1")
 
 
@@ -81,7 +81,8 @@ def test_methods_are_those_of_the_document():
         methods = {method["name"]: method for method in table["methods"]}
         assert methods["splat"]["textures"] and not methods["points"]["textures"]
         assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
-        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps"] and methods["points"]["parameters"] == []
+        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"]
+        assert methods["points"]["parameters"] == []
         for parameter in table["parameters"]:
             name, schema = parameter["name"], document[parameter["name"]]
             assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \
@@ -97,6 +98,8 @@ def test_methods_are_those_of_the_document():
         assert {p["name"] for p in table["parameters"]} == {n for m in table["methods"] for n in m["parameters"]}
         assert [p["name"] for p in table["parameters"] if p["textures"]] == ["atoms"]
         assert [p["name"] for p in table["parameters"] if p["maps"]] == ["maps"]
+        assert [p["name"] for p in table["parameters"] if p["primitives"]] == ["primitives"]
+        assert d.ask("/v1/datasets/wall").json()["primitives"] is None
 
 
 def test_status_says_how_it_is():
@@ -137,7 +140,8 @@ def test_every_format_of_every_layer():
             assert jpeg.headers["Content-Type"] == "image/jpeg" and jpeg_size(jpeg.body) == (64, 48)
             png = d.view(**LOOK, width=64, height=48, layer=layer, format="png").body
             width, height, depth, color, row = png_pixels(png)
-            wanted = {"depth": (16, 0), "range": (16, 0), "coverage": (8, 0), "normal": (8, 2)}.get(layer, (8, 6))
+            wanted = {"depth": (16, 0), "range": (16, 0), "coverage": (8, 0), "normal": (8, 2),
+                      "primitive": (8, 2)}.get(layer, (8, 6))
             assert (width, height, (depth, color)) == (64, 48, wanted)
             assert row == 64 * depth // 8 * {0: 1, 2: 3, 6: 4}[color]
 

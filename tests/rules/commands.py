@@ -58,7 +58,7 @@ for words, wanted in {
     "pack a.xyz --memory 17179869184G -o b.spld": "K, M, G or T",
     "render a.spld -o": "requires an argument, FILE.*splatd render --help",
     "tour a.spld --pth b -o c": "did you mean --path", "render a.spld --superample 2 -o b.png": "did you mean --supersample",
-    "render a.spld --layer colour -o b.png": "--layer takes color, depth.* or coverage, not 'colour'",
+    "render a.spld --layer colour -o b.png": "--layer takes color, depth.* or primitive, not 'colour'",
     "tour a.spld --path b --format gif -o c": "--format takes jpeg, png.*, not 'gif'",
     "render a.spld --visibility x -o b.png": "--visibility takes adaptive, constant or none, not 'x'",
     "tour a.spld --path b --ease up -o c": "--ease takes none, in, out or in-out, not 'up'",

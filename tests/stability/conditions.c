@@ -153,8 +153,17 @@ struct drawing {
     enum spl_method method;
     uint32_t atoms;
     enum spl_maps maps;
-    double psnr; /* NAN until it is measured */
+    const struct world *world;     /* where it is not the one that has the scene; may be NULL */
+    double figures[FIGURE_COUNT];  /* NAN until they are measured */
 };
+
+static struct drawing drawing_of(const char *name, enum spl_method method, uint32_t atoms, enum spl_maps maps)
+{
+    struct drawing drawing = {.name = name, .method = method, .atoms = atoms, .maps = maps};
+    for (int f = 0; f < FIGURE_COUNT; f++)
+        drawing.figures[f] = NAN;
+    return drawing;
+}
 
 /* One row a drawing; of strips, to whose sides the filter looks as far as along them, `fill` in the whole form only. */
 static void measure_rows(struct conditions *c, const struct world *world, const struct spl_view *view,
@@ -178,8 +187,10 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
         views[0].method = views[1].method = drawings[i].method;
         views[0].disc.atoms = views[1].disc.atoms = drawings[i].atoms;
         views[0].maps = views[1].maps = drawings[i].maps;
-        bool measured = measure(c, world, views, truths, true, &row);
-        drawings[i].psnr = measured ? row.figures[FIGURE_PSNR] : NAN;
+        const struct world *drawn = drawings[i].world ? drawings[i].world : world;
+        bool measured = measure(c, drawn, views, truths, true, &row);
+        if (measured)
+            memcpy(drawings[i].figures, row.figures, sizeof row.figures);
         if (measured && c->update)
             table_put(c->table, &row);
         if (measured)
@@ -188,7 +199,7 @@ static void measure_rows(struct conditions *c, const struct world *world, const 
             continue; /* filled frames are the slowest, and check_drivers() compares them pixel by pixel */
         struct spl_renderer *renderer = c->suite->renderer;
         c->suite->renderer = c->suite->other;
-        if (measure(c, world, views, truths, false, &row))
+        if (measure(c, drawn, views, truths, false, &row))
             table_judge(c->table, &c->suite->report, &row, spl_renderer_get_device(c->suite->other)->backend);
         c->suite->renderer = renderer;
     }
@@ -201,27 +212,54 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
 {
     struct drawing drawings[SPL_METHOD_COUNT];
     for (int method = 0; method < SPL_METHOD_COUNT; method++)
-        drawings[method] = (struct drawing){spl_method_name((enum spl_method)method), (enum spl_method)method,
-                                            view->disc.atoms, view->maps, NAN};
+        drawings[method] = drawing_of(spl_method_name((enum spl_method)method), (enum spl_method)method,
+                                      view->disc.atoms, view->maps);
     measure_rows(c, world, view, drawings, SPL_METHOD_COUNT, &(struct row){condition, value, NULL, whole_only, {0}});
 }
 
 void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
                                  const char *condition, const char *value, bool whole_only)
 {
-    struct drawing drawings[] = {{"coloured", SPL_METHOD_SPLAT, 0, view->maps, NAN},
-                                 {"textured", SPL_METHOD_SPLAT, SPL_TEXTURE_ATOMS, view->maps, NAN}};
+    struct drawing drawings[] = {drawing_of("coloured", SPL_METHOD_SPLAT, 0, view->maps),
+                                 drawing_of("textured", SPL_METHOD_SPLAT, SPL_TEXTURE_ATOMS, view->maps)};
     measure_rows(c, world, view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
 }
 
 void conditions_measure_maps(struct conditions *c, const struct world *world, const struct spl_view *view,
                              const char *condition, const char *value, bool whole_only, double harm)
 {
-    struct drawing drawings[] = {{"unmapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_OFF, NAN},
-                                 {"mapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_ON, NAN}};
+    struct drawing drawings[] = {drawing_of("unmapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_OFF),
+                                 drawing_of("mapped", SPL_METHOD_SPLAT, 0, SPL_MAPS_ON)};
     measure_rows(c, world, view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
-    double gain = drawings[1].psnr - drawings[0].psnr;
+    double gain = drawings[1].figures[FIGURE_PSNR] - drawings[0].figures[FIGURE_PSNR];
     if (!isnan(gain))
-        report_at_least(&c->suite->report, "maps-do-no-harm", &(struct place){condition, value, NULL, NULL}, gain, -harm,
-                        "dB that maps gain");
+        report_at_least(&c->suite->report, "maps-do-no-harm", &(struct place){condition, value, NULL, NULL}, gain,
+                        -harm, "dB that maps gain");
+}
+
+void conditions_measure_primitives(struct conditions *c, const struct world worlds[2], const struct spl_view *view,
+                                   const char *condition, const char *value, bool whole_only,
+                                   const struct worse *allowed)
+{
+    static const struct {
+        enum figure figure;
+        const char *check, *unit;
+    } checks[] = {{FIGURE_HOLES, "primitives-leave-no-holes", "share of pixels beyond the splats' own"},
+                  {FIGURE_HALO, "primitives-keep-silhouettes", "share of empty pixels beyond the splats' own"},
+                  {FIGURE_DEPTH_BEYOND, "primitives-lie-where-points-do", "share of pixels beyond the splats' own"}};
+    struct drawing drawings[] = {drawing_of("discs", SPL_METHOD_SPLAT, view->disc.atoms, view->maps),
+                                 drawing_of("primitives", SPL_METHOD_SPLAT, view->disc.atoms, view->maps)};
+    const double limits[] = {allowed->holes, allowed->halo, allowed->beyond};
+    const struct place place = {condition, value, NULL, NULL};
+    const double *of[2] = {drawings[0].figures, drawings[1].figures};
+    drawings[1].world = &worlds[1];
+    measure_rows(c, &worlds[0], view, drawings, 2, &(struct row){condition, value, NULL, whole_only, {0}});
+    if (isnan(of[0][FIGURE_PSNR]) || isnan(of[1][FIGURE_PSNR]))
+        return; /* not asked for, or a failure that was reported */
+    report_at_least(&c->suite->report, "primitives-do-no-harm", &place, of[1][FIGURE_PSNR] - of[0][FIGURE_PSNR],
+                    -allowed->db, "dB that primitives gain");
+    for (size_t i = 0; i < sizeof checks / sizeof *checks; i++)
+        if (!isnan(of[0][checks[i].figure]) || !isnan(of[1][checks[i].figure]))
+            report_at_most(&c->suite->report, checks[i].check, &place,
+                           of[1][checks[i].figure] - of[0][checks[i].figure], limits[i], checks[i].unit);
 }

@@ -24,10 +24,22 @@ void conditions_measure(struct conditions *c, const struct world *world, const s
 void conditions_measure_textures(struct conditions *c, const struct world *world, const struct spl_view *view,
                                  const char *condition, const char *value, bool whole_only);
 
-/* The same, with the splats' own colours and with maps: rows "unmapped" and "mapped". Maps that lose more than `harm` dB
- * fail "maps-do-no-harm". */
+/* The same, with the splats' own colours and with maps: rows "unmapped" and "mapped". Maps that lose more than `harm`
+ * dB fail "maps-do-no-harm". */
 void conditions_measure_maps(struct conditions *c, const struct world *world, const struct spl_view *view,
                              const char *condition, const char *value, bool whole_only, double harm);
+
+/* How much worse a view may be with primitives than without. */
+struct worse {
+    double db;                 /* of PSNR */
+    double holes, halo, beyond; /* shares, as of FIGURE_HOLES, FIGURE_HALO, FIGURE_DEPTH_BEYOND */
+};
+
+/* The same scan as splats and with primitives (world_init_both()): rows "discs" and "primitives". What is worse by more
+ * than that fails one of four checks. */
+void conditions_measure_primitives(struct conditions *c, const struct world worlds[2], const struct spl_view *view,
+                                   const char *condition, const char *value, bool whole_only,
+                                   const struct worse *allowed);
 
 /* Is this condition to be measured? `only` may be the beginning of its name. */
 bool conditions_wants(const struct conditions *c, const char *condition);
@@ -37,5 +49,6 @@ void conditions_of_views(struct conditions *c);  /* where the eye is, what it ta
 void conditions_of_shapes(struct conditions *c); /* degenerate neighbourhoods */
 void conditions_of_photographs(struct conditions *c); /* textures: what photographs show, and how they may be spoilt */
 void conditions_of_maps(struct conditions *c);        /* maps of stations: what they show, and how they may be wrong */
+void conditions_of_primitives(struct conditions *c);  /* planes and lines, and what is neither */
 
 #endif

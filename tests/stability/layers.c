@@ -1,5 +1,5 @@
 /* Whatever is in view, each layer holds what its kind allows, and layers of one frame say the same thing: there is a
- * depth, a range, a normal and an id exactly where something is covered. The limits are definitions
+ * depth, a range, a normal, an id and a primitive exactly where something is covered. The limits are definitions
  * (include/splatd/image.h), so not one pixel may break them. A frame is a function of its request: other frames in
  * between change no byte of it. Two drivers run the same arithmetic; what their rounding may change is one level. */
 #include "themes.h"
@@ -26,7 +26,7 @@ static void count_broken(const struct spl_view *view, const struct spl_frame *f,
     const uint8_t *color = f->images[SPL_LAYER_COLOR].pixels;
     const float *depth = f->images[SPL_LAYER_DEPTH].pixels, *range = f->images[SPL_LAYER_RANGE].pixels;
     const float *normal = f->images[SPL_LAYER_NORMAL].pixels, *coverage = f->images[SPL_LAYER_COVERAGE].pixels;
-    const uint32_t *id = f->images[SPL_LAYER_ID].pixels;
+    const uint32_t *id = f->images[SPL_LAYER_ID].pixels, *shape = f->images[SPL_LAYER_PRIMITIVE].pixels;
     double samples = view->supersample * view->supersample;
     memset(broken, 0, SPL_LAYER_COUNT * sizeof *broken);
     for (size_t i = 0; i < (size_t)c->width * c->height; i++) {
@@ -42,6 +42,7 @@ static void count_broken(const struct spl_view *view, const struct spl_frame *f,
         double length = sqrt(normal[3 * i] * (double)normal[3 * i] + normal[3 * i + 1] * (double)normal[3 * i + 1] +
                              normal[3 * i + 2] * (double)normal[3 * i + 2]);
         broken[SPL_LAYER_NORMAL] += there ? !(fabs(length - 1) < 1e-3) : length != 0;
+        broken[SPL_LAYER_PRIMITIVE] += there != (shape[i] > SPL_SHAPE_NONE && shape[i] < SPL_SHAPE_COUNT);
         broken[SPL_LAYER_ID] += there ? id[i] >= ids : id[i] != UINT32_MAX;
     }
 }

@@ -4,8 +4,9 @@
  *   stability drivers [--whole]                 Vulkan against EGL
  *   stability conditions [--whole]              measures what degrades and compares it with table.json, either way
  *   stability conditions [NAME] [--method METHOD] --update [--whole]   writes the table's rows anew, those of the
- *                                               conditions that begin so and of the method; read it before it is committed
- *   stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for it catches it
+ *                                               conditions that begin so and of the method; read it before it is
+ * committed stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for
+ * it catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
  * prints what passes as well. Exit code 77: no such device here. */
@@ -111,6 +112,7 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     conditions_of_shapes(conditions);
     conditions_of_photographs(conditions);
     conditions_of_maps(conditions);
+    conditions_of_primitives(conditions);
     bool all = !conditions->only && !conditions->method;
     if (all && !(conditions->update && suite->whole))
         table_find_stale(conditions->table, &suite->report, suite->whole);
@@ -149,7 +151,8 @@ int main(int argc, char **argv)
     else if (!strcmp(words[0], "plant"))
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
-        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME] [--method METHOD] [--update] | plant "
+        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME] [--method "
+                        "METHOD] [--update] | plant "
                         "half-pixel|margin-0|pop|no-trim [--whole]\n");
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);

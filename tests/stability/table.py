@@ -32,6 +32,10 @@ BEGIN_MAPS, END_MAPS = "<!-- table.py: maps begin -->\n", "<!-- table.py: maps e
 UNMAPPED = [("psnr", "colours: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("halo", "halo", 100, 1),
             ("depth_beyond", "beyond", 100, 1), ("flicker", "flicker", 1, 1)]
 MAPPED = [("psnr", "maps: PSNR", 1, 1), *UNMAPPED[1:]]
+BEGIN_PRIMITIVES, END_PRIMITIVES = "<!-- table.py: primitives begin -->\n", "<!-- table.py: primitives end -->\n"
+DISCS = [("psnr", "splats: PSNR", 1, 1), ("ssim", "SSIM", 1, 2), ("holes", "holes", 100, 1), ("halo", "halo", 100, 1),
+         ("depth_beyond", "beyond", 100, 1), ("depth_median", "depth, mm", 1000, 1), ("flicker", "flicker", 1, 1)]
+PRIMITIVES = [("psnr", "primitives: PSNR", 1, 1), *DISCS[1:]]
 
 
 def cell(row, figure, factor, decimals):
@@ -74,7 +78,8 @@ def main(arguments):
     new = text
     for begin, end, kinds in ((BEGIN, END, {"splat": SPLAT, "points": POINTS, "fill": FILL, "nearest": NEAREST}),
                               (BEGIN_TEXTURES, END_TEXTURES, {"coloured": COLOURED, "textured": TEXTURED}),
-                              (BEGIN_MAPS, END_MAPS, {"unmapped": UNMAPPED, "mapped": MAPPED})):
+                              (BEGIN_MAPS, END_MAPS, {"unmapped": UNMAPPED, "mapped": MAPPED}),
+                              (BEGIN_PRIMITIVES, END_PRIMITIVES, {"discs": DISCS, "primitives": PRIMITIVES})):
         if text.count(begin) != 1 or text.count(end) != 1:
             sys.exit(f"{RESULTS}: the marks {begin.strip()} and {end.strip()} must be there once each")
         head, rest = new.split(begin)

@@ -31,21 +31,23 @@ static void *must_have(void *p)
     return p;
 }
 
-static void pack(struct world *world, const char *folder, const char *scan, const struct spl_photo_options *photos,
-                 const struct spl_map_options *maps)
+/* Packs the scan; `what` says what is no default. */
+static void pack(struct world *world, const char *folder, const char *scan, struct spl_pack_options what)
 {
     struct spl_error err = {0};
     char packed[512];
     snprintf(packed, sizeof packed, "%s/world.spld", folder);
-    const struct spl_pack_options options = {
-        .size = sizeof options,
-        .inputs = (const char *const[]){scan}, .input_count = 1, .output = packed, .photos = photos, .maps = maps};
-    must(spl_pack(&options, NULL, &err), world->name, &err);
+    what.size = sizeof what;
+    what.inputs = (const char *const[]){scan};
+    what.input_count = 1;
+    what.output = packed;
+    must(spl_pack(&what, NULL, &err), world->name, &err);
     must(spl_dataset_open(packed, false, &world->dataset, &err), world->name, &err);
     unlink(packed);
 }
 
-static void synth(const struct scan *scan, const char *folder, char path[512])
+/* `format`: "ply" or "ptx". */
+static void synth(const struct scan *scan, const char *folder, const char *format, char path[512])
 {
     struct spl_error err = {0};
     const struct spl_synth_options options = {.scene = scan->scene,
@@ -56,9 +58,9 @@ static void synth(const struct scan *scan, const char *folder, char path[512])
                                               .mixed = scan->mixed,
                                               .dropout = scan->dropout,
                                               .misregister = scan->misregister,
-                                              .formats = "ply"};
+                                              .formats = format};
     must(spl_synth(&options, NULL, &err), scan->scene, &err);
-    snprintf(path, 512, "%s/%s.ply", folder, scan->scene);
+    snprintf(path, 512, "%s/%s.%s", folder, scan->scene, format);
 }
 
 void world_init(struct world *world, const struct scan *scan)
@@ -69,8 +71,35 @@ void world_init(struct world *world, const struct scan *scan)
     snprintf(world->name, sizeof world->name, "%s", scan->scene);
     must(spl_scene_create(scan->scene, &world->scene, &err), scan->scene, &err);
     make_folder(folder);
-    synth(scan, folder, path);
-    pack(world, folder, path, NULL, NULL);
+    synth(scan, folder, "ply", path);
+    pack(world, folder, path, (struct spl_pack_options){0});
+    unlink(path);
+    rmdir(folder);
+}
+
+void world_init_scan_both(struct world worlds[2], const char *name, const char *scan, double error)
+{
+    static const enum spl_pack_primitives both[] = {SPL_PRIMITIVES_OFF, SPL_PRIMITIVES_ALL};
+    char folder[256];
+    make_folder(folder);
+    for (int i = 0; i < 2; i++) {
+        worlds[i] = (struct world){0};
+        snprintf(worlds[i].name, sizeof worlds[i].name, "%s", name);
+        pack(&worlds[i], folder, scan, (struct spl_pack_options){.primitives = both[i], .error = i ? error : 0});
+    }
+    rmdir(folder);
+}
+
+void world_init_both(struct world worlds[2], const struct scan *scan, double error)
+{
+    struct spl_error err = {0};
+    struct spl_scene *scene;
+    char folder[256], path[512];
+    must(spl_scene_create(scan->scene, &scene, &err), scan->scene, &err);
+    make_folder(folder);
+    synth(scan, folder, scene->scanner.kind == SPL_SCANNER_TERRESTRIAL ? "ptx" : "ply", path);
+    world_init_scan_both(worlds, scan->scene, path, error);
+    worlds[0].scene = scene;
     unlink(path);
     rmdir(folder);
 }
@@ -80,14 +109,9 @@ void world_init_points(struct world *world, const char *name, const struct point
     world_init_photos(world, name, points, count, NULL);
 }
 
-void world_init_photos(struct world *world, const char *name, const struct point *points, size_t count,
-                       const struct spl_photo_options *photos)
+/* Points as PLY with doubles. */
+static void write_points(const char *path, const struct point *points, size_t count)
 {
-    char folder[256], path[512];
-    *world = (struct world){0};
-    snprintf(world->name, sizeof world->name, "%s", name);
-    make_folder(folder);
-    snprintf(path, sizeof path, "%s/points.ply", folder);
     FILE *file = must_have(fopen(path, "wb"));
     fprintf(file,
             "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty double x\nproperty double y\n"
@@ -99,7 +123,30 @@ void world_init_photos(struct world *world, const char *name, const struct point
                   fwrite(points[i].color, sizeof points[i].color, 1, file) == 1 && written;
     if (fclose(file) || !written)
         must(1, path, &(struct spl_error){.message = "cannot be written"});
-    pack(world, folder, path, photos, NULL);
+}
+
+void world_init_photos(struct world *world, const char *name, const struct point *points, size_t count,
+                       const struct spl_photo_options *photos)
+{
+    char folder[256], path[512];
+    *world = (struct world){0};
+    snprintf(world->name, sizeof world->name, "%s", name);
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/points.ply", folder);
+    write_points(path, points, count);
+    pack(world, folder, path, (struct spl_pack_options){.photos = photos});
+    unlink(path);
+    rmdir(folder);
+}
+
+void world_init_points_both(struct world worlds[2], const char *name, const struct point *points, size_t count,
+                            double error)
+{
+    char folder[256], path[512];
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/points.ply", folder);
+    write_points(path, points, count);
+    world_init_scan_both(worlds, name, path, error);
     unlink(path);
     rmdir(folder);
 }
@@ -111,7 +158,7 @@ void world_init_mapped(struct world *world, const char *name, const char *scan, 
     *world = (struct world){0};
     snprintf(world->name, sizeof world->name, "%s", name);
     make_folder(folder);
-    pack(world, folder, scan, NULL, &maps);
+    pack(world, folder, scan, (struct spl_pack_options){.maps = &maps});
     rmdir(folder);
     must(!spl_dataset_get_info(world->dataset)->maps, name, &(struct spl_error){.message = "no map was made"});
 }
@@ -169,7 +216,7 @@ struct point *world_scan(const struct scan *scan, size_t *count)
 {
     char folder[256], path[512], line[256];
     make_folder(folder);
-    synth(scan, folder, path);
+    synth(scan, folder, "ply", path);
     FILE *file = must_have(fopen(path, "rb"));
     bool wide = false;
     *count = 0;

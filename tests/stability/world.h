@@ -39,6 +39,13 @@ struct suite {
 
 /* Scans the scene and packs it. */
 void world_init(struct world *world, const struct scan *scan);
+/* The same scan packed as splats alone and with primitives: worlds[0] and worlds[1], the first of which has the scene.
+ * From tripods it is PTX, so that it is known which side each point was seen from. `error` as of spl_pack_options. */
+void world_init_both(struct world worlds[2], const struct scan *scan, double error);
+/* Likewise a scan's file, and points as they are; the caller's is the scene. */
+void world_init_scan_both(struct world worlds[2], const char *name, const char *scan, double error);
+void world_init_points_both(struct world worlds[2], const char *name, const struct point *points, size_t count,
+                            double error);
 /* Packs points as they are. */
 void world_init_points(struct world *world, const char *name, const struct point *points, size_t count);
 /* The same with photographs. */

@@ -108,7 +108,8 @@ void spl_renderer_get_residency(struct spl_renderer *renderer, const struct spl_
 static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_view *view, struct spl_error *err)
 {
     static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32,
-                                                               SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32};
+                                                               SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32,
+                                                               SPL_PIXEL_U32};
     const struct spl_camera *camera = &view->camera;
     size_t pixels = (size_t)camera->width * camera->height;
     *image = (struct spl_image){layer, types[layer], camera->width, camera->height, NULL};
@@ -121,6 +122,8 @@ static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_
     memcpy(&word, &depth, 4);
     if (image->type == SPL_PIXEL_RGBA8)
         memcpy(&word, view->background, 4);
+    if (layer == SPL_LAYER_PRIMITIVE)
+        word = SPL_SHAPE_SPLAT;
     for (size_t i = 0; i < pixels * words; i++)
         out[i] = word;
     return 0;

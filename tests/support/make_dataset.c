@@ -24,7 +24,9 @@ struct build {
     uint32_t *bases[SPL_STREAM_KNOWN_COUNT]; /* by chunk */
     uint8_t *widths[SPL_STREAM_KNOWN_COUNT];
     size_t chunk_count, chunk_capacity;
-    uint32_t splats;
+    uint32_t splats; /* ids that are taken */
+    const struct make_panels *panels;
+    size_t panel_count;
 };
 
 static void must(int rc, const struct spl_error *err)
@@ -63,8 +65,71 @@ static uint32_t add_streams(struct build *b, size_t index, const struct make_spl
     return used;
 }
 
-/* Writes `count` splats as the node's chunks and sets what follows from them. */
-static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count)
+static size_t chunks_of(const struct make_panels *panels)
+{
+    return (panels->count + SPL_PANELS_MAX - 1) / SPL_PANELS_MAX;
+}
+
+/* Is it the node's? The root of two levels has what is coarse. */
+static bool is_of(const struct make_panels *panels, const struct spl_node *node, bool levels)
+{
+    bool inside = true;
+    for (int a = 0; a < 3; a++)
+        inside &= panels->plane.origin[a] >= node->origin[a] && panels->plane.origin[a] < node->origin[a] + node->size;
+    return !levels || (node->depth ? !panels->coarse && inside : panels->coarse);
+}
+
+/* The finest step that holds all heights. */
+static unsigned step_of(const struct make_panels *panels)
+{
+    float most = 0;
+    for (size_t p = 0; p < panels->count; p++)
+        for (int i = 0; i < SPL_RELIEF_POINTS(panels->reliefs[p].level); i++)
+            most = fmaxf(most, fabsf(panels->reliefs[p].height[i]));
+    return spl_relief_choose_step(panels->plane.cell, most);
+}
+
+/* The panels as chunks from `*chunk` on, words from words[*used] on. Returns the sum of their spacings. */
+static double add_panels(struct build *b, struct spl_node *node, const struct make_panels *panels,
+                         struct spl_chunk *chunk, uint32_t *words, size_t *used)
+{
+    struct spl_panel_plane plane = panels->plane;
+    struct spl_panel_frame frame;
+    for (int a = 0; a < 3; a++)
+        plane.origin[a] -= node->origin[a];
+    for (size_t first = 0; first < panels->count; first += SPL_PANELS_MAX, chunk++) {
+        size_t left = panels->count - first, index = (size_t)(chunk - b->chunks);
+        uint32_t extent[2], n = left < SPL_PANELS_MAX ? (uint32_t)left : SPL_PANELS_MAX;
+        spl_panels_begin(&plane, chunk);
+        plane.points = 0;
+        chunk->geometry_word = (uint32_t)*used;
+        *used += panels->reliefs
+                     ? spl_meshes_encode(panels->panels + first, panels->reliefs + first, n, step_of(panels),
+                                         panels->color_error, chunk, words + *used)
+                     : spl_panels_encode(panels->panels + first, n, panels->color_error, chunk, words + *used);
+        chunk->first_id = b->splats;
+        b->splats += n;
+        for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
+            b->bases[s][index] = s == SPL_STREAM_CLASS ? panels->classification : 0;
+            b->widths[s][index] = 0;
+        }
+        spl_panels_get_frame(chunk, &frame);
+        spl_panels_get_extent(chunk, &extent[0], &extent[1]);
+        for (int i = 0; i < 8; i++)
+            for (int a = 0; a < 3; a++) {
+                float u = i & 1 ? (float)(extent[0] * SPL_PANEL_SIDE) * frame.cell : 0;
+                float v = i & 2 ? (float)(extent[1] * SPL_PANEL_SIDE) * frame.cell : 0;
+                float w = (i & 4 ? 1 : -1) * spl_panels_get_reach(chunk);
+                float at = frame.origin[a] + u * frame.u[a] + v * frame.v[a] + w * frame.normal[a];
+                node->box_min[a] = fminf(node->box_min[a], at);
+                node->box_max[a] = fmaxf(node->box_max[a], at);
+            }
+    }
+    return (double)plane.cell * SPL_RADIUS_SPACING * (double)panels->count;
+}
+
+/* Writes `count` splats and the node's panels as its chunks and sets what follows from them. */
+static void add_node(struct build *b, struct spl_node *node, const struct make_splat *splats, size_t count, bool levels)
 {
     const struct spl_chunk_options options = {.position_error = 0.016,
                                               .normal_error = make_dataset_normal_error,
@@ -74,8 +139,15 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
     while (splat_count < count && !splats[splat_count].vertex)
         splat_count++;
     size_t disc_chunks = (splat_count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
-    size_t chunk_count = disc_chunks + (count > splat_count);
-    spl_assert(count && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity &&
+    size_t chunk_count = disc_chunks + (count > splat_count), panel_chunks = 0, items = count;
+    for (size_t p = 0; p < b->panel_count; p++) {
+        bool own = is_of(&b->panels[p], node, levels);
+        panel_chunks += own ? chunks_of(&b->panels[p]) : 0;
+        items += own ? b->panels[p].count : 0;
+    }
+    size_t own_chunks = chunk_count;
+    chunk_count += panel_chunks;
+    spl_assert(items && chunk_count <= SPL_NODE_CHUNKS_MAX && b->chunk_count + chunk_count <= b->chunk_capacity &&
                count - splat_count <= SPL_CHUNK_SPLATS);
     uint32_t *words = must_have(malloc(chunk_count * words_max * sizeof *words));
     struct spl_chunk *chunks = b->chunks + b->chunk_count;
@@ -84,7 +156,7 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         node->box_min[a] = FLT_MAX;
         node->box_max[a] = -FLT_MAX;
     }
-    for (size_t c = 0; c < chunk_count; c++) {
+    for (size_t c = 0; c < own_chunks; c++) {
         struct spl_splat part[SPL_CHUNK_SPLATS];
         double position[SPL_CHUNK_SPLATS][3];
         const struct make_splat *from = splats + (c < disc_chunks ? c * SPL_CHUNK_SPLATS : splat_count);
@@ -92,6 +164,7 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         uint32_t n = left < SPL_CHUNK_SPLATS ? (uint32_t)left : SPL_CHUNK_SPLATS;
         struct spl_chunk_options own = options;
         own.kind = c < disc_chunks ? SPL_CHUNK_DISCS : SPL_CHUNK_LINES;
+        own.width = (double)from->width;
         for (uint32_t i = 0; i < n; i++) {
             part[i] = (struct spl_splat){.radius = from[i].radius,
                                          .linear = from[i].linear,
@@ -119,9 +192,14 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
         used += length;
         used += add_streams(b, b->chunk_count + c, from, n, words + used);
     }
+    for (size_t p = 0, c = own_chunks; p < b->panel_count; p++)
+        if (is_of(&b->panels[p], node, levels)) {
+            radius_sum += add_panels(b, node, &b->panels[p], &chunks[c], words, &used);
+            c += chunks_of(&b->panels[p]);
+        }
     struct spl_error err = {0};
     must(spl_dataset_writer_add_node(b->writer, words, used, chunks, chunk_count, &node->page, &err), &err);
-    node->spacing = (float)(radius_sum / (double)count / SPL_RADIUS_SPACING);
+    node->spacing = (float)(radius_sum / (double)items / SPL_RADIUS_SPACING);
     node->first_chunk = (uint32_t)b->chunk_count;
     node->chunk_count = (uint32_t)chunk_count;
     b->chunk_count += chunk_count;
@@ -132,13 +210,13 @@ static void add_node(struct build *b, struct spl_node *node, const struct make_s
 static void add_two_levels(struct build *b, const struct make_splat *splats, size_t count)
 {
     size_t stride = count < 8 ? 1 : 8, kept = 0, all = 0;
-    struct make_splat *part = must_have(malloc(count * sizeof *part));
+    struct make_splat *part = must_have(malloc((count + 1) * sizeof *part));
     for (size_t i = 0; i < count; i += stride) {
         part[kept] = splats[i];
         part[kept++].radius *= sqrtf((float)stride);
     }
     struct spl_node *root = &b->nodes[0];
-    add_node(b, root, part, kept);
+    add_node(b, root, part, kept, true);
     root->first_child = 1;
     for (unsigned octant = 0; octant < 8; octant++) {
         struct spl_node *child = &b->nodes[1 + root->child_count];
@@ -154,9 +232,12 @@ static void add_two_levels(struct build *b, const struct make_splat *splats, siz
                 part[kept++] = splats[i];
         }
         all += kept;
-        if (kept == 0)
+        bool has = kept > 0;
+        for (size_t p = 0; p < b->panel_count; p++)
+            has |= is_of(&b->panels[p], child, true);
+        if (!has)
             continue;
-        add_node(b, child, part, kept);
+        add_node(b, child, part, kept, true);
         root->child_count++;
         for (int a = 0; a < 3; a++) {
             float shift = (float)(child->origin[a] - root->origin[a]);
@@ -171,12 +252,28 @@ static void add_two_levels(struct build *b, const struct make_splat *splats, siz
 
 void make_dataset_file(const char *path, const struct make_splat *splats, size_t count, int levels)
 {
-    struct build b = {.node_count = 1, .chunk_capacity = 2 * (count / SPL_CHUNK_SPLATS) + 10};
-    double low[3], high[3], middle[3], size = 1e-3;
-    size_t discs = 0;
+    make_dataset_file_panels(path, splats, count, NULL, 0, levels);
+}
+
+void make_dataset_file_panels(const char *path, const struct make_splat *splats, size_t count,
+                              const struct make_panels *panels, size_t panel_count, int levels)
+{
+    struct build b = {.node_count = 1,
+                      .chunk_capacity = 2 * (count / SPL_CHUNK_SPLATS) + 10,
+                      .panels = panels,
+                      .panel_count = panel_count};
+    double low[3], high[3], middle[3], size = 1e-3, radius = 0;
+    size_t discs = 0, points = 0;
     for (size_t i = 0; i < count; i++)
         discs += !splats[i].vertex;
-    spl_assert(discs && (levels == 1 || discs == count));
+    for (size_t p = 0; p < panel_count; p++) {
+        b.chunk_capacity += chunks_of(&panels[p]);
+        points += levels == 1 || !panels[p].coarse ? panels[p].plane.points : 0;
+        radius = (double)panels[p].plane.cell * SPL_RADIUS_SPACING;
+    }
+    spl_assert((discs || panel_count) && (levels == 1 || discs == count));
+    radius = discs ? (double)splats[discs / 2].radius : radius;
+    points += discs;
     b.chunks = must_have(malloc(b.chunk_capacity * sizeof *b.chunks));
     struct spl_stream streams[SPL_STREAM_KNOWN_COUNT];
     for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
@@ -185,7 +282,11 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
         streams[s].width = b.widths[s] = must_have(malloc(b.chunk_capacity));
     }
     for (int a = 0; a < 3; a++) {
-        low[a] = high[a] = splats[0].position[a];
+        low[a] = high[a] = count ? splats[0].position[a] : panels[0].plane.origin[a];
+        for (size_t p = 0; p < panel_count; p++) {
+            low[a] = fmin(low[a], panels[p].plane.origin[a]);
+            high[a] = fmax(high[a], panels[p].plane.origin[a]);
+        }
         for (size_t i = 1; i < count; i++) {
             low[a] = fmin(low[a], splats[i].position[a]);
             high[a] = fmax(high[a], splats[i].position[a]);
@@ -199,14 +300,14 @@ void make_dataset_file(const char *path, const struct make_splat *splats, size_t
     must(spl_dataset_writer_create(path, &b.writer, &err), &err);
     spl_dataset_writer_set_page_bytes(b.writer, make_dataset_page_bytes);
     if (levels == 1)
-        add_node(&b, &b.nodes[0], splats, count);
+        add_node(&b, &b.nodes[0], splats, count, false);
     else
         add_two_levels(&b, splats, count);
     json_t *meta =
         json_pack("{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:s*, "
                   "s:s*, s:[s], s:{}}",
-                  "points", (json_int_t)discs, "leaf_splats", (json_int_t)discs, "levels", levels, "splat_radius",
-                  (double)splats[discs / 2].radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
+                  "points", (json_int_t)points, "leaf_splats", (json_int_t)points, "levels", levels, "splat_radius",
+                  radius, "bounds", "min", low[0], low[1], low[2], "max", high[0], high[1],
                   high[2], "default_view", "eye", middle[0] - size, middle[1] - 2 * size, middle[2] + size, "target",
                   middle[0], middle[1], middle[2], "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "unit",
                   make_dataset_unit, "crs", make_dataset_crs, "sources", "made by a test", "pack");
@@ -231,10 +332,16 @@ void make_folder(char *path)
 
 struct spl_dataset *make_dataset_levels(const struct make_splat *splats, size_t count, int levels)
 {
+    return make_dataset_panels(splats, count, NULL, 0, levels);
+}
+
+struct spl_dataset *make_dataset_panels(const struct make_splat *splats, size_t count,
+                                        const struct make_panels *panels, size_t panel_count, int levels)
+{
     char folder[256], path[300];
     make_folder(folder);
     snprintf(path, sizeof path, "%s/made.spld", folder);
-    make_dataset_file(path, splats, count, levels);
+    make_dataset_file_panels(path, splats, count, panels, panel_count, levels);
     struct spl_dataset *dataset;
     struct spl_error err = {0};
     int rc = spl_dataset_open(path, true, &dataset, &err);

@@ -8,6 +8,8 @@
 
 #include <splatd/dataset.h>
 
+#include "dataset/panels.h"
+
 struct make_splat {
     double position[3];   /* world */
     float normal[3];      /* unit */
@@ -16,6 +18,7 @@ struct make_splat {
     uint8_t classification;
     float uncertainty;
     bool linear;
+    float width; /* of a vertex: its line's, 0 = not known; the first one's is that of all */
     bool vertex; /* of a line, not a splat; `linear` then says that a piece goes to the next vertex */
     float clip[3], clip_offset; /* struct spl_clip: all 0 = no line */
 };
@@ -26,6 +29,24 @@ struct make_splat {
  * Two levels: the root holds every k-th splat, k <= 8, of radius * sqrt(k); its children are the cube's octants (their
  * splats in the order given), of at most 524,288 splats each. */
 void make_dataset_file(const char *path, const struct make_splat *splats, size_t count, int levels);
+
+/* Panels of a plane, whose origin is in world coordinates here. */
+struct make_panels {
+    struct spl_panel_plane plane;
+    const struct spl_panel *panels;
+    const struct spl_relief *reliefs; /* theirs, of one level: they are meshes; NULL = they are flat */
+    size_t count;       /* a chunk for each SPL_PANELS_MAX of them; the points are those of the first */
+    double color_error; /* as of spl_panels_encode() */
+    uint8_t classification;
+    bool coarse;        /* of two levels: the root's; else of the octant where its origin lies */
+};
+
+/* The same with panels behind each node's splats and lines, of which there may be none then. A panel's id is the
+ * splats and vertices, and the panels before it. */
+void make_dataset_file_panels(const char *path, const struct make_splat *splats, size_t count,
+                              const struct make_panels *panels, size_t panel_count, int levels);
+struct spl_dataset *make_dataset_panels(const struct make_splat *splats, size_t count,
+                                        const struct make_panels *panels, size_t panel_count, int levels);
 
 /* Mean error of the normals that follow, radians; default 1 degree. */
 extern double make_dataset_normal_error;

@@ -1,4 +1,5 @@
-/* Maps by direction; see mapped_dataset.h. Each block has the two corners of its colours' box, and the codes nearest. */
+/* Maps by direction; see mapped_dataset.h. Each block has the two corners of its colours' box, and the codes nearest.
+ */
 #include "support/mapped_dataset.h"
 
 #include <math.h>
@@ -123,8 +124,8 @@ static int get_map(void *context, uint32_t index, const uint32_t **words, struct
     return SPL_OK;
 }
 
-struct spl_dataset *make_mapped(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
-                                const struct spl_chunk_stations *seen)
+static void write_mapped(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
+                         const struct spl_chunk_stations *seen, const char *path)
 {
     struct making making = {.maps = maps};
     struct spl_map_row *rows = calloc(count, sizeof *rows);
@@ -132,23 +133,29 @@ struct spl_dataset *make_mapped(const struct spl_dataset *from, const struct mak
         rows[i] = maps[i].row;
     struct spl_rewrite what = {
         .from = from, .maps = rows, .map_count = count, .stations = seen, .get_map = get_map, .context = &making};
+    struct spl_error err = {0};
+    must(spl_dataset_rewrite(&what, path, &err), &err);
+    free(making.words);
+    free(rows);
+}
+
+struct spl_dataset *make_mapped(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
+                                const struct spl_chunk_stations *seen)
+{
     char folder[256], path[300];
     struct spl_dataset *dataset;
     struct spl_error err = {0};
     make_folder(folder);
     snprintf(path, sizeof path, "%s/mapped.spld", folder);
-    must(spl_dataset_rewrite(&what, path, &err), &err);
+    write_mapped(from, maps, count, seen, path);
     int rc = spl_dataset_open(path, true, &dataset, &err);
     unlink(path);
     rmdir(folder);
     must(rc, &err);
-    free(making.words);
-    free(rows);
     return dataset;
 }
 
-struct spl_dataset *make_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
-                                      bool trims)
+static struct spl_chunk_stations *seen_alike(const struct spl_dataset *from, uint32_t count, bool trims)
 {
     uint64_t chunks;
     const struct spl_chunk *all = spl_dataset_get_chunks(from, &chunks);
@@ -157,10 +164,25 @@ struct spl_dataset *make_mapped_alike(const struct spl_dataset *from, const stru
     for (uint64_t c = 0; c < chunks; c++) {
         for (uint32_t i = 0; i < most; i++)
             seen[c].seen_by[i] = (uint16_t)(1 + (c + i) % most);
-        if (trims && spl_chunk_kind(&all[c]) == SPL_CHUNK_DISCS)
+        if (trims && spl_chunk_kind(&all[c]) != SPL_CHUNK_LINES)
             seen[c].seen_by[0] |= SPL_STATION_TRIMS;
     }
+    return seen;
+}
+
+struct spl_dataset *make_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
+                                      bool trims)
+{
+    struct spl_chunk_stations *seen = seen_alike(from, count, trims);
     struct spl_dataset *dataset = make_mapped(from, maps, count, seen);
     free(seen);
     return dataset;
+}
+
+void write_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count, bool trims,
+                        const char *path)
+{
+    struct spl_chunk_stations *seen = seen_alike(from, count, trims);
+    write_mapped(from, maps, count, seen, path);
+    free(seen);
 }

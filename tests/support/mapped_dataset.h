@@ -35,4 +35,8 @@ struct spl_dataset *make_mapped(const struct spl_dataset *from, const struct mak
 struct spl_dataset *make_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count,
                                       bool trims);
 
+/* That as a file. */
+void write_mapped_alike(const struct spl_dataset *from, const struct make_map *maps, uint32_t count, bool trims,
+                        const char *path);
+
 #endif

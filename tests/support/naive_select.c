@@ -7,7 +7,9 @@
 #include <stdlib.h>
 
 #include "base/error.h"
+#include "dataset/chunk.h"
 #include "dataset/format.h"
+#include "dataset/panels.h"
 
 /* What follows the cut of one node into another is the same: clusters are drawn at nine tenths. */
 static const double cluster_share = 0.9;
@@ -70,7 +72,44 @@ static bool is_beside(const struct spl_camera *camera, double corners[8][3], dou
 
 static double largest_radius(const struct spl_chunk *chunk)
 {
+    if (spl_kind_has_panels(spl_chunk_kind(chunk)))
+        return (double)chunk->step * (double)SPL_RADIUS_SPACING;
     return chunk->radius_min + chunk->radius_step * (pow(2, chunk->geometry_bits >> SPL_GEOMETRY_RADIUS & 15) - 1);
+}
+
+/* All of a chunk of panels: every panel of its grid, whether it is there or not, and every height that codes can say.
+ */
+static void add_panels(struct selection *s, const struct spl_node *node, const struct spl_chunk *chunk, bool beside,
+                       struct naive_chunk *out)
+{
+    const struct spl_camera *camera = s->options->camera;
+    struct spl_panel_frame frame;
+    uint32_t columns, rows;
+    bool whole = spl_chunk_kind(chunk) == SPL_CHUNK_MESHES ? s->options->meshes : s->options->panels;
+    double corners[8][3], radius = whole ? 0 : largest_radius(chunk);
+    spl_panels_get_frame(chunk, &frame);
+    spl_panels_get_extent(chunk, &columns, &rows);
+    for (int k = 0; k < 8; k++) {
+        double u = k & 1 ? (double)frame.cell * SPL_PANEL_SIDE * columns : 0;
+        double v = k & 2 ? (double)frame.cell * SPL_PANEL_SIDE * rows : 0;
+        double w = (k & 4 ? 128 : -128) * (double)spl_panels_get_worth(chunk);
+        for (int i = 0; i < 3; i++) {
+            corners[k][i] = 0;
+            for (int a = 0; a < 3; a++)
+                corners[k][i] += camera->rotation[3 * i + a] * (node->origin[a] - camera->eye[a] + frame.origin[a] +
+                                                                u * frame.u[a] + v * frame.v[a] + w * frame.normal[a]);
+        }
+        out->near = fmin(out->near, corners[k][2] - radius);
+    }
+    double least = INFINITY, most = -INFINITY;
+    for (int k = 0; k < 8; k++) {
+        least = fmin(least, corners[k][2]);
+        most = fmax(most, corners[k][2]);
+    }
+    out->panels = true;
+    out->middle = (least + most) / 2;
+    out->spacing = frame.cell * focal_of(camera) / fmax(out->middle, camera->near);
+    out->beside = beside || is_beside(camera, corners, radius);
 }
 
 static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, bool beside)
@@ -88,9 +127,16 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
     struct naive_chunk *out = &s->out[s->count++];
     *out = (struct naive_chunk){.node = node_index, .chunk = index, .count = chunk->count, .near = INFINITY};
     out->lines = spl_chunk_kind(chunk) == SPL_CHUNK_LINES;
+    out->width = spl_chunk_line_width(chunk);
+    for (uint32_t c = 0; c < node->chunk_count; c++)
+        out->lined |= spl_chunk_line_width(&s->chunks[node->first_chunk + c]) > 0;
     out->scale = 1;
     if (out->lines)
         return;
+    if (spl_kind_has_panels(spl_chunk_kind(chunk))) {
+        add_panels(s, node, chunk, beside, out);
+        return;
+    }
     for (int k = 0; k < 8; k++) {
         out->near = fmin(out->near, corners[k][2]);
         out->middle += corners[k][2] / 8;
@@ -162,7 +208,8 @@ double naive_spacing(const struct naive_chunk *chunks, size_t count)
     for (int i = 1; i < 64; i++) {
         double least = pow(2, i / 4.0), sparser = 0, all = 0;
         for (size_t c = 0; c < count; c++) {
-            double area = chunks[c].beside ? 0 : chunks[c].count * chunks[c].spacing * chunks[c].spacing;
+            double items = chunks[c].panels ? 256.0 * chunks[c].count : chunks[c].count; /* as if no cell were empty */
+            double area = chunks[c].beside ? 0 : items * chunks[c].spacing * chunks[c].spacing;
             all += area;
             sparser += chunks[c].spacing >= least ? area : 0;
         }
@@ -174,10 +221,10 @@ double naive_spacing(const struct naive_chunk *chunks, size_t count)
     return pow(2, 16);
 }
 
-uint32_t naive_weight(uint64_t fragments)
+uint32_t naive_weight(uint64_t fragments, uint64_t light)
 {
     uint64_t weight = 255;
-    while (weight && 512 * weight * fragments > UINT32_MAX)
+    while (weight && 512 * (weight * fragments + light) > UINT32_MAX)
         weight--;
     return (uint32_t)weight;
 }

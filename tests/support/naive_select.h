@@ -16,6 +16,8 @@ struct naive_options {
     const struct spl_camera *camera; /* in samples */
     double lod;
     uint32_t atoms; /* of a texture at most; 0 = no textures */
+    bool panels;    /* are drawn as such; else the discs that their cells stand for */
+    bool meshes;    /* the same of meshes */
 };
 
 /* A chunk of the level of detail that is asked for, wherever it lies. */
@@ -28,7 +30,10 @@ struct naive_chunk {
     bool beside;            /* its discs, or its node's, are all on one outer side of the image */
     uint32_t planes;        /* of its textures, 0 = plain */
     bool smooth;            /* texels wider than a sample */
+    bool panels;            /* or meshes; drawn whole; their nearest point is that of what is drawn of them */
     bool lines;             /* whose vertices are drawn all, and have no extent */
+    double width;           /* of lines */
+    bool lined;             /* its node has lines that have a width */
 };
 
 /* All of them, `*count`; the caller frees. */
@@ -38,7 +43,8 @@ struct naive_chunk *naive_select(const struct naive_options *options, size_t *co
  * what is in the image exceeds. */
 double naive_spacing(const struct naive_chunk *chunks, size_t count);
 
-/* The largest weight of a fragment, up to 255, with which `fragments` of them cannot wrap a sum: 512 weight each. */
-uint32_t naive_weight(uint64_t fragments);
+/* The largest weight of a fragment, up to 255, with which `fragments` of them, and `light` ones of weight 1, cannot
+ * wrap a sum: 512 weight each. */
+uint32_t naive_weight(uint64_t fragments, uint64_t light);
 
 #endif

@@ -12,42 +12,14 @@
 #include "dataset/dictionary.h"
 #include "dataset/texture.h"
 #include "geom/octahedral.h"
+#include "geom/octahedral.h"
 #include "geom/tangent.h"
 #include "support/naive_select.h"
 #include "support/reference_fill.h"
+#include "support/reference_lines.h"
 #include "support/reference_maps.h"
-
-struct sample {
-    float first;   /* pushed depth, INFINITY = nothing */
-    float own;     /* method nearest: depth of the winner, which is not bent */
-    uint32_t id;
-    uint32_t fragments; /* discs that cover it */
-    uint32_t word;    /* method fill: depth, spacing, linear */
-    uint32_t payload; /* of the winner, where one wins: colour */
-    float normal_winner[3];
-    uint64_t color[3], weight;
-    uint64_t depth, normal[3];
-    float mapped[3]; /* colour with those of maps */
-};
-
-struct scene {
-    const struct spl_dataset *dataset;
-    const struct spl_view *view;
-    struct spl_camera camera; /* in samples, with what method fill draws around the image */
-    uint32_t guard;           /* samples of it */
-    struct naive_chunk *chunks;
-    size_t chunk_count;
-    struct sample *samples;
-    uint32_t weight_max;
-    float margin;
-    uint32_t *atoms;    /* the dictionary, expanded */
-    uint32_t *textures; /* of page textures_page */
-    uint32_t textures_page;
-    const struct spl_chunk *coded; /* whose codes `code` has; NULL = none */
-    struct spl_chunk_code code;
-    struct reference_map *maps; /* NULL = none is drawn */
-    bool colored;               /* they give colours */
-};
+#include "support/reference_panels.h"
+#include "support/reference_scene.h"
 
 struct disc {
     float p[3], n[3], radius;
@@ -62,15 +34,14 @@ struct disc {
     const struct reference_map *trims;  /* may be NULL */
 };
 
-/* Are discs drawn, and are they summed up? Else the nearest wins. */
-static bool draws_discs(const struct spl_view *view)
+static bool draws_panels(const struct spl_view *view)
 {
-    return view->method == SPL_METHOD_SPLAT || view->method == SPL_METHOD_NEAREST;
+    return draws_discs(view) && (view->shapes == SPL_SHAPES_PANELS || view->shapes == SPL_SHAPES_ALL);
 }
 
-static bool sums(const struct scene *s)
+static bool draws_meshes(const struct spl_view *view)
 {
-    return s->view->method == SPL_METHOD_SPLAT;
+    return draws_discs(view) && view->shapes == SPL_SHAPES_ALL;
 }
 
 static void to_view(const struct spl_camera *camera, const float v[3], float out[3])
@@ -124,14 +95,6 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     if (qx * d->line[0] + qy * d->line[1] + fall * d->line[2] >= d->end)
         return 1;
     return distance < near_center ? distance : near_center;
-}
-
-/* The point of view space at depth z of sample (x, y). */
-static void view_point(const struct scene *s, int64_t x, int64_t y, float z, float p[3])
-{
-    p[0] = ((float)x + 0.5f - (float)s->camera.cx) * (1 / (float)s->camera.fx) * z;
-    p[1] = ((float)y + 0.5f - (float)s->camera.cy) * (1 / (float)s->camera.fy) * z;
-    p[2] = z;
 }
 
 /* A channel of an atom's texel, + 128, at the level of `side` texels. */
@@ -192,6 +155,14 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
     }
 }
 
+/* A normal as the word by which kernels tell the least of several. */
+static uint32_t normal_word(const float n[3])
+{
+    float e[2];
+    spl_octahedral_encode(n, &e[0], &e[1]);
+    return (uint32_t)((e[0] + 1) * 32767 + 0.5f) | (uint32_t)((e[1] + 1) * 32767 + 0.5f) << 16;
+}
+
 /* Method nearest: a fragment whose depth is bent to `bent`; each layer's least payload among equals. */
 static void bend(struct sample *at, const struct disc *d, float z, float bent)
 {
@@ -202,61 +173,126 @@ static void bend(struct sample *at, const struct disc *d, float z, float bent)
     at->first = bent;
     at->payload = nearer || payload < at->payload ? payload : at->payload;
     at->own = nearer || z < at->own ? z : at->own;
-    if (nearer || d->id < at->id) {
+    if (nearer || d->id < at->id)
         at->id = d->id;
+    if (nearer || normal_word(d->n) < normal_word(at->normal_winner))
         memcpy(at->normal_winner, d->n, sizeof d->n);
+}
+
+/* A fragment of `d` at (x, y): its depth, squared distance to the centre, how far it lies off, how far back it is
+ * pushed. */
+struct fragment {
+    float z, distance, offset[3], margin, behind;
+};
+
+static void draw(struct scene *s, const struct disc *d, struct sample *at, const struct fragment *f, bool shade)
+{
+    float z = f->z, pushed = z + f->margin + f->behind;
+    bool light = f->distance >= 1; /* a cell that stands for a panel */
+    if (!sums(s)) {
+        bend(at, d, z, z + (light ? 0 : f->margin * f->distance) + f->behind);
+        return;
     }
+    if (!shade) {
+        at->light += light;
+        at->fragments += !light;
+        if (pushed < at->first)
+            at->first = pushed;
+        return;
+    }
+    if (z + f->behind > at->first || pushed < at->first) /* the latter was trimmed */
+        return;
+    if (pushed == at->first && d->id < at->id)
+        at->id = d->id;
+    uint32_t weight = (uint32_t)((1 - f->distance) * (float)s->weight_max + 0.5f);
+    weight = weight ? weight : 1;
+    uint32_t offset = (uint32_t)((at->first - z) / at->first * 262144.0f + 0.5f);
+    at->weight += weight;
+    at->depth += (uint64_t)weight * (offset > 262143 ? 262143 : offset);
+    uint32_t color[3] = {d->color[0], d->color[1], d->color[2]};
+    if (d->planes)
+        sample_texture(s, d, f->offset, color);
+    for (int i = 0; i < 3; i++) {
+        at->color[i] += (uint64_t)weight * color[i];
+        at->normal[i] += (uint64_t)weight * (uint32_t)(d->n[i] * 127.0f + 127.5f);
+    }
+}
+
+static struct sample *sample_of(struct scene *s, int64_t x, int64_t y)
+{
+    return &s->samples[y * s->camera.width + x];
+}
+
+static float margin_of(const struct scene *s, float radius, float z, float slant)
+{
+    float pixel = SPL_LOW_PASS * z / (float)s->camera.fx;
+    return s->margin * (radius > pixel ? radius : pixel) * slant;
 }
 
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 {
     int first[2], last[2];
-    float center[2], z, from_center[3];
+    float center[2], p[3];
     footprint(s, d, first, last, center);
-    float pixel = SPL_LOW_PASS * d->p[2] / (float)s->camera.fx;
     float inverse = 1.0f / d->p[2], rx = d->p[0] * inverse, ry = d->p[1] * inverse;
     float facing = d->n[0] * rx + d->n[1] * ry + d->n[2], slant = 1.0f / fmaxf(fabsf(facing), 1e-6f);
     slant = slant < 1 ? 1 : slant > SPL_MARGIN_SLANT ? SPL_MARGIN_SLANT : slant;
-    float margin = s->margin * (d->radius > pixel ? d->radius : pixel) * slant;
+    struct fragment f = {.margin = margin_of(s, d->radius, d->p[2], slant),
+                         .behind = s->sided && facing > 0 ? d->radius : 0};
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {
-            float distance = coverage(s, d, center, x, y, &z, from_center);
-            if (!(distance < 1))
+            f.distance = coverage(s, d, center, x, y, &f.z, f.offset);
+            if (!(f.distance < 1))
                 continue;
-            float p[3];
-            view_point(s, x, y, z, p);
+            view_point(s, x, y, f.z, p);
             if (!(sums(s) && shade) && d->trims && reference_map_trims(d->trims, p, d->n, d->radius))
                 continue;
-            struct sample *at = &s->samples[(size_t)y * s->camera.width + (size_t)x];
-            float pushed = z + margin;
-            if (!sums(s)) {
-                bend(at, d, z, z + margin * distance);
-                continue;
-            }
-            if (!shade) {
-                at->fragments++;
-                if (pushed < at->first)
-                    at->first = pushed;
-                continue;
-            }
-            if (z > at->first || pushed < at->first) /* the latter was trimmed */
-                continue;
-            if (pushed == at->first && d->id < at->id)
-                at->id = d->id;
-            uint32_t weight = (uint32_t)((1 - distance) * (float)s->weight_max + 0.5f);
-            weight = weight ? weight : 1;
-            uint32_t offset = (uint32_t)((at->first - z) / at->first * 262144.0f + 0.5f);
-            at->weight += weight;
-            at->depth += (uint64_t)weight * (offset > 262143 ? 262143 : offset);
-            uint32_t color[3] = {d->color[0], d->color[1], d->color[2]};
-            if (d->planes)
-                sample_texture(s, d, from_center, color);
-            for (int i = 0; i < 3; i++) {
-                at->color[i] += (uint64_t)weight * color[i];
-                at->normal[i] += (uint64_t)weight * (uint32_t)(d->n[i] * 127.0f + 127.5f);
-            }
+            draw(s, d, sample_of(s, x, y), &f, shade);
         }
     }
+}
+
+/* A chunk of panels that is drawn. */
+struct panels {
+    struct scene *scene;
+    struct reference_plane plane;
+    const struct reference_map *trims; /* may be NULL */
+    bool shade;
+};
+
+static void draw_fragment(void *context, const struct reference_fragment *from)
+{
+    const struct panels *panels = context;
+    struct scene *s = panels->scene;
+    const struct reference_plane *plane = &panels->plane;
+    float radius = plane->chunk->radius_min;
+    struct disc d = {.id = from->id};
+    memcpy(d.n, from->normal, sizeof d.n);
+    memcpy(d.color, sums(s) ? from->smooth : from->color, sizeof d.color);
+    float p[3];
+    view_point(s, from->x, from->y, from->z, p);
+    if (!(sums(s) && panels->shade) && panels->trims && reference_map_trims(panels->trims, p, d.n, radius))
+        return;
+    struct fragment f = {.z = from->z,
+                         .distance = from->light,
+                         .margin = margin_of(s, radius, from->z, from->slant),
+                         .behind = s->sided && from->behind ? radius : 0};
+    draw(s, &d, sample_of(s, from->x, from->y), &f, panels->shade);
+}
+
+/* A piece of a line that has a width. */
+static void wide_piece(struct scene *s, const struct disc ends[2], const struct reference_piece *cut, bool shade)
+{
+    const struct reference_capsule c = reference_capsule(&s->camera, cut);
+    for (int64_t y = 0; y < s->camera.height; y++)
+        for (int64_t x = 0; x < s->camera.width; x++) {
+            struct fragment f = {0};
+            bool second;
+            f.distance = reference_capsule_sample(&c, (int)x, (int)y, &f.z, &second);
+            f.margin = margin_of(s, cut->half, f.z, 1);
+            if (f.distance < 1)
+                draw(s, &ends[second], sample_of(s, x, y), &f, shade);
+        }
 }
 
 static void project(const struct scene *s, const float p[3], float out[2])
@@ -265,7 +301,7 @@ static void project(const struct scene *s, const float p[3], float out[2])
     out[1] = (float)s->camera.fy * (p[1] / p[2]) + (float)s->camera.cy;
 }
 
-/* `behind`: steps of depth that are added. */
+/* Of several at one depth the least wins, of each layer's own word. */
 static void put(struct scene *s, const float place[2], float z, const struct disc *d, uint32_t low_bits)
 {
     if (!(place[0] >= 0 && place[1] >= 0 && place[0] < (float)s->camera.width && place[1] < (float)s->camera.height))
@@ -282,10 +318,10 @@ static void put(struct scene *s, const float place[2], float z, const struct dis
     bool nearer = z < at->first;
     at->first = z;
     at->payload = nearer || payload < at->payload ? payload : at->payload;
-    if (nearer || d->id < at->id) {
-        at->id = d->id;
+    if (nearer || normal_word(d->n) < normal_word(at->normal_winner))
         memcpy(at->normal_winner, d->n, sizeof d->n);
-    }
+    if (nearer || d->id < at->id)
+        at->id = d->id;
 }
 
 static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
@@ -295,7 +331,8 @@ static void point(struct scene *s, const struct disc *d, uint32_t low_bits)
     put(s, place, d->p[2], d, low_bits);
 }
 
-/* From one vertex to the other, a sample a column or, where the line is upright, a row; `middle` as in fill_lines.comp. */
+/* From one vertex to the other, a sample a column or, where the line is upright, a row; `middle` as in fill_lines.comp.
+ */
 static void line(struct scene *s, const struct disc ends[2], const float from[3], const float to[3], float middle)
 {
     float a[2], b[2];
@@ -313,26 +350,6 @@ static void line(struct scene *s, const struct disc ends[2], const float from[3]
         float z = 1 / (w0 + t * (w1 - w0));
         put(s, place, z, &ends[!(t * w1 * z < middle)], SPL_FILL_LINEAR);
     }
-}
-
-/* A piece, without what lies beyond the planes near and far. */
-static void piece(struct scene *s, const struct disc ends[2])
-{
-    const float *p = ends[0].p, *q = ends[1].p, near = (float)s->camera.near, far = (float)s->camera.far;
-    float from[3], to[3], skip = 0, rest = 0;
-    if (fmaxf(p[2], q[2]) <= near || fminf(p[2], q[2]) >= far)
-        return;
-    if (p[2] < near || p[2] > far)
-        skip = (fminf(fmaxf(p[2], near), far) - p[2]) / (q[2] - p[2]);
-    if (q[2] < near || q[2] > far)
-        rest = (fminf(fmaxf(q[2], near), far) - q[2]) / (p[2] - q[2]);
-    for (int c = 0; c < 3; c++) {
-        from[c] = p[c] + skip * (q[c] - p[c]);
-        to[c] = q[c] + rest * (p[c] - q[c]);
-    }
-    from[2] = fminf(fmaxf(p[2], near), far);
-    to[2] = fminf(fmaxf(q[2], near), far);
-    line(s, ends, from, to, (0.5f - skip) / (1 - skip - rest));
 }
 
 /* The codes of a chunk into s->code. */
@@ -354,6 +371,13 @@ static void load_code(struct scene *s, uint32_t page, const struct spl_chunk *ch
     uint32_t texture = spl_dataset_get_chunk_textures(s->dataset)[index];
     spl_texture_decode(s->textures + spl_texture_word(texture), spl_texture_planes(texture), chunk->count, &s->code);
     s->coded = chunk;
+}
+
+/* The map that trims a chunk; NULL: none does. */
+static const struct reference_map *trims_of(const struct scene *s, uint32_t chunk)
+{
+    uint16_t own = s->maps ? spl_dataset_get_chunk_stations(s->dataset)[chunk].seen_by[0] : 0;
+    return own & SPL_STATION_TRIMS ? &s->maps[(own & SPL_STATION_ROW) - 1] : NULL;
 }
 
 /* Splat or vertex `index` of a chunk as it is drawn; false where it lies before or behind what is. */
@@ -385,10 +409,7 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
         d->code = &s->code;
         d->atoms = &s->code.splat[index];
     }
-    if (s->maps) {
-        uint16_t own = spl_dataset_get_chunk_stations(s->dataset)[drawn->chunk].seen_by[0];
-        d->trims = own & SPL_STATION_TRIMS ? &s->maps[(own & SPL_STATION_ROW) - 1] : NULL;
-    }
+    d->trims = trims_of(s, drawn->chunk);
     to_view(&s->camera, splat.position, d->p);
     to_view(&s->camera, splat.normal, d->n);
     for (int i = 0; i < 3; i++) {
@@ -403,23 +424,63 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
     return d->p[2] >= (float)s->camera.near && d->p[2] <= (float)s->camera.far;
 }
 
-/* Pieces from one vertex to the next, wherever they lie. */
-static void for_each_piece(struct scene *s)
+/* Pieces from one vertex to the next, wherever they lie; of discs' methods those that have a width. */
+static void for_each_piece(struct scene *s, bool shade)
 {
     for (size_t c = 0; c < s->chunk_count; c++)
         for (uint32_t index = 0; s->chunks[c].lines && index + 1 < s->chunks[c].count; index++) {
             struct disc ends[2];
+            struct reference_piece cut = {.half = (float)(s->chunks[c].width / 2)};
             uint32_t goes_on, ignored;
             load_disc(s, &s->chunks[c], index, &ends[0], &goes_on);
             load_disc(s, &s->chunks[c], index + 1, &ends[1], &ignored);
-            if (goes_on & SPL_FILL_LINEAR)
-                piece(s, ends);
+            if (!(goes_on & SPL_FILL_LINEAR) || !reference_cut(&s->camera, ends[0].p, ends[1].p, &cut))
+                continue;
+            if (!draws_discs(s->view))
+                line(s, ends, cut.from, cut.to, cut.middle);
+            else if (s->chunks[c].width > 0)
+                wide_piece(s, ends, &cut, shade);
         }
+}
+
+/* Panels or meshes, or their cells as discs or points. */
+static void draw_panels(struct scene *s, const struct naive_chunk *drawn, bool shade)
+{
+    uint64_t count;
+    size_t bytes;
+    const struct spl_node *node = &spl_dataset_get_nodes(s->dataset, &count)[drawn->node];
+    const struct spl_chunk *chunk = &spl_dataset_get_chunks(s->dataset, &count)[drawn->chunk];
+    const uint32_t *page = spl_dataset_get_page(s->dataset, node->page, &bytes);
+    struct panels panels = {s, reference_plane(&s->camera, node, chunk, page), trims_of(s, drawn->chunk), shade};
+    if (spl_chunk_kind(chunk) == SPL_CHUNK_MESHES ? draws_meshes(s->view) : draws_panels(s->view)) {
+        reference_panel_fragments(&panels.plane, draw_fragment, &panels);
+        return;
+    }
+    for (uint32_t i = 0; i < chunk->count * SPL_PANEL_SIDE * SPL_PANEL_SIDE; i++) {
+        struct reference_cell cell;
+        struct disc d = {
+            .radius = SPL_RADIUS_SPACING * chunk->step, .end = 1, .texture_scale = 1, .trims = panels.trims};
+        if (!reference_panel_cell(&panels.plane, i, &cell) || cell.p[2] < (float)s->camera.near ||
+            cell.p[2] > (float)s->camera.far)
+            continue;
+        d.id = cell.id;
+        memcpy(d.p, cell.p, sizeof d.p);
+        memcpy(d.n, cell.n, sizeof d.n);
+        memcpy(d.color, cell.color, sizeof d.color);
+        if (draws_discs(s->view))
+            depth_disc(s, &d, shade);
+        else
+            point(s, &d, reference_fill_code(d.radius, spl_dataset_get_info(s->dataset)->splat_radius) << 1);
+    }
 }
 
 static void for_each_disc(struct scene *s, bool shade)
 {
     for (size_t c = 0; c < s->chunk_count; c++) {
+        if (s->chunks[c].panels) {
+            draw_panels(s, &s->chunks[c], shade);
+            continue;
+        }
         for (uint32_t index = 0; !s->chunks[c].lines && index < s->chunks[c].count; index++) {
             struct disc d;
             uint32_t low_bits;
@@ -427,216 +488,22 @@ static void for_each_disc(struct scene *s, bool shade)
                 continue;
             if (!draws_discs(s->view))
                 point(s, &d, low_bits);
-            else
+            else if (!draws_lines(s->view) || !s->chunks[c].lined || !(low_bits & SPL_FILL_LINEAR))
                 depth_disc(s, &d, shade);
         }
     }
+    if (draws_lines(s->view))
+        for_each_piece(s, shade);
 }
 
-static uint32_t most_fragments(const struct scene *s)
+static uint32_t choose_weight(const struct scene *s)
 {
-    uint32_t most = 0;
-    for (size_t i = 0; i < (size_t)s->camera.width * s->camera.height; i++)
+    uint32_t most = 0, light = 0;
+    for (size_t i = 0; i < (size_t)s->camera.width * s->camera.height; i++) {
         most = s->samples[i].fragments > most ? s->samples[i].fragments : most;
-    return most;
-}
-
-static float depth_of(const struct scene *s, const struct sample *at)
-{
-    if (!sums(s))
-        return s->view->method == SPL_METHOD_NEAREST ? at->own : at->first;
-    return (float)((double)at->first * (1 - (double)at->depth / (double)at->weight / 262144.0));
-}
-
-static void normal_of(const struct scene *s, const struct sample *at, double out[3])
-{
-    double length = 0;
-    for (int i = 0; i < 3; i++) {
-        out[i] = sums(s) ? (double)at->normal[i] / (double)at->weight - 127.5 : at->normal_winner[i];
-        length += out[i] * out[i];
+        light = s->samples[i].light > light ? s->samples[i].light : light;
     }
-    for (int i = 0; i < 3; i++)
-        out[i] /= sqrt(length);
-}
-
-/* What stands for the sample: where it is empty and at most one of the eight around it is, that of them whose depth is
- * closest to their mean. */
-static const struct sample *standing_for(const struct scene *s, int64_t x, int64_t y)
-{
-    const struct sample *own = &s->samples[(size_t)y * s->camera.width + (size_t)x], *around[8], *found = own;
-    int covered = 0;
-    float sum = 0, closest = INFINITY;
-    if (!sums(s) || own->first < INFINITY)
-        return own;
-    for (int64_t j = y > 0 ? y - 1 : y; j <= y + 1 && j < s->camera.height; j++)
-        for (int64_t i = x > 0 ? x - 1 : x; i <= x + 1 && i < s->camera.width; i++) {
-            const struct sample *beside = &s->samples[(size_t)j * s->camera.width + (size_t)i];
-            if (beside->first == INFINITY)
-                continue;
-            around[covered++] = beside;
-            sum += beside->first;
-        }
-    for (int i = 0; covered >= 7 && i < covered; i++) {
-        float off = fabsf((float)covered * around[i]->first - sum);
-        if (off < closest) {
-            closest = off;
-            found = around[i];
-        }
-    }
-    return found;
-}
-
-/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2. */
-static float smooth_color(const struct scene *s, const struct sample *at, int c)
-{
-    int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
-    double sum = 0, weights = 0;
-    for (int64_t j = -1; j <= 1; j++)
-        for (int64_t i = -1; i <= 1; i++) {
-            bool inside = x + i >= 0 && x + i < width && y + j >= 0 && y + j < s->camera.height;
-            const struct sample *beside = inside ? at + j * width + i : at;
-            double weight = i && j ? 0.5 : i || j ? 1 : 4;
-            if (!(fabsf(beside->first - at->first) <= SPL_SMOOTH_SHARE * at->first))
-                continue;
-            sum += weight * (beside->payload >> 8 * c & 255);
-            weights += weight;
-        }
-    return (float)(sum / weights);
-}
-
-/* Channel `c` of what a sample contributes. */
-static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
-{
-    if (s->colored)
-        return (uint64_t)(at->mapped[c] + 0.5f);
-    if (sums(s))
-        return (at->color[c] + at->weight / 2) / at->weight;
-    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c) + 0.5f) : at->payload >> 8 * c & 255;
-}
-
-/* Method nearest keeps how far a depth was bent as a share of it, a float of four bits behind its first. */
-static float surface_of(const struct scene *s, const struct sample *at)
-{
-    if (at->first == INFINITY)
-        return 0;
-    if (sums(s))
-        return depth_of(s, at);
-    int exponent;
-    double share = ((double)at->first - (double)at->own) / (double)at->first, mantissa = frexp(share, &exponent);
-    return share < 1 / 65536.0 ? at->first : (float)(at->first * (1 - ldexp(round(mantissa * 32) / 32, exponent)));
-}
-
-/* How far the surface goes from (x, y) to the next sample along an axis: by the means of both sides, each weighted by
- * how far off the other one's depth is; at the same depth where a side holds nothing. */
-static void surface_step(const struct scene *s, const float *depths, int64_t x, int64_t y, int axis, float step[3])
-{
-    int64_t width = s->camera.width, height = s->camera.height;
-    float z = depths[y * width + x], p[3], off[2], side[2][3];
-    view_point(s, x, y, z, p);
-    for (int i = 0; i < 2; i++) {
-        int64_t bx = x + (axis ? 0 : 2 * i - 1), by = y + (axis ? 2 * i - 1 : 0);
-        float beside = bx >= 0 && bx < width && by >= 0 && by < height ? depths[by * width + bx] : 0, q[3];
-        view_point(s, bx, by, beside > 0 ? beside : z, q);
-        off[i] = beside > 0 ? fabsf(beside - z) + 1e-6f * z : 1e30f;
-        for (int c = 0; c < 3; c++)
-            side[i][c] = i ? q[c] - p[c] : p[c] - q[c];
-    }
-    for (int c = 0; c < 3; c++)
-        step[c] = side[1][c] + (side[0][c] - side[1][c]) * (off[1] / (off[0] + off[1]));
-}
-
-/* Colours of every sample, of all stations: who asks for this has each chunk seen by all there are. */
-static void add_maps(struct scene *s)
-{
-    int64_t width = s->camera.width, count = width * s->camera.height;
-    float *depths = spl_alloc((size_t)count, sizeof *depths, NULL);
-    uint32_t maps = spl_dataset_get_info(s->dataset)->maps;
-    for (int64_t i = 0; i < count; i++)
-        depths[i] = surface_of(s, &s->samples[i]);
-    for (int64_t i = 0; i < count; i++) {
-        struct sample *at = &s->samples[i];
-        if (!(depths[i] > 0))
-            continue;
-        struct reference_sample sample = {.radius = fmaxf(at->first - depths[i], 0) / fmaxf(s->margin, 1e-6f)};
-        float weights = SPL_MAP_BASE, sum[3];
-        for (int c = 0; c < 3; c++)
-            sum[c] = SPL_MAP_BASE * (sums(s) ? (float)at->color[c] / (float)at->weight : smooth_color(s, at, c));
-        view_point(s, i % width, i / width, depths[i], sample.p);
-        surface_step(s, depths, i % width, i / width, 0, sample.right);
-        surface_step(s, depths, i % width, i / width, 1, sample.down);
-        for (uint32_t m = 0; m < maps; m++) {
-            float color[3], weight = reference_map_color(&s->maps[m], &sample, color);
-            weights += weight;
-            for (int c = 0; c < 3; c++)
-                sum[c] += weight * color[c];
-        }
-        for (int c = 0; c < 3; c++)
-            at->mapped[c] = sum[c] / weights;
-    }
-    free(depths);
-    s->colored = true;
-}
-
-static void resolve_pixel(struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame)
-{
-    uint32_t side = (uint32_t)s->view->supersample, covered = 0, id = UINT32_MAX, near_count = 0,
-             width = s->view->camera.width;
-    float nearest = INFINITY;
-    uint64_t color[3] = {0};
-    double normal[3] = {0}, depth = 0;
-    size_t pixel = (size_t)y * width + x;
-    for (uint32_t pass = 0; pass < 2; pass++) {
-        for (uint32_t i = 0; i < side * side; i++) {
-            const struct sample *at = standing_for(s, x * side + i % side + s->guard, y * side + i / side + s->guard);
-            if (at->first == INFINITY)
-                continue;
-            if (pass == 1) {
-                if (at->first <= nearest * 1.01f) {
-                    depth += depth_of(s, at);
-                    near_count++;
-                }
-                continue;
-            }
-            covered++;
-            if (at->first < nearest || (at->first == nearest && at->id < id))
-                id = at->id;
-            nearest = fminf(nearest, at->first);
-            double n[3];
-            normal_of(s, at, n);
-            for (int c = 0; c < 3; c++) {
-                color[c] += color_of(s, at, c);
-                normal[c] += n[c];
-            }
-        }
-    }
-    const struct spl_image *images = frame->images;
-    if (images[SPL_LAYER_COLOR].pixels) {
-        uint8_t *out = (uint8_t *)images[SPL_LAYER_COLOR].pixels + 4 * pixel;
-        const uint8_t *back = s->view->background;
-        uint32_t back_weight = back[3] * (side * side - covered), weight = 255 * covered + back_weight;
-        for (int c = 0; c < 3; c++)
-            out[c] = weight ? (uint8_t)((255 * color[c] + back_weight * back[c] + weight / 2) / weight) : 0;
-        out[3] = (uint8_t)((weight + side * side / 2) / (side * side));
-    }
-    float z = covered ? (float)(depth / near_count) : NAN;
-    if (images[SPL_LAYER_DEPTH].pixels)
-        ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
-    if (images[SPL_LAYER_RANGE].pixels) {
-        double rx = ((x + 0.5) * side + s->guard - s->camera.cx) / s->camera.fx,
-               ry = ((y + 0.5) * side + s->guard - s->camera.cy) / s->camera.fy;
-        ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(z * sqrt(1 + rx * rx + ry * ry));
-    }
-    if (images[SPL_LAYER_NORMAL].pixels) {
-        float *out = (float *)images[SPL_LAYER_NORMAL].pixels + 3 * pixel;
-        const double *r = s->camera.rotation;
-        double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-        for (int i = 0; i < 3; i++)
-            out[i] = covered ? (float)((r[i] * normal[0] + r[3 + i] * normal[1] + r[6 + i] * normal[2]) / length) : 0;
-    }
-    if (images[SPL_LAYER_ID].pixels)
-        ((uint32_t *)images[SPL_LAYER_ID].pixels)[pixel] = id;
-    if (images[SPL_LAYER_COVERAGE].pixels)
-        ((float *)images[SPL_LAYER_COVERAGE].pixels)[pixel] = (float)covered / (float)(side * side);
+    return naive_weight(most, light);
 }
 
 static void fill(struct scene *s, const struct fill_plan *plan)
@@ -654,7 +521,7 @@ static void fill(struct scene *s, const struct fill_plan *plan)
             samples[i].normal[c] = at->normal_winner[c];
         }
     }
-    reference_fill(samples, s->camera.width, s->camera.height, s->camera.fx,
+    reference_fill(samples, s->camera.width, s->camera.height, (const double[2]){s->camera.fx, s->camera.fy},
                    spl_dataset_get_info(s->dataset)->splat_radius, s->view, plan);
     for (size_t i = 0; i < count; i++) {
         struct sample *at = &s->samples[i];
@@ -686,9 +553,12 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.margin = (float)view->disc.margin;
     const bool mapped =
         spl_dataset_get_info(dataset)->maps && view->maps == SPL_MAPS_ON && draws_discs(view);
+    s.sided = mapped || spl_dataset_get_info(dataset)->panels || spl_dataset_get_info(dataset)->meshes;
     const struct naive_options options = {.dataset = dataset,
                                           .camera = &s.camera,
                                           .lod = view->lod,
+                                          .panels = draws_panels(view),
+                                          .meshes = draws_meshes(view),
                                           .atoms = view->method == SPL_METHOD_SPLAT && !mapped ? view->disc.atoms : 0};
     struct fill_plan plan = {0};
     int rc = SPL_OK;
@@ -708,8 +578,8 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.samples = rc ? NULL : spl_alloc(count, sizeof *s.samples, err);
     if (!rc && !s.samples)
         rc = SPL_E_NOMEM;
-    static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32,
-                                                               SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32};
+    static const enum spl_pixel_type types[SPL_LAYER_COUNT] = {
+        SPL_PIXEL_RGBA8, SPL_PIXEL_F32, SPL_PIXEL_F32, SPL_PIXEL_F32X3, SPL_PIXEL_U32, SPL_PIXEL_F32, SPL_PIXEL_U32};
     for (int i = 0; i < SPL_LAYER_COUNT && !rc; i++) {
         if (!(view->layers >> i & 1))
             continue;
@@ -723,18 +593,16 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
         for (size_t i = 0; i < count; i++)
             s.samples[i] = (struct sample){.first = INFINITY, .id = UINT32_MAX};
         for_each_disc(&s, false);
-        if (view->method == SPL_METHOD_FILL)
-            for_each_piece(&s);
-        s.weight_max = naive_weight(most_fragments(&s));
+        s.weight_max = choose_weight(&s);
         if (sums(&s))
             for_each_disc(&s, true);
         if (view->method == SPL_METHOD_FILL)
             fill(&s, &plan);
         if (mapped && view->layers >> SPL_LAYER_COLOR & 1)
-            add_maps(&s);
+            reference_add_maps(&s);
         for (uint32_t y = 0; y < view->camera.height; y++)
             for (uint32_t x = 0; x < view->camera.width; x++)
-                resolve_pixel(&s, x, y, frame);
+                reference_resolve_pixel(&s, x, y, frame);
     }
     for (uint32_t m = 0; mapped && m < spl_dataset_get_info(dataset)->maps; m++)
         free(s.maps[m].words);

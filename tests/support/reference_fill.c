@@ -263,11 +263,11 @@ static void finish_sample(const struct filter *f, struct fill_sample *s, int x, 
     memcpy(s->normal, c.normal, sizeof c.normal);
 }
 
-void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
+void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, const double focal[2], double median,
                     const struct spl_view *view, const struct fill_plan *plan)
 {
-    struct filter f = {.view = view, .plan = plan, .focal = (float)focal};
-    f.reach = (float)(3 / 1.128379f * focal);
+    struct filter f = {.view = view, .plan = plan, .focal = (float)focal[0]};
+    f.reach = (float)(3 / 1.128379f * (focal[0] > focal[1] ? focal[0] : focal[1]));
     f.margin = (float)(1 / 1.128379f);
     f.radius = (float)(median / 16);
     f.threshold = (float)(8 * view->fill.threshold);

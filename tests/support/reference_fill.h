@@ -29,8 +29,9 @@ struct fill_plan fill_plan_of(const struct spl_view *view, double spacing);
 /* The code of a splat's radius, of a dataset whose median radius is `median`. */
 uint32_t reference_fill_code(float radius, double median);
 
-/* Filters the samples in place; `focal` in samples. */
-void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, double focal, double median,
+/* Filters the samples in place; `focal` along x and y, in samples: points reach as far as the longer one
+ * says. */
+void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, const double focal[2], double median,
                     const struct spl_view *view, const struct fill_plan *plan);
 
 #endif

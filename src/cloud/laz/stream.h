@@ -13,13 +13,13 @@
 struct spl_laz_stream;
 
 /* `points` records lie from byte `points_at` on. A table of chunks that is missing, or wrong where it can be done
- * without, is no error: spl_laz_stream_get_warning() tells the latter. `threads`: 0 = all cores. On success the caller owns *out; `source` and
- * `cancelled`, which may be NULL, are borrowed. */
+ * without, is no error: spl_laz_stream_get_warning() tells the latter. `threads`: 0 = all cores. On success the caller
+ * owns *out; `source` and `cancelled`, which may be NULL, are borrowed. */
 int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, const struct spl_laz_format *format,
                         uint64_t points_at, uint64_t points, unsigned threads, const atomic_bool *cancelled,
                         struct spl_error *err);
 
-/* What is wrong with the table, at an offset of the file, so that chunks are read one after the other; NULL: nothing. */
+/* What is wrong with the table, at an offset of the file, so that chunks are read one by one; NULL: nothing. */
 const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stream *stream);
 
 /* NULL-safe. */

@@ -7,7 +7,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "pack/maps/blocks.h"
+#include "dataset/block.h"
 
 enum { apron = SPL_MAP_APRON, halvings_max = 12 };
 
@@ -53,6 +53,14 @@ void spl_atlas_scale(struct spl_atlas *atlas, const float factors[3])
     for (size_t i = 0; i < (size_t)atlas->width * atlas->height; i++)
         for (int c = 0; c < 3; c++)
             atlas->texels[i][c] *= factors[c];
+}
+
+bool spl_atlas_is_full(const struct spl_atlas *atlas)
+{
+    size_t count = (size_t)atlas->width * atlas->height, i = 0;
+    while (i < count && atlas->texels[i][3] > 0)
+        i++;
+    return i == count;
 }
 
 struct job {
@@ -205,7 +213,7 @@ static void encode_rows(void *context, size_t begin, size_t end, unsigned worker
                 for (int c = 0; c < 3; c++)
                     texels[i][c] =
                         spl_srgb_of_linear(from->texels[(4 * row + i / 4) * from->width + 4 * block + i % 4][c]);
-            job->errors[row] += spl_map_block_encode((const float(*)[3])texels, job->words + 2 * (row * across + block));
+            job->errors[row] += spl_block_encode((const float(*)[3])texels, job->words + 2 * (row * across + block));
         }
 }
 

@@ -15,6 +15,9 @@ struct spl_atlas {
 int spl_atlas_init(struct spl_atlas *atlas, uint32_t side, struct spl_error *err);
 void spl_atlas_finish(struct spl_atlas *atlas);
 
+/* Whether every texel has a weight. */
+bool spl_atlas_is_full(const struct spl_atlas *atlas);
+
 /* Where there is no weight, colours from around, smoother the farther they come (push and pull); weights become 1.
  * An atlas that is empty becomes grey. Parallel. */
 int spl_atlas_fill(struct spl_atlas *atlas, unsigned threads, struct spl_error *err);

@@ -68,7 +68,7 @@ static void repeat(struct spl_atlas *atlas, const bool *edited)
         }
 }
 
-int spl_map_edit(const struct spl_map_edits *edits, struct spl_map_export *out, uint32_t index,
+int spl_map_edit(struct spl_map_edits *edits, struct spl_map_export *out, uint32_t index,
                  const struct spl_map_row *row, const uint32_t *words, struct spl_atlas *atlas, struct spl_error *err)
 {
     struct spl_image picture = {0};

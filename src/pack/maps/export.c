@@ -175,6 +175,9 @@ static int check_entry(const struct spl_map_edits *edits, size_t i, struct spl_e
     if (!json_string_value(json_object_get(entry, "name")) || !color)
         return spl_fail_field(err, SPL_E_INPUT, "name", "%s/%s: map %zu has no name or no color", edits->folder,
                               list_name, i + 1);
+    if (!json_is_integer(side))
+        return spl_fail_field(err, SPL_E_INPUT, "side", "%s/%s: map %zu has no side that is a whole number, 1 to %d",
+                              edits->folder, list_name, i + 1, SPL_MAP_SIDE_MAX);
     if (!(json_integer_value(side) > 0 && json_integer_value(side) <= SPL_MAP_SIDE_MAX))
         return spl_fail_field(err, SPL_E_INPUT, "side", "%s/%s: map %zu has a side of %lld; it must be 1 to %d",
                               edits->folder, list_name, i + 1, (long long)json_integer_value(side), SPL_MAP_SIDE_MAX);
@@ -184,6 +187,9 @@ static int check_entry(const struct spl_map_edits *edits, size_t i, struct spl_e
     if (!rc && (info.width != wide || info.height != high))
         rc = spl_fail_field(err, SPL_E_INPUT, "color", "%s: %u x %u pixels; a map of side %u has %u x %u", path,
                             info.width, info.height, high, wide, high);
+    if (!rc && info.bits != 8)
+        rc = spl_fail_field(err, SPL_E_INPUT, "color", "%s: has %u bits a channel; save it with 8, as it was exported",
+                            path, info.bits);
     free(path);
     return rc;
 }
@@ -242,7 +248,7 @@ static void put_over(struct spl_image *picture, const struct spl_image *edited)
             to[t][c] = (uint8_t)((from[t][c] * from[t][3] + to[t][c] * (255 - from[t][3]) + 127) / 255);
 }
 
-int spl_map_edits_apply(const struct spl_map_edits *edits, uint32_t index, const struct spl_map_row *row,
+int spl_map_edits_apply(struct spl_map_edits *edits, uint32_t index, const struct spl_map_row *row,
                         struct spl_image *picture, struct spl_error *err)
 {
     const json_t *entry = NULL;
@@ -265,8 +271,10 @@ int spl_map_edits_apply(const struct spl_map_edits *edits, uint32_t index, const
         rc = spl_fail_field(err, SPL_E_INPUT, "side",
                             "%s: %u x %u pixels; this map has %u x %u: export it anew from these scans and options", path,
                             edited.width, edited.height, picture->width, picture->height);
-    if (!rc)
+    if (!rc) {
         put_over(picture, &edited);
+        edits->taken++;
+    }
     spl_image_finish(&edited);
     free(path);
     return rc;

@@ -49,6 +49,7 @@ void spl_map_export_finish(struct spl_map_export *out);
 struct spl_map_edits {
     const char *folder; // borrowed
     json_t *list;
+    size_t taken; /* maps that took the colours of theirs */
 };
 
 /* Reads maps.json and the headers of its colours, which must have the sizes that it says. Errors name "maps", or a
@@ -57,7 +58,7 @@ int spl_map_edits_init(struct spl_map_edits *edits, const char *folder, struct s
 
 /* Puts the edited colours of map `index` over those of `picture`; a transparent texel leaves them as they are, and so
  * does a list without that map. Refuses a map that another station had. Blocks for reading. */
-int spl_map_edits_apply(const struct spl_map_edits *edits, uint32_t index, const struct spl_map_row *row,
+int spl_map_edits_apply(struct spl_map_edits *edits, uint32_t index, const struct spl_map_row *row,
                         struct spl_image *picture, struct spl_error *err);
 void spl_map_edits_finish(struct spl_map_edits *edits);
 

@@ -15,10 +15,23 @@ struct gathering {
     const struct spl_splats *splats;
     const struct spl_stations *stations;
     uint32_t station;
-    const struct spl_sight *sight; // NULL: the station's own splats alone
+    bool own; /* the station's own splats alone; else what these show, one of which is not NULL */
+    const struct spl_map_sight *map;
+    const struct spl_sight *sight;
     size_t *first; /* by chunk: of its hits; while counting, how many of the chunk before */
     bool counting;
 };
+
+static bool shows(const struct gathering *g, const struct spl_world_splat *splat, const double own[3], double range)
+{
+    double normal[3], cosine;
+    if (!g->map)
+        return spl_sight_sees(g->sight, splat, &cosine, &range);
+    const float *n = splat->splat.normal;
+    spl_station_turn(&g->stations->list[g->station], (double[3]){(double)n[0], (double)n[1], (double)n[2]}, normal);
+    cosine = fmin(fabs(own[0] * normal[0] + own[1] * normal[1] + own[2] * normal[2]) / range, 1);
+    return spl_map_shows(g->map, own, (double)splat->splat.radius, cosine) > 0;
+}
 
 static void gather(void *context, size_t begin, size_t end, unsigned worker)
 {
@@ -29,18 +42,18 @@ static void gather(void *context, size_t begin, size_t end, unsigned worker)
     for (uint32_t c = (uint32_t)begin; c < end; c++) {
         const struct spl_chunk *chunk = &splats->chunks[c];
         const uint16_t *of = g->stations->of + chunk->first_id;
-        bool asked = spl_splats_is_leaf(splats, c) && spl_splats_is_discs(splats, c), any = g->sight;
+        bool asked = spl_splats_is_leaf(splats, c) && spl_splats_is_discs(splats, c), any = !g->own;
         for (uint32_t i = 0; asked && !any && i < chunk->count; i++)
             any = of[i] == g->station;
         uint32_t count = asked && any ? spl_splats_get(splats, c, list) : 0;
         size_t at = g->counting ? 0 : g->first[c];
         for (uint32_t i = 0; i < count; i++) {
-            double cosine, range, own[3];
-            if (g->sight ? !spl_sight_sees(g->sight, &list[i], &cosine, &range) : of[i] != g->station)
+            double range, own[3];
+            if (g->own && of[i] != g->station)
                 continue;
             spl_station_to_own(&g->stations->list[g->station], list[i].position, own);
             range = sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
-            if (!((float)range > 0))
+            if (!((float)range > 0) || (!g->own && !shows(g, &list[i], own, range)))
                 continue;
             if (!g->counting) {
                 struct spl_hit *hit = &g->hits->list[at];
@@ -58,14 +71,19 @@ static void gather(void *context, size_t begin, size_t end, unsigned worker)
 }
 
 int spl_hits_init(struct spl_hits *hits, const struct spl_splats *splats, const struct spl_stations *stations,
-                  uint32_t station, unsigned threads, struct spl_error *err)
+                  uint32_t station, const struct spl_map_sight *map, unsigned threads, struct spl_error *err)
 {
-    struct gathering g = {
-        .hits = hits, .splats = splats, .stations = stations, .station = station, .counting = true};
+    struct gathering g = {.hits = hits,
+                          .splats = splats,
+                          .stations = stations,
+                          .station = station,
+                          .own = stations->scanned,
+                          .map = map,
+                          .counting = true};
     struct spl_sight sight = {0};
     *hits = (struct spl_hits){0};
     int rc = (g.first = spl_alloc(splats->chunk_count + (size_t)1, sizeof *g.first, err)) ? SPL_OK : SPL_E_NOMEM;
-    if (!rc && !stations->scanned) {
+    if (!rc && !g.own && !map) {
         rc = spl_sight_init(&sight, &stations->list[station], splats, threads, err);
         g.sight = &sight;
     }
@@ -111,7 +129,7 @@ static void place(void *context, size_t begin, size_t end, unsigned worker)
         const double direction[3] = {(double)d[0], (double)d[1], (double)d[2]};
         double at[2];
         spl_polar_place(p->side, p->apron, direction, at);
-        int chart = at[0] < left[1] ? 0 : at[0] < left[2] ? 1 : 2; /* a place at a chart's very end is in its last texel */
+        int chart = at[0] < left[1] ? 0 : at[0] < left[2] ? 1 : 2; /* a place at a chart's end is in its last texel */
         double last = left[chart] + p->apron + (chart == 2 ? 4 : 1) * p->side - 1.0;
         uint32_t x = (uint32_t)fmin(at[0], last), y = (uint32_t)fmin(at[1], p->apron + p->side - 1.0);
         p->hits->texel[i] = y * spl_polar_width(p->side, p->apron) + x;
@@ -147,7 +165,8 @@ static void compare(void *context, size_t begin, size_t end, unsigned worker)
             double square = 0;
             for (int a = 0; a < 3; a++)
                 square += (list[k].position[a] - list[0].position[a]) * (list[k].position[a] - list[0].position[a]);
-            if (of[k] != of[0] || square >= least || square > 4 * (double)list[0].splat.radius * (double)list[0].splat.radius)
+            double radius = (double)list[0].splat.radius;
+            if (of[k] != of[0] || square >= least || square > 4 * radius * radius)
                 continue;
             least = square;
             nearest = k;

@@ -2,7 +2,7 @@
 #ifndef SPL_PACK_MAPS_HITS_H
 #define SPL_PACK_MAPS_HITS_H
 
-#include "pack/maps/stations.h"
+#include "pack/maps/sees.h"
 
 struct spl_hit {
     float direction[3]; /* unit, the station's frame */
@@ -17,9 +17,10 @@ struct spl_hits {
 };
 
 /* Of a station that scanned its splats, those that are its own; of one that is only said to have stood there, all that
- * it sees. In the order of splats. Parallel; blocks. On failure nothing is held. */
+ * it sees: as its `map` has it, or before there is one (NULL) as a z-buffer has. In the order of splats. Parallel;
+ * blocks. On failure nothing is held. */
 int spl_hits_init(struct spl_hits *hits, const struct spl_splats *splats, const struct spl_stations *stations,
-                  uint32_t station, unsigned threads, struct spl_error *err);
+                  uint32_t station, const struct spl_map_sight *map, unsigned threads, struct spl_error *err);
 void spl_hits_finish(struct spl_hits *hits);
 
 /* Finds the texel of each hit in an atlas (geom/polar.h). Parallel. */

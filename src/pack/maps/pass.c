@@ -1,10 +1,8 @@
-/* The pass that makes maps. First every station's ranges, from its splats: they say what each chunk is seen by, and stay
- * in memory, 2 bytes a texel. Then the file is written anew, and as it asks for them the stations' colours are made one
- * after the other, from pictures that are read one at a time. Memory: 16 bytes a texel of one map, a picture, 36 bytes
- * a splat of one station. The caller's thread. */
+/* The pass that makes maps. First every station's ranges, from its splats, also where panels are drawn in their place:
+ * they say what each chunk is seen by, and stay in memory, 2 bytes a texel. Then the file is written anew, and as it
+ * asks for them the stations' colours are made one after the other, from pictures that are read one at a time. Memory:
+ * 16 bytes a texel of one map, a picture, 36 bytes a splat of one station. The caller's thread. */
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,44 +10,16 @@
 #include "base/memory.h"
 #include "dataset/rewrite.h"
 #include "geom/unit.h"
-#include "pack/maps/agree.h"
 #include "pack/maps/colors.h"
-#include "pack/maps/edit.h"
-#include "pack/maps/even.h"
-#include "pack/maps/maps.h"
-#include "pack/maps/pictures.h"
-#include "pack/maps/sees.h"
+#include "pack/maps/pass.h"
 #include "pack/prune.h"
 #include "pack/texture/photo_image.h"
 
 /* Bytes that colours and ranges of a map made from pictures may take together, a texel of colour. */
 static const double bytes_a_texel = 0.75;
 
-struct pass {
-    const struct spl_pack_options *pack;
-    const struct spl_map_options *options; /* the pack's */
-    const struct spl_view_list *views;
-    struct spl_stage *stage;
-    struct spl_map_report *report;
-    struct spl_splats splats;
-    struct spl_stations stations;
-    double slack;             /* of all rows */
-    double metre;             /* metres a unit; 1 where nobody knows */
-    uint32_t count;           /* of maps: */
-    uint32_t *station_of;     /* by row */
-    uint16_t *row_of;         /* by station: row + 1; 0 = it has no map */
-    struct spl_map_row *rows;
-    uint32_t **codes;         /* by row: the words of its ranges */
-    struct spl_chunk_stations *chunks;
-    float *seen;     /* by chunk: what share of it some map shows */
-    float (*factors)[3]; /* by row: of colours in linear light, which even exposures out */
-    bool *leaf;      /* by node: as of struct spl_rewrite; NULL = nothing is pruned */
-    uint32_t *words; /* of the map that is written */
-    struct spl_map_edits edits;
-    struct spl_map_export out;
-    double errors;   /* of blocks, squared, summed over channels; of so many texels */
-    double texels;
-};
+/* Coarser ranges mistake what is before a wall for the wall; 52 kB. */
+static const double least_range_side = 64;
 
 /* The largest side of ranges that leaves a map within its bytes. */
 static uint32_t find_range_side(const struct spl_map_row *row)
@@ -59,11 +29,11 @@ static uint32_t find_range_side(const struct spl_map_row *row)
         words += (double)spl_map_level_words(row, l);
     double left = bytes_a_texel * 6 * row->side * row->side - 4 * words; /* 2 * 6 (s + 1) (s + 2) */
     double side = left > 24 ? floor(sqrt(left / 12) - 1.5) : 0;
-    return (uint32_t)fmin(fmax(side, 4), SPL_MAP_RANGE_SIDE_MAX);
+    return (uint32_t)fmin(fmax(side, least_range_side), SPL_MAP_RANGE_SIDE_MAX);
 }
 
 /* A station's row and ranges. Sides of the colours are those of its pictures, else the step of its splats. */
-static int make_ranges(struct pass *p, uint32_t station, struct spl_hits *hits, struct spl_error *err)
+static int make_ranges(struct spl_map_pass *p, uint32_t station, struct spl_hits *hits, struct spl_error *err)
 {
     struct spl_map_row row = {.side = spl_colors_find_side(&p->stations, p->views, station),
                               .levels = SPL_MAP_LEVELS_MAX};
@@ -100,7 +70,7 @@ static int make_ranges(struct pass *p, uint32_t station, struct spl_hits *hits, 
     return SPL_OK;
 }
 
-static int make_all_ranges(struct pass *p, struct spl_error *err)
+static int make_all_ranges(struct spl_map_pass *p, struct spl_error *err)
 {
     uint32_t count = p->stations.count;
     p->rows = spl_alloc(count, sizeof *p->rows, err);
@@ -114,10 +84,12 @@ static int make_all_ranges(struct pass *p, struct spl_error *err)
     spl_stage_begin(p->stage, "ranges of stations", NULL, count);
     for (uint32_t s = 0; s < count && !rc; s++) {
         struct spl_hits hits;
-        if ((rc = spl_hits_init(&hits, &p->splats, &p->stations, s, p->stage->threads, err)))
+        if ((rc = spl_hits_init(&hits, &p->splats, &p->stations, s, NULL, p->stage->threads, err)))
             break;
         if (hits.count)
             rc = make_ranges(p, s, &hits, err);
+        if (!rc)
+            spl_map_check_sight(p, s, hits.count, hits.count ? (double)p->rows[p->count - 1].near : 0);
         spl_hits_finish(&hits);
         spl_stage_add(p->stage, 1, 0);
         if (!rc)
@@ -130,33 +102,39 @@ static int make_all_ranges(struct pass *p, struct spl_error *err)
     return rc;
 }
 
-static int find_chunks(struct pass *p, struct spl_error *err)
+static int find_chunks(struct spl_map_pass *p, struct spl_error *err)
 {
     struct spl_map_sight *maps = spl_alloc(p->count, sizeof *maps, err);
-    p->chunks = spl_alloc(p->splats.chunk_count, sizeof *p->chunks, err);
-    p->seen = spl_alloc(p->splats.chunk_count, sizeof *p->seen, err);
+    struct spl_stations drawn = p->stations;
+    uint16_t *of = NULL;
+    p->chunks = spl_alloc(p->drawn.chunk_count, sizeof *p->chunks, err);
+    p->seen = spl_alloc(p->drawn.chunk_count, sizeof *p->seen, err);
     int rc = maps && p->chunks && p->seen ? SPL_OK : SPL_E_NOMEM;
+    if (!rc && p->drawn.dataset != p->splats.dataset) {
+        rc = spl_stations_place(&p->stations, &p->splats, &p->drawn, p->stage, &of, err);
+        drawn.of = of;
+    }
     for (uint32_t row = 0; !rc && row < p->count; row++)
         maps[row] = (struct spl_map_sight){&p->rows[row], p->codes[row]};
     if (!rc)
-        rc = spl_map_find_chunks(&p->splats, &p->stations, p->row_of, maps, p->stage, p->chunks, p->seen, err);
+        rc = spl_map_find_chunks(&p->drawn, &drawn, p->row_of, maps, p->stage, p->chunks, p->seen, err);
     free(maps);
+    free(of);
     return rc;
 }
 
-static int prune(struct pass *p, const struct spl_dataset *dataset, uint32_t factor, struct spl_error *err)
+static int prune(struct spl_map_pass *p, const struct spl_dataset *dataset, uint32_t factor, struct spl_error *err)
 {
     const struct spl_prune_options how = {.factor = factor, .seen = p->seen};
     struct spl_prune_report report;
     if (factor <= 1)
         return SPL_OK;
-    if (!(p->leaf = spl_alloc(p->splats.node_count, sizeof *p->leaf, err)))
+    if (!(p->leaf = spl_alloc(p->drawn.node_count, sizeof *p->leaf, err)))
         return SPL_E_NOMEM;
     return spl_prune_plan(dataset, &how, p->leaf, &report, p->stage, err);
 }
 
-/* A picture that cannot be used: handed out and left out, or the end. */
-static int refuse(struct pass *p, int rc, const struct spl_error *why, struct spl_error *err)
+int spl_map_pass_refuse(struct spl_map_pass *p, int rc, const struct spl_error *why, struct spl_error *err)
 {
     if (rc == SPL_OK)
         return rc;
@@ -169,14 +147,7 @@ static int refuse(struct pass *p, int rc, const struct spl_error *why, struct sp
     return SPL_OK;
 }
 
-/* A panorama's faces are views; the first of them stands for all. */
-static bool is_same_panorama(const struct spl_named_view *a, const struct spl_named_view *b)
-{
-    return a && a->inner && a->inner->is_panorama && b->inner && b->inner->is_panorama &&
-           a->inner->at == b->inner->at && !strcmp(a->inner->path, b->inner->path) && a->panorama == b->panorama;
-}
-
-static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station,
+static int add_picture(struct spl_map_pass *p, struct spl_atlas *atlas, uint32_t station,
                        const struct spl_inverse_ranges *inverse, const struct spl_named_view *view,
                        struct spl_error *err)
 {
@@ -199,8 +170,8 @@ static int add_picture(struct pass *p, struct spl_atlas *atlas, uint32_t station
     return rc;
 }
 
-/* The colours of a row's station at `side`, without holes. */
-static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_atlas *atlas, struct spl_error *err)
+int spl_map_pass_make_colors(struct spl_map_pass *p, uint32_t row, uint32_t side, struct spl_atlas *atlas,
+                             struct spl_error *err)
 {
     static const float even[3] = {1, 1, 1};
     uint32_t station = p->station_of[row];
@@ -216,29 +187,31 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
         ranges.texels[t] = (float)spl_map_range_of_code(&p->rows[row], spl_map_get_code(p->codes[row], t));
     if (!rc)
         rc = spl_inverse_ranges_init(&inverse, &ranges, err);
-    if (!rc)
-        rc = spl_hits_init(&hits, &p->splats, &p->stations, station, p->stage->threads, err);
-    if (!rc)
-        spl_colors_add_hits(atlas, &hits, &inverse, p->factors ? p->factors[row] : even, p->stage->threads);
-    spl_hits_finish(&hits);
     for (size_t v = 0; v < p->views->count && !rc; v++) {
         struct spl_error why = {0};
         if (p->stations.of_view[v] != station || !p->views->views[v].photograph)
             continue;
-        if (is_same_panorama(last, &p->views->views[v])) {
+        if (spl_map_is_same_picture(last, &p->views->views[v])) {
             spl_stage_add(p->stage, 1, 0);
             continue;
         }
         last = &p->views->views[v];
         if ((rc = add_picture(p, atlas, station, &inverse, last, &why))) {
             for (size_t face = v; face < p->views->count; face++)
-                if (face == v || is_same_panorama(last, &p->views->views[face]))
+                if (face == v || spl_map_is_same_picture(last, &p->views->views[face]))
                     p->stations.of_view[face] = UINT32_MAX;
-            rc = refuse(p, rc, &why, err);
+            rc = spl_map_pass_refuse(p, rc, &why, err);
         }
         spl_stage_add(p->stage, 1, 0);
         if (!rc)
             rc = spl_stage_check(p->stage, err);
+    }
+    if (!rc && !spl_atlas_is_full(atlas)) {
+        const struct spl_map_sight map = {&p->rows[row], p->codes[row]};
+        rc = spl_hits_init(&hits, &p->splats, &p->stations, station, &map, p->stage->threads, err);
+        if (!rc)
+            spl_colors_add_hits(atlas, &hits, &inverse, p->factors ? p->factors[row] : even, p->stage->threads);
+        spl_hits_finish(&hits);
     }
     if (!rc)
         rc = spl_atlas_fill(atlas, p->stage->threads, err);
@@ -247,111 +220,15 @@ static int make_colors(struct pass *p, uint32_t row, uint32_t side, struct spl_a
     return rc;
 }
 
-/* The station's first picture; NULL without. */
-static const struct spl_named_view *find_picture(const struct pass *p, uint32_t station)
-{
-    for (size_t v = 0; v < p->views->count; v++)
-        if (p->stations.of_view[v] == station && p->views->views[v].photograph)
-            return &p->views->views[v];
-    return NULL;
-}
-
-static void warn(const struct pass *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static void warn(const struct pass *p, const char *format, ...)
-{
-    char text[1024];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    if (p->pack->warn)
-        p->pack->warn(p->pack->progress_context, text);
-}
-
-/* What pictures that do not fit their station are told, or warned of; 0, or below it where they are not to be used. */
-static int judge(struct pass *p, const char *name, const struct spl_agreement *a, struct spl_error *why)
-{
-    char cause[160] = "is its pose another's, or of another system of coordinates?";
-    double length = sqrt(a->shift[0] * a->shift[0] + a->shift[1] * a->shift[1] + a->shift[2] * a->shift[2]);
-    bool other = a->other > 0.5 && a->other > a->correlation + 0.25;
-    if (a->shared < SPL_AGREEMENT_LEAST || isnan(a->correlation))
-        return SPL_OK;
-    if (other)
-        snprintf(cause, sizeof cause, "%s%s%.0f degrees around the vertical it would be %.2f",
-                 a->mirrored ? "mirrored" : "", a->mirrored ? " and turned by " : "turned by ", a->turned, a->other);
-    if (a->correlation < 0.25 || other)
-        return spl_fail_field(why, SPL_E_INPUT, "panoramas",
-                              "%s: its colours are not those of the splats that it shows (correlation %.2f of %zu): %s",
-                              name, a->correlation, a->shared, cause);
-    if (a->correlation < 0.6) {
-        warn(p, "%s: its colours hardly are those of the splats that it shows (correlation %.2f of %zu)", name,
-             a->correlation, a->shared);
-        return SPL_OK;
-    }
-    if (length * p->metre > 0.007 && length > 4 * a->shift_error)
-        warn(p, "%s: its edges fit the splats' where it stands %.1f mm (+- %.1f) from where its pose says, towards %.4f, "
-                "%.4f, %.4f",
-             name, 1000 * length * p->metre, 2000 * a->shift_error * p->metre, a->shift[0], a->shift[1], a->shift[2]);
-    if (a->turn > 0.0015 && a->turn > 4 * a->turn_error)
-        warn(p, "%s: its edges fit the splats' where it is turned by %.2f degrees (+- %.2f)", name, a->turn * 180 / M_PI,
-             2 * a->turn_error * 180 / M_PI);
-    return SPL_OK;
-}
-
-/* Each station's pictures against its splats, at a side that is enough for it. */
-static int check_pictures(struct pass *p, struct spl_error *err)
-{
-    enum { side_enough = 512, samples_most = 300000, compared_most = 40000 };
-    struct spl_samples samples, compared = {0};
-    struct spl_sightings sightings = {0};
-    int rc = spl_samples_init(&samples, &p->splats, &p->stations, samples_most, err);
-    if (!rc)
-        rc = spl_samples_init(&compared, &p->splats, &p->stations, compared_most, err);
-    spl_stage_begin(p->stage, "checking maps", NULL, p->count);
-    for (uint32_t row = 0; !rc && row < p->count; row++) {
-        uint32_t station = p->station_of[row], side = p->rows[row].side;
-        const struct spl_named_view *picture = find_picture(p, station);
-        const struct spl_map_sight map = {&p->rows[row], p->codes[row]};
-        struct spl_atlas atlas = {0};
-        struct spl_agreement agreement = {0};
-        struct spl_error why = {0};
-        if (!picture)
-            continue;
-        rc = make_colors(p, row, side < side_enough ? side : side_enough, &atlas, err);
-        if (!rc && samples.colored)
-            rc = spl_agreement_find(&agreement, &atlas, &p->stations.list[station], station, p->stations.scanned, &map,
-                                    &samples, err);
-        int fault = rc ? SPL_OK : judge(p, picture->photograph, &agreement, &why);
-        if (!rc && !fault)
-            rc = spl_sightings_add(&sightings, &atlas, (uint16_t)row, &p->stations.list[station], &map, &compared, err);
-        spl_atlas_finish(&atlas);
-        for (size_t v = 0; fault && v < p->views->count; v++)
-            if (p->stations.of_view[v] == station)
-                p->stations.of_view[v] = UINT32_MAX;
-        if (fault)
-            rc = refuse(p, fault, &why, err);
-        spl_stage_add(p->stage, 1, 0);
-    }
-    spl_stage_end(p->stage);
-    if (!rc && (p->factors = spl_alloc(p->count, sizeof *p->factors, err)))
-        rc = spl_sightings_even_out(&sightings, &compared, p->count, p->factors, err);
-    else if (!rc)
-        rc = SPL_E_NOMEM;
-    spl_sightings_finish(&sightings);
-    spl_samples_finish(&compared);
-    spl_samples_finish(&samples);
-    return rc;
-}
-
 /* The words of a map: ranges, then each level of the colours, which is halved from the one before. */
 static int get_map(void *context, uint32_t index, const uint32_t **words, struct spl_error *err)
 {
-    struct pass *p = context;
+    struct spl_map_pass *p = context;
     const struct spl_map_row *row = &p->rows[index];
     struct spl_atlas atlas = {0};
     free(p->words);
     p->words = spl_alloc_raw(spl_map_words(row), sizeof *p->words, err);
-    int rc = p->words ? make_colors(p, index, row->side, &atlas, err) : SPL_E_NOMEM;
+    int rc = p->words ? spl_map_pass_make_colors(p, index, row->side, &atlas, err) : SPL_E_NOMEM;
     if (!rc)
         spl_atlas_scale(&atlas, p->factors[index]);
     if (!rc)
@@ -371,12 +248,6 @@ static int get_map(void *context, uint32_t index, const uint32_t **words, struct
     spl_stage_add(p->stage, 1, 0);
     *words = p->words;
     return rc;
-}
-
-void spl_maps_plan(struct spl_stage *stage, uint32_t pictures, uint64_t points)
-{
-    spl_stage_plan(stage, "ranges of stations", 0.5e-6 * (double)points, 0);
-    spl_stage_plan(stage, "maps", 0.5 * pictures + 0.5e-6 * (double)points, 0);
 }
 
 struct loading {
@@ -419,46 +290,38 @@ int spl_maps_load(const struct spl_map_options *options, const struct spl_map_so
                                                 .refuse = options->refused ? refuse_picture : NULL,
                                                 .context = &loading};
     int rc = how.count ? spl_map_pictures_load(&how, list, err) : SPL_OK;
-    report->pictures = (uint32_t)list->count;
+    report->pictures = report->refused;
+    for (size_t v = 0; v < list->count; v++)
+        report->pictures += !(v && spl_map_is_same_picture(&list->views[v - 1], &list->views[v]));
     return rc;
 }
 
-static void name_nowhere(void *context, const struct spl_named_view *view, double metres)
+static void name_nowhere(void *context, const struct spl_named_view *view, double units)
 {
-    struct pass *p = context;
+    struct spl_map_pass *p = context;
     struct spl_error why = {0};
-    spl_fail(&why, SPL_E_INPUT, "%s: stands %.3g away from the nearest station, beyond half a metre", view->name,
-             metres);
+    spl_fail(&why, SPL_E_INPUT, "%s: stands %.3g m away from the nearest station, beyond half a metre",
+             view->photograph ? view->photograph : view->name, units * p->metre);
     p->report->refused++;
     if (p->options->refused)
         p->options->refused(p->options->context, &why);
 }
 
-/* Pictures that somebody named, of which none stands where the scan has a station, are those of another scan. */
-static int check_any(const struct pass *p, struct spl_error *err)
-{
-    if (!p->views->count || p->report->refused < p->report->pictures || p->options->find)
-        return SPL_OK;
-    return spl_fail_field(err, SPL_E_INPUT, "panoramas",
-                          "%s: none of its %u pictures stands within half a metre of a station of the scan: are they of "
-                          "this scan, and their poses in its coordinates? --panoramas scan takes the scan's own colours",
-                          p->options->panoramas, p->report->pictures);
-}
-
 int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view_list *views,
-                   const struct spl_dataset *dataset, struct spl_stage *stage, struct spl_map_report *report,
-                   struct spl_error *err)
+                   const struct spl_dataset *dataset, const struct spl_dataset *points, struct spl_stage *stage,
+                   struct spl_map_report *report, struct spl_error *err)
 {
-    struct pass p = {.pack = options, .options = options->maps, .views = views, .stage = stage, .report = report};
+    struct spl_map_pass p = {
+        .pack = options, .options = options->maps, .views = views, .stage = stage, .report = report};
     uint64_t begin_ns = spl_now_ns();
     json_t *about = NULL;
     if (!spl_unit_parse(spl_dataset_get_info(dataset)->unit, &p.metre) || !(p.metre > 0))
         p.metre = 1;
     int rc = open_files(options->maps, &p.edits, &p.out, err);
-    if (rc || (rc = spl_splats_init(&p.splats, dataset, err)) ||
+    if (rc || (rc = spl_splats_init(&p.drawn, dataset, err)) || (rc = spl_splats_init(&p.splats, points, err)) ||
         (rc = spl_stations_init(&p.stations, &p.splats, views, stage, name_nowhere, &p, err)) ||
-        (rc = check_any(&p, err)) || (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
-        (rc = check_pictures(&p, err)) || (rc = prune(&p, dataset, options->prune, err)))
+        (rc = spl_map_check_any(&p, err)) || (rc = make_all_ranges(&p, err)) || (rc = find_chunks(&p, err)) ||
+        (rc = spl_map_check_pictures(&p, err)) || (rc = prune(&p, dataset, options->prune, err)))
         goto done;
     about = json_pack("{s:i}", "pictures", (int)(report->pictures - report->refused));
     const struct spl_rewrite rewrite = {.from = dataset,
@@ -470,12 +333,17 @@ int spl_maps_apply(const struct spl_pack_options *options, const struct spl_view
                                         .leaf = p.leaf,
                                         .leaf_radius = spl_prune_leaf_radius(dataset),
                                         .about_maps = about};
-    spl_stage_begin(stage, "maps", NULL, p.count + views->count);
+    spl_stage_begin(stage, "maps", NULL, p.count + spl_map_count_placed(&p));
     rc = spl_dataset_rewrite(&rewrite, options->output, err);
     spl_stage_end(stage);
     if (!rc && p.out.folder)
         rc = spl_map_export_commit(&p.out, err);
     report->stations = p.count;
+    report->edits = (uint32_t)json_array_size(p.edits.list);
+    report->edited = (uint32_t)p.edits.taken;
+    if (!rc && report->edited < report->edits)
+        spl_map_warn(&p, "--maps %s: %u of its %u maps are of no station of this dataset, and were not taken",
+                     p.edits.folder, report->edits - report->edited, report->edits);
     for (uint32_t row = 0; row < p.count; row++) {
         report->side = p.rows[row].side > report->side ? p.rows[row].side : report->side;
         report->texels += 6ull * p.rows[row].side * p.rows[row].side;
@@ -500,5 +368,6 @@ done:
     spl_map_edits_finish(&p.edits);
     spl_stations_finish(&p.stations);
     spl_splats_finish(&p.splats);
+    spl_splats_finish(&p.drawn);
     return rc;
 }

@@ -140,3 +140,9 @@ int spl_map_pictures_load(const struct spl_map_picture_options *options, struct 
         spl_view_list_finish(list);
     return rc;
 }
+
+bool spl_map_is_same_picture(const struct spl_named_view *a, const struct spl_named_view *b)
+{
+    return a && a->inner && a->inner->is_panorama && b && b->inner && b->inner->is_panorama &&
+           a->inner->at == b->inner->at && !strcmp(a->inner->path, b->inner->path) && a->panorama == b->panorama;
+}

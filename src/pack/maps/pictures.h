@@ -30,4 +30,7 @@ struct spl_map_picture_options {
 int spl_map_pictures_load(const struct spl_map_picture_options *options, struct spl_view_list *list,
                           struct spl_error *err);
 
+/* Whether two views are faces of one panorama, of which the first stands for all. Either may be NULL. */
+bool spl_map_is_same_picture(const struct spl_named_view *a, const struct spl_named_view *b);
+
 #endif

@@ -1,7 +1,8 @@
 /* Hits to ranges. A texel's is the mean of its hits within 5 % of the nearest. Holes of up to three texels, and those
  * that the discs beside them reach over, lie between scan lines and are closed. What then has no hit is open: nothing
  * came back from there, or the scanner never looked. Below the lowest hit of each degree of azimuth, and wherever one
- * looks down at feet, stands its tripod; above the highest there is sky, unless the scan ends there all around, or goes around only in part.
+ * looks down at feet, stands its tripod; above the highest there is sky, unless the scan ends there all around, or
+ * goes around only in part.
  *
  * Works on an atlas whose aprons are wide enough to look for neighbours in; sums go by the order of hits. The caller's
  * thread; hits are placed in parallel. */

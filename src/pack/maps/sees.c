@@ -1,14 +1,17 @@
-/* Which stations see a chunk, and whether its own trims it. A chunk's own station is that of most of its splats: the
- * first; the next three are those that see its splats best, by cosine over distance. It trims where a disc, drawn up to
- * twice as large as levels are scaled, reaches a place that is dropped: splats of other stations among its own too, for at
- * silhouettes most chunks have some, and fringes cost more than what is gone with them.
+/* Which stations see a chunk, and whether its own trims it. A chunk's own station is that of most of its splats, or
+ * panels: the first; the next three are those that see its splats best, by cosine over distance. It trims where a disc,
+ * drawn up to twice as large as levels are scaled, or the disc of a panel's outer cell reaches a place that is dropped:
+ * splats of other stations among its own too, for at silhouettes most chunks have some, and fringes cost more than what
+ * is gone with them.
  *
  * Each chunk is one thread's, so threads change nothing. */
 #include "pack/maps/sees.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/parallel.h"
+#include "dataset/panels.h"
 #include "geom/polar.h"
 #include "geom/tangent.h"
 
@@ -102,18 +105,61 @@ static uint16_t find_own(const struct pass *p, const uint16_t *of, uint32_t coun
     return own;
 }
 
-static bool reaches_through(const struct spl_map_sight *map, const struct spl_station *station,
-                            const struct spl_world_splat *s, double cosine)
+/* Does a ring of `radius` around a splat reach a place that is dropped? */
+static bool ring_reaches_through(const struct spl_map_sight *map, const struct spl_station *station,
+                                 const struct spl_world_splat *s, double radius, double cosine)
 {
     float u[3], v[3];
     spl_tangent_frame(s->splat.normal, u, v);
-    for (int k = 0; k < 2 * rim; k++) {
-        double radius = (double)s->splat.radius * (k < rim ? 1 : grown), angle = 2 * M_PI * k / rim, p[3], own[3];
+    for (int k = 0; k < rim; k++) {
+        double angle = 2 * M_PI * k / rim, p[3], own[3];
         for (int i = 0; i < 3; i++)
             p[i] = s->position[i] + radius * (cos(angle) * (double)u[i] + sin(angle) * (double)v[i]);
         spl_station_to_own(station, p, own);
         if (spl_map_drops(map, own, (double)s->splat.radius, cosine))
             return true;
+    }
+    return false;
+}
+
+static bool reaches_through(const struct spl_map_sight *map, const struct spl_station *station,
+                            const struct spl_world_splat *s, double cosine)
+{
+    return ring_reaches_through(map, station, s, (double)s->splat.radius, cosine) ||
+           ring_reaches_through(map, station, s, grown * (double)s->splat.radius, cosine);
+}
+
+/* Of panels: their cells are drawn as large as they are, and those that others are all around reach beyond nothing. */
+static bool panels_reach_through(const struct pass *p, uint32_t c, const struct spl_station *station,
+                                 const struct spl_map_sight *map)
+{
+    enum { side = SPL_PANEL_SIDE };
+    const struct spl_chunk *header = &p->splats->chunks[c];
+    const struct spl_node *node = &p->splats->nodes[p->splats->node_of[c]];
+    struct spl_panel_frame frame;
+    size_t bytes;
+    const uint32_t *page = spl_dataset_get_page(p->splats->dataset, node->page, &bytes);
+    spl_panels_get_frame(header, &frame);
+    for (uint32_t i = 0; i < header->count; i++) {
+        struct spl_panel panel;
+        struct spl_relief relief;
+        spl_panels_decode(header, page, i, &panel);
+        spl_panels_get_relief(header, page, i, &relief);
+        for (uint32_t cell = 0; cell < side * side; cell++) {
+            uint32_t x = cell % side, y = cell / side, row = panel.cells[y];
+            bool inner = x && y && x + 1 < side && y + 1 < side &&
+                         (row >> (x - 1) & panel.cells[y - 1] >> x & panel.cells[y + 1] >> x & row >> (x + 1) & 1);
+            if (!(row >> x & 1) || inner)
+                continue;
+            struct spl_world_splat s = {.splat.radius = header->radius_min};
+            double range;
+            float *at = s.splat.position;
+            spl_panels_place(&frame, &panel, &relief, (float)x + 0.5f, (float)y + 0.5f, at, s.splat.normal);
+            for (int a = 0; a < 3; a++)
+                s.position[a] = node->origin[a] + (double)at[a];
+            if (ring_reaches_through(map, station, &s, (double)s.splat.radius, cosine_of(station, &s, &range)))
+                return true;
+        }
     }
     return false;
 }
@@ -147,9 +193,8 @@ static void judge_chunk(const struct pass *p, uint32_t c)
     struct spl_world_splat list[SPL_CHUNK_SPLATS];
     struct spl_chunk_stations *out = &p->out[c];
     const uint16_t *of = p->stations->of + p->splats->chunks[c].first_id;
-    uint32_t count = spl_splats_get(p->splats, c, list), step = (count + asked - 1) / asked, used = 0;
-    bool discs = spl_splats_is_discs(p->splats, c);
-    uint16_t own = discs ? find_own(p, of, count) : 0, rows[SPL_CHUNK_STATIONS] = {0};
+    uint32_t count = spl_stations_get_places(p->splats, c, list), step = (count + asked - 1) / asked, used = 0;
+    uint16_t own = spl_splats_is_lines(p->splats, c) ? 0 : find_own(p, of, count), rows[SPL_CHUNK_STATIONS] = {0};
     double best[SPL_CHUNK_STATIONS] = {0}, extent = 0, shown[asked] = {0}, all = 0;
     const int last = SPL_CHUNK_STATIONS - 1;
     *out = (struct spl_chunk_stations){0};
@@ -165,7 +210,8 @@ static void judge_chunk(const struct pass *p, uint32_t c)
         if (!row)
             continue;
         if (row == own) {
-            bool trims = find_trims(station, &p->maps[row - 1], list, count);
+            bool trims = spl_splats_is_discs(p->splats, c) ? find_trims(station, &p->maps[row - 1], list, count)
+                                                           : panels_reach_through(p, c, station, &p->maps[row - 1]);
             out->seen_by[used++] = (uint16_t)(own | (trims ? SPL_STATION_TRIMS : 0));
         }
         cosine_of(station, &list[0], &range);

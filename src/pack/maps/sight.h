@@ -6,9 +6,12 @@
 
 #include "pack/maps/stations.h"
 
+enum { SPL_SIGHT_LEVELS = 8 };
+
 struct spl_sight {
     const struct spl_station *station; // borrowed
-    _Atomic uint32_t *nearest;         /* bits of the least range in each texel, which order as ranges do; owned */
+    /* By level, each half as fine: bits of the least range in each texel, which order as ranges do. The first owned */
+    _Atomic uint32_t *nearest[SPL_SIGHT_LEVELS];
 };
 
 /* Draws the leaves' discs, parallel. SPL_E_NOMEM; nothing is held then. */

@@ -12,14 +12,17 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "dataset/map.h"
+#include "dataset/panels.h"
 #include "geom/unit.h"
+#include "pack/maps/pictures.h"
 #include "pack/maps/sight.h"
 
 static const double tripod_m = 0.5, hair_m = 1e-3;
 
 struct pass {
-    const struct spl_splats *splats;
-    struct spl_stations *stations;
+    const struct spl_splats *splats; /* that are placed */
+    const struct spl_stations *stations;
+    uint16_t *of; /* by their ids */
     struct spl_stage *stage;
     const struct spl_stream *scan;
     uint32_t scan_index;
@@ -136,11 +139,10 @@ static int take_eyes(struct spl_stations *stations, const struct spl_view_list *
     return rc;
 }
 
-static int place_views(struct pass *p, const struct spl_view_list *views, double metre,
-                       void (*nowhere)(void *context, const struct spl_named_view *view, double metres), void *context,
+static int place_views(struct spl_stations *stations, const struct spl_view_list *views, double metre,
+                       void (*nowhere)(void *context, const struct spl_named_view *view, double units), void *context,
                        struct spl_error *err)
 {
-    struct spl_stations *stations = p->stations;
     if (!(stations->of_view = spl_alloc_raw(views->count, sizeof *stations->of_view, err)))
         return SPL_E_NOMEM;
     for (size_t v = 0; v < views->count; v++) {
@@ -155,7 +157,7 @@ static int place_views(struct pass *p, const struct spl_view_list *views, double
         if (nearest <= tripod_m * metre)
             continue;
         stations->of_view[v] = UINT32_MAX;
-        if (nowhere)
+        if (nowhere && !(v && spl_map_is_same_picture(&views->views[v - 1], &views->views[v])))
             nowhere(context, &views->views[v], nearest);
     }
     return SPL_OK;
@@ -168,12 +170,12 @@ static void read_scans(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     for (uint32_t c = (uint32_t)begin; c < end; c++) {
         const struct spl_chunk *chunk = &splats->chunks[c];
-        uint16_t *of = p->stations->of + chunk->first_id;
+        uint16_t *of = p->of + chunk->first_id;
         size_t bytes;
         const uint32_t *words = spl_dataset_get_page(splats->dataset, splats->nodes[splats->node_of[c]].page, &bytes);
         for (uint32_t i = 0; i < chunk->count; i++)
             of[i] = p->scan ? SPL_NOT_A_STATION : 0;
-        if (!p->scan || !spl_splats_is_discs(splats, c))
+        if (!p->scan || spl_splats_is_lines(splats, c))
             continue;
         words += chunk->geometry_word + spl_chunk_words(chunk) +
                  spl_dataset_get_stream_words(splats->dataset, p->scan_index, c);
@@ -192,28 +194,29 @@ static void judge_sight(void *context, size_t begin, size_t end, unsigned worker
     struct spl_world_splat splats[SPL_CHUNK_SPLATS];
     for (uint32_t c = (uint32_t)begin; c < end; c++) {
         uint64_t id = p->splats->chunks[c].first_id;
-        uint32_t count = spl_splats_is_discs(p->splats, c) ? spl_splats_get(p->splats, c, splats) : 0;
+        uint32_t count = spl_splats_is_lines(p->splats, c) ? 0 : spl_stations_get_places(p->splats, c, splats);
         for (uint32_t i = 0; i < count; i++, id++) {
             double cosine, range;
             if (!spl_sight_sees(p->sight, &splats[i], &cosine, &range) || (float)(cosine / range) <= p->best[id])
                 continue;
             p->best[id] = (float)(cosine / range);
-            p->stations->of[id] = (uint16_t)p->station;
+            p->of[id] = (uint16_t)p->station;
         }
         spl_stage_add(p->stage, 1, worker);
     }
 }
 
-static int judge_all(struct pass *p, struct spl_error *err)
+/* By the z-buffers of `seen`. */
+static int judge_all(struct pass *p, const struct spl_splats *seen, struct spl_error *err)
 {
-    struct spl_stations *stations = p->stations;
+    const struct spl_stations *stations = p->stations;
     int rc = (p->best = spl_alloc(p->splats->count, sizeof *p->best, err)) ? SPL_OK : SPL_E_NOMEM;
     if (!rc)
-        memset(stations->of, 0xff, p->splats->count * sizeof *stations->of);
+        memset(p->of, 0xff, p->splats->count * sizeof *p->of);
     spl_stage_begin(p->stage, "stations", NULL, (uint64_t)stations->count * p->splats->chunk_count);
     for (p->station = 0; !rc && p->station < stations->count; p->station++) {
         struct spl_sight sight;
-        if ((rc = spl_sight_init(&sight, &stations->list[p->station], p->splats, p->stage->threads, err)))
+        if ((rc = spl_sight_init(&sight, &stations->list[p->station], seen, p->stage->threads, err)))
             break;
         p->sight = &sight;
         spl_parallel_for(p->stage->threads, p->splats->chunk_count, 16, judge_sight, p);
@@ -225,22 +228,80 @@ static int judge_all(struct pass *p, struct spl_error *err)
     return rc;
 }
 
+int spl_stations_place(const struct spl_stations *stations, const struct spl_splats *splats,
+                       const struct spl_splats *placed, struct spl_stage *stage, uint16_t **of, struct spl_error *err)
+{
+    struct pass p = {.splats = placed, .stations = stations, .stage = stage};
+    int scan = spl_dataset_find_stream(placed->dataset, "scan"), rc = SPL_OK;
+    uint32_t streams;
+    if (stations->scanned && scan >= 0) {
+        p.scan = spl_dataset_get_streams(placed->dataset, &streams) + scan;
+        p.scan_index = (uint32_t)scan;
+    }
+    *of = p.of = spl_alloc_raw(placed->count, sizeof **of, err);
+    if (!p.of)
+        return SPL_E_NOMEM;
+    if (stations->scanned)
+        spl_parallel_for(stage->threads, placed->chunk_count, 64, read_scans, &p);
+    else
+        rc = judge_all(&p, splats, err);
+    if (rc) {
+        free(*of);
+        *of = NULL;
+    }
+    return rc;
+}
+
+uint32_t spl_stations_get_places(const struct spl_splats *splats, uint32_t chunk, struct spl_world_splat *out)
+{
+    const struct spl_chunk *header = &splats->chunks[chunk];
+    const struct spl_node *node = &splats->nodes[splats->node_of[chunk]];
+    struct spl_panel_frame frame;
+    size_t bytes;
+    uint32_t count = spl_splats_get(splats, chunk, out);
+    if (!spl_kind_has_panels(spl_chunk_kind(header)))
+        return count;
+    const uint32_t *page = spl_dataset_get_page(splats->dataset, node->page, &bytes);
+    spl_panels_get_frame(header, &frame);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct spl_splat middle = out[i].splat;
+        double least = INFINITY;
+        struct spl_panel panel;
+        struct spl_relief relief;
+        spl_panels_decode(header, page, i, &panel);
+        spl_panels_get_relief(header, page, i, &relief);
+        for (uint32_t cell = 0; cell < SPL_PANEL_SIDE * SPL_PANEL_SIDE; cell++) {
+            uint32_t x = cell % SPL_PANEL_SIDE, y = cell / SPL_PANEL_SIDE;
+            float at[3], normal[3];
+            double square = 0;
+            if (!(panel.cells[y] >> x & 1))
+                continue;
+            spl_panels_place(&frame, &panel, &relief, (float)x + 0.5f, (float)y + 0.5f, at, normal);
+            for (int a = 0; a < 3; a++)
+                square += ((double)at[a] - (double)middle.position[a]) * ((double)at[a] - (double)middle.position[a]);
+            if (!(square < least))
+                continue;
+            least = square;
+            memcpy(out[i].splat.position, at, sizeof at);
+            memcpy(out[i].splat.normal, normal, sizeof normal);
+        }
+        out[i].splat.radius = header->radius_min;
+        for (int a = 0; a < 3; a++)
+            out[i].position[a] = node->origin[a] + (double)out[i].splat.position[a];
+    }
+    return count;
+}
+
 int spl_stations_init(struct spl_stations *stations, const struct spl_splats *splats, const struct spl_view_list *views,
                       struct spl_stage *stage,
-                      void (*nowhere)(void *context, const struct spl_named_view *view, double metres), void *context,
+                      void (*nowhere)(void *context, const struct spl_named_view *view, double units), void *context,
                       struct spl_error *err)
 {
-    struct pass p = {.splats = splats, .stations = stations, .stage = stage};
     const struct spl_dataset_info *info = spl_dataset_get_info(splats->dataset);
     const json_t *known = json_object_get(spl_dataset_get_meta(splats->dataset), "stations");
     int scan = spl_dataset_find_stream(splats->dataset, "scan"), rc;
     double unit_m, metre = spl_unit_parse(info->unit, &unit_m) && unit_m > 0 ? 1 / unit_m : 1;
-    uint32_t streams;
     *stations = (struct spl_stations){.scanned = json_array_size(known) == 1 || (json_array_size(known) && scan >= 0)};
-    if (stations->scanned && scan >= 0) {
-        p.scan = spl_dataset_get_streams(splats->dataset, &streams) + scan;
-        p.scan_index = (uint32_t)scan;
-    }
     rc = json_array_size(known) ? take_scanned(stations, known, err) : take_eyes(stations, views, metre, err);
     if (!rc && !stations->count)
         rc = spl_fail_field(err, SPL_E_INPUT, "panoramas",
@@ -249,13 +310,9 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_splats *sp
                             "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
                             "\"quaternion\": [1, 0, 0, 0]}]}");
     if (!rc)
-        rc = place_views(&p, views, metre, nowhere, context, err);
-    if (!rc && !(stations->of = spl_alloc_raw(splats->count, sizeof *stations->of, err)))
-        rc = SPL_E_NOMEM;
-    if (!rc && stations->scanned)
-        spl_parallel_for(stage->threads, splats->chunk_count, 64, read_scans, &p);
-    else if (!rc)
-        rc = judge_all(&p, err);
+        rc = place_views(stations, views, metre, nowhere, context, err);
+    if (!rc)
+        rc = spl_stations_place(stations, splats, splats, stage, &stations->of, err);
     if (rc)
         spl_stations_finish(stations);
     return rc;

@@ -26,9 +26,18 @@ struct spl_stations {
  * SPL_E_LIMIT with more than a dataset can have. Parallel; blocks. On failure nothing is held. */
 int spl_stations_init(struct spl_stations *stations, const struct spl_splats *splats, const struct spl_view_list *views,
                       struct spl_stage *stage,
-                      void (*nowhere)(void *context, const struct spl_named_view *view, double metres), void *context,
+                      void (*nowhere)(void *context, const struct spl_named_view *view, double units), void *context,
                       struct spl_error *err);
 void spl_stations_finish(struct spl_stations *stations);
+
+/* Whose the splats and panels of `placed` are, a dataset of the same points as `splats`: their ids' stations, owned by
+ * the caller. Of panels those of most of their points, or which sees their middle best. Parallel; blocks. */
+int spl_stations_place(const struct spl_stations *stations, const struct spl_splats *splats,
+                       const struct spl_splats *placed, struct spl_stage *stage, uint16_t **of, struct spl_error *err);
+
+/* A splat for each splat, panel and vertex of a chunk, where it is looked at from: of a panel the cell nearest to the
+ * middle of its cells, as the disc that it stands for. Fills out[SPL_CHUNK_SPLATS]; returns how many. Any thread. */
+uint32_t spl_stations_get_places(const struct spl_splats *splats, uint32_t chunk, struct spl_world_splat *out);
 
 /* World point to the station's frame. */
 void spl_station_to_own(const struct spl_station *station, const double world[3], double own[3]);
@@ -44,6 +53,12 @@ static inline bool spl_splats_is_leaf(const struct spl_splats *splats, uint32_t 
 static inline bool spl_splats_is_discs(const struct spl_splats *splats, uint32_t chunk)
 {
     return spl_chunk_kind(&splats->chunks[chunk]) == SPL_CHUNK_DISCS;
+}
+
+/* Lines belong to no station. */
+static inline bool spl_splats_is_lines(const struct spl_splats *splats, uint32_t chunk)
+{
+    return spl_chunk_kind(&splats->chunks[chunk]) == SPL_CHUNK_LINES;
 }
 
 #endif

@@ -315,7 +315,8 @@ void spl_coded_finish(struct spl_coded *coded)
 int spl_coded_get(void *context, uint64_t chunk, struct spl_chunk_code *code, struct spl_error *err)
 {
     const struct spl_coded_chunks *chunks = context;
-    uint32_t splats = chunks->splats->chunks[chunk].count;
+    uint64_t all;
+    uint32_t splats = spl_dataset_get_chunks(chunks->splats->dataset, &all)[chunk].count;
     const uint32_t *words = chunks->coded->words[chunk];
     (void)err;
     if (words)

@@ -232,6 +232,8 @@ int spl_chosen_init(struct spl_chosen *chosen, const struct spl_splats *splats, 
                         .own = own,
                         .stage = stage};
     int rc = chosen->photo && chosen->color ? SPL_OK : SPL_E_NOMEM;
+    for (uint64_t id = 0; !rc && id < splats->count; id++) /* of panels whose cells are asked nobody has the ids */
+        chosen->photo[id] = SPL_NO_PHOTO;
     if (!rc) {
         spl_parallel_for(stage->threads, splats->chunk_count, 16, choose_chunks, &pass);
         chosen->unseen = atomic_load(&pass.unseen);

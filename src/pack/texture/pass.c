@@ -54,7 +54,7 @@ static int allocate(struct spl_photo_pass *pass, const struct spl_dataset *datas
     pass->gains = spl_alloc(pass->report->photographs + 1, sizeof *pass->gains, err);
     pass->dropped = spl_alloc(pass->report->photographs, sizeof *pass->dropped, err);
     if (colored)
-        pass->own = spl_alloc_raw(pass->splats.count, sizeof *pass->own, err);
+        pass->own = spl_alloc(pass->splats.count, sizeof *pass->own, err);
     if (rc || !pass->gains || !pass->dropped || (colored && !pass->own))
         return SPL_E_NOMEM;
     if (colored)
@@ -152,18 +152,31 @@ static int even_out(struct spl_photo_pass *pass, struct spl_error *err)
     }
 }
 
-/* Points, not splats: coarser levels have their colours from the same photographs. NULL when memory is refused. */
+/* Points, not splats: coarser levels have their colours from the same photographs. Of those that panels stand for as
+ * large a share as of their cells. */
+static uint64_t count_points(const struct spl_photo_pass *pass)
+{
+    uint64_t points = 0, cells = 0, all_cells = 0;
+    for (uint32_t chunk = 0; chunk < pass->splats.chunk_count; chunk++) {
+        const struct spl_chunk *header = &pass->splats.chunks[chunk];
+        uint32_t kind = spl_chunk_kind(header), seen = 0;
+        if (pass->splats.nodes[pass->splats.node_of[chunk]].child_count || kind == SPL_CHUNK_LINES)
+            continue;
+        for (uint64_t id = header->first_id; id < header->first_id + header->count; id++)
+            seen += pass->chosen.photo[id] != SPL_NO_PHOTO;
+        points += spl_kind_has_panels(kind) ? 0 : seen;
+        cells += spl_kind_has_panels(kind) ? seen : 0;
+        all_cells += spl_kind_has_panels(kind) ? header->count : 0;
+    }
+    double share = all_cells ? (double)cells / (double)all_cells : 0;
+    return points + (uint64_t)(share * (double)spl_dataset_get_info(pass->splats.dataset)->panel_points + 0.5);
+}
+
+/* NULL when memory is refused. */
 static json_t *describe_source(const struct spl_photo_pass *pass)
 {
     const char *cameras = pass->options->cameras, *end = cameras + strlen(cameras), *name;
-    json_int_t points = 0;
-    for (uint32_t chunk = 0; chunk < pass->splats.chunk_count; chunk++) {
-        uint64_t first = pass->splats.chunks[chunk].first_id;
-        bool point = !pass->splats.nodes[pass->splats.node_of[chunk]].child_count &&
-                     spl_chunk_kind(&pass->splats.chunks[chunk]) == SPL_CHUNK_DISCS;
-        for (uint64_t id = first; point && id < first + pass->splats.chunks[chunk].count; id++)
-            points += pass->chosen.photo[id] != SPL_NO_PHOTO;
-    }
+    json_int_t points = (json_int_t)count_points(pass);
     while (end > cameras + 1 && end[-1] == '/')
         end--;
     /* two names of the path: a COLMAP model's folder is mostly called "0" */
@@ -203,7 +216,7 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
     struct spl_photo_pass pass = {.options = options, .list = list, .report = report, .stage = stage};
     const struct spl_renderer_options how = {.size = sizeof how, .device = options->device};
     uint64_t begin_ns = spl_now_ns();
-    int rc = spl_splats_init(&pass.splats, dataset, err);
+    int rc = spl_splats_init_with_cells(&pass.splats, dataset, err);
     if (rc || (rc = allocate(&pass, dataset, err)) || (rc = spl_renderer_create(&how, &pass.renderer, err)) ||
         (rc = spl_renderer_add(pass.renderer, dataset, err)))
         goto done;
@@ -216,12 +229,16 @@ int spl_photos_apply(const struct spl_photo_options *options, const struct spl_v
         goto done;
     spl_stage_end(stage);
     report->unseen = pass.chosen.unseen;
+    if (pass.splats.own_chunks) /* among them are cells, of which there are no splats */
+        report->unseen = (uint64_t)((double)report->unseen / (double)pass.splats.count *
+                                    (double)spl_dataset_get_info(dataset)->splats);
     if (!(pass.color_source = describe_source(&pass))) {
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing colours");
         goto done;
     }
     const struct spl_rewrite plain = {
-        .from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color, .color_source = pass.color_source};
+        .from = dataset, .colors = (const uint8_t(*)[3])pass.chosen.color, .first_cell = pass.splats.first_cell,
+        .color_source = pass.color_source};
     rc = options->textures == SPL_TEXTURES_NONE ? spl_dataset_rewrite(&plain, output, err)
                                                 : spl_photo_pass_write_textured(&pass, dataset, output, err);
     report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;

@@ -156,6 +156,7 @@ int spl_photo_pass_write_textured(struct spl_photo_pass *pass, const struct spl_
     struct spl_coded_chunks chunks = {&coded, &pass->splats};
     const struct spl_rewrite what = {.from = dataset,
                                        .colors = (const uint8_t(*)[3])pass->chosen.color,
+                                       .first_cell = pass->splats.first_cell,
                                        .dictionary = &coded.dictionary,
                                        .code_chunk = spl_coded_get,
                                        .context = &chunks,

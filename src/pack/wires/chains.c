@@ -8,7 +8,9 @@
 #include "base/memory.h"
 #include "pack/median.h"
 #include "pack/stage.h"
+#include "pack/wires/axis.h"
 #include "pack/wires/join.h"
+#include "pack/wires/sides.h"
 #include "pack/wires/wires.h"
 #include "shared.h" /* SPL_CHUNK_SPLATS, SPL_FILL_STRAY */
 
@@ -92,12 +94,6 @@ static int count_pieces(const struct spl_wire_point *a, const struct spl_wire_po
     return (int)fmin(ceil(*length / (straight * fmax(a->spacing, b->spacing))), pieces_most) | 1;
 }
 
-/* Does a chain begin at point `i`? At the lower of its ends. */
-static bool is_begin(const struct spl_wire_point *p, uint32_t i)
-{
-    return p[i].next[0] != SPL_WIRE_END && p[i].next[1] == SPL_WIRE_END && p[i].other >= i;
-}
-
 /* Room for all vertices: one for each piece, and one more for each chain. */
 static int reserve(struct spl_wires *w, const struct gathered *g, struct spl_error *err)
 {
@@ -108,7 +104,7 @@ static int reserve(struct spl_wires *w, const struct gathered *g, struct spl_err
         for (int k = 0; k < 2; k++) /* each join at one of its points */
             if (p[i].next[k] != SPL_WIRE_END && p[i].next[k] > i)
                 vertices += (unsigned)count_pieces(&p[i], &p[p[i].next[k]], &length);
-        vertices += is_begin(p, i);
+        vertices += spl_wires_is_begin(p, i);
     }
     if (vertices >= SPL_WIRE_END)
         return spl_fail(err, SPL_E_LIMIT,
@@ -129,6 +125,7 @@ static void add_vertex(struct spl_wires *w, const struct spl_points *p, const st
     struct spl_wire_vertex *vertex = &w->vertices[w->count++];
     *vertex = (struct spl_wire_vertex){.radius = (float)g->points[like].spacing,
                                        .length = length,
+                                       .width = (float)g->points[like].width,
                                        .color_class = p->color_class[index],
                                        .point = SPL_WIRE_END};
     memcpy(vertex->position, position, sizeof vertex->position);
@@ -153,16 +150,37 @@ static void add_join(struct spl_wires *w, const struct spl_points *p, const stru
     }
 }
 
+static int compare_begins(const void *a, const void *b, void *context)
+{
+    const struct spl_wire_point *p = context;
+    uint32_t i = *(const uint32_t *)a, k = *(const uint32_t *)b;
+    return p[i].width != p[k].width ? (p[i].width > p[k].width) - (p[i].width < p[k].width) : (i > k) - (i < k);
+}
+
+/* Where chains begin, by their width, since those of a chunk share one; *count of them. The caller frees. */
+static uint32_t *list_begins(const struct spl_wires *w, const struct gathered *g, size_t *count, struct spl_error *err)
+{
+    uint32_t *begins = spl_alloc_raw(g->count + 1, sizeof *begins, err);
+    *count = 0;
+    for (uint32_t i = 0; begins && i < g->count; i++)
+        if (spl_wires_is_begin(g->points, i) && (!w->with_widths || g->points[i].width > 0))
+            begins[(*count)++] = i;
+    if (begins && w->with_widths)
+        qsort_r(begins, *count, sizeof *begins, compare_begins, g->points);
+    return begins;
+}
+
 /* Adds up to as many items as there are points to the stage. */
 static int add_chains(struct spl_wires *w, const struct spl_points *points, const struct gathered *g,
                       struct spl_wires_work *work, struct spl_error *err)
 {
     const struct spl_wire_point *p = g->points;
     uint64_t done = 0;
-    int rc = reserve(w, g, err);
-    for (uint32_t i = 0; i < g->count && !rc; i++) {
-        if (!is_begin(p, i))
-            continue;
+    size_t count = 0;
+    uint32_t *begins = list_begins(w, g, &count, err);
+    int rc = begins ? reserve(w, g, err) : SPL_E_NOMEM;
+    for (size_t k = 0; k < count && !rc; k++) {
+        uint32_t i = begins[k];
         float length = (float)p[i].length;
         add_vertex(w, points, g, i, p[i].position, length);
         for (uint32_t before = SPL_WIRE_END, at = i; at != p[i].other && !rc; done++) {
@@ -174,7 +192,15 @@ static int add_chains(struct spl_wires *w, const struct spl_points *points, cons
             rc = spl_stage_check(work->stage, err);
         }
     }
+    free(begins);
     return rc;
+}
+
+/* Points that no line stands for are as others are. */
+static void unmark(const struct gathered *g, struct spl_points *points)
+{
+    for (size_t i = 0; i < g->count; i++)
+        points->linear[g->index[i]] = g->points[i].width > 0;
 }
 
 static int compare_pieces(const void *a, const void *b, void *context)
@@ -196,11 +222,11 @@ static int sort_pieces(struct spl_wires *w, struct spl_error *err)
     return SPL_OK;
 }
 
-int spl_wires_find(struct spl_wires *wires, const struct spl_points *points, struct spl_stage *stage,
-                   struct spl_error *err)
+int spl_wires_find(struct spl_wires *wires, struct spl_points *points, const struct spl_wires_options *options,
+                   struct spl_stage *stage, struct spl_error *err)
 {
     struct gathered g = {0};
-    *wires = (struct spl_wires){0};
+    *wires = (struct spl_wires){.with_widths = options, .error = options ? options->error : 0};
     if (!points->linear)
         return SPL_OK;
     spl_stage_begin(stage, "joining wires", NULL, 0);
@@ -212,12 +238,22 @@ int spl_wires_find(struct spl_wires *wires, const struct spl_points *points, str
     wires->cut_short = rc == SPL_E_LIMIT; /* the links hold */
     if (rc == SPL_E_CANCELLED)
         rc = spl_stage_check(stage, err);
-    if (!rc || wires->cut_short)
+    if (wires->cut_short)
+        rc = SPL_OK;
+    if (!rc && options)
+        rc = spl_wires_find_axes(g.points, (uint32_t)g.count, options->noise, &cutting, err);
+    if (!rc && options)
+        rc = spl_wires_drop_thick(g.points, (uint32_t)g.count, &cutting, err);
+    if (!rc && options)
+        unmark(&g, points);
+    if (!rc)
         rc = add_chains(wires, points, &g, &cutting, err);
     free(g.points);
     free(g.index);
     if (!rc)
         rc = sort_pieces(wires, err);
+    if (!rc && options)
+        rc = spl_wires_claim(wires, points, options->noise, stage, err);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc)

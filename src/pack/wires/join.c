@@ -258,6 +258,7 @@ static int thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
                     break;
                 if (kept[b] && distance(p[i].position, p[b].position) < limit) {
                     kept[i] = 0;
+                    p[i].beside = b;
                     break;
                 }
             }
@@ -278,6 +279,8 @@ int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wir
         points[i].next[0] = points[i].next[1] = SPL_WIRE_END;
         points[i].other = i;
         points[i].length = 0;
+        points[i].beside = SPL_WIRE_END;
+        points[i].width = 0;
         spacings[i] = points[i].spacing;
         longest = fmax(longest, points[i].spacing);
         for (int c = 0; c < 3; c++)

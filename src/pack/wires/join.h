@@ -15,6 +15,8 @@ struct spl_wire_point {
     uint32_t next[2]; /* the points that it is joined with, SPL_WIRE_END where there is none */
     uint32_t other;   /* of an end: the chain's other end; itself when alone */
     double length;    /* of an end: from there to the other */
+    uint32_t beside;  /* of a point that is left alone: the one that it lies beside; else SPL_WIRE_END */
+    double width;     /* spl_wires_find_axes() */
 };
 
 /* How far joining may go: what steps are left of those that the number of points allows, and the stage that it is. */
@@ -39,7 +41,13 @@ static inline void spl_wires_advance(const struct spl_wires_work *work, uint64_t
                       0);
 }
 
-/* Sets the links of `count` points (`next`, `other`, `length`, which need no value before): chains without branches or
+/* Does a chain begin at point `i`? At the lower of its ends. */
+static inline bool spl_wires_is_begin(const struct spl_wire_point *p, uint32_t i)
+{
+    return p[i].next[0] != SPL_WIRE_END && p[i].next[1] == SPL_WIRE_END && p[i].other >= i;
+}
+
+/* Sets the links of `count` points (`next`, `other`, `length`, `beside`, which need no value before): chains without branches or
  * loops. Points that lie beside another one are left alone. Adds up to 2 `count` items to the stage. SPL_E_NOMEM; else
  * as spl_wires_check(): the links hold then, but are not all. Pure function but for `work`; any thread. */
 int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work, struct spl_error *err);

@@ -129,8 +129,8 @@ static struct spl_wire_vertex mean_vertex(const struct spl_wire_vertex *v, size_
 
 /* Appends the line of vertices [0, count), simplified; the last one ends it. False: a node has no room for all of
  * it. */
-static bool add_simplified(struct spl_node_lines *out, const struct spl_wire_vertex *v, size_t count, double spacing,
-                           double error)
+static bool add_simplified(struct spl_node_lines *out, const struct spl_wire_vertex *v, size_t count, size_t most,
+                           double spacing, double error)
 {
     for (size_t first = 0; first + 1 < count; first += stretch - 1) {
         size_t left = count - first;
@@ -141,7 +141,7 @@ static bool add_simplified(struct spl_node_lines *out, const struct spl_wire_ver
         while (next < count && !out->kept[next])
             next++;
         size_t last = next < count ? at + (next - at) / 2 : at;
-        if (out->count == SPL_NODE_VERTICES)
+        if (out->count == most)
             return false;
         out->vertices[out->count++] = mean_vertex(v, at, before, last, spacing);
         before = last + 1;
@@ -176,6 +176,20 @@ static bool copy_lines(const struct spl_wires *w, size_t pieces, struct spl_node
     return true;
 }
 
+/* The lines as they were joined, but for vertices that the bound does not need. False: no memory. */
+static bool simplify_leaf(const struct spl_wires *w, size_t pieces, struct spl_node_lines *out)
+{
+    if (!reserve_vertices(out, 2 * pieces))
+        return false;
+    for (size_t i = 0, end; i < pieces; i = end) {
+        const struct spl_wire_vertex *v = &w->vertices[out->pieces[i]];
+        double error = w->error > 0 ? w->error : SPL_WIRES_WIDTH_ERROR * v->width;
+        end = end_of_run(out, i, pieces);
+        add_simplified(out, v, end - i + 1, out->capacity, 0, error);
+    }
+    return true;
+}
+
 /* The lines of a level; false where a node has no room for all of their vertices. */
 static bool simplify_lines(const struct spl_wires *w, size_t pieces, double spacing, double coarse,
                            struct spl_node_lines *out)
@@ -185,7 +199,7 @@ static bool simplify_lines(const struct spl_wires *w, size_t pieces, double spac
         const struct spl_wire_vertex *v = &w->vertices[out->pieces[i]];
         end = end_of_run(out, i, pieces);
         if (v->length >= SPL_WIRES_SHORTEST * coarse &&
-            !add_simplified(out, v, end - i + 1, spacing, SPL_WIRES_ERROR * coarse))
+            !add_simplified(out, v, end - i + 1, SPL_NODE_VERTICES, spacing, SPL_WIRES_ERROR * coarse))
             return false;
     }
     return true;
@@ -203,7 +217,7 @@ bool spl_wires_get_node(const struct spl_wires *wires, size_t begin, size_t end,
     memcpy(out->pieces, wires->pieces + first, pieces * sizeof *out->pieces);
     qsort(out->pieces, pieces, sizeof *out->pieces, compare_indices);
     if (spacing <= 0)
-        return copy_lines(wires, pieces, out);
+        return wires->with_widths ? simplify_leaf(wires, pieces, out) : copy_lines(wires, pieces, out);
     if (!reserve_vertices(out, 2 * pieces < SPL_NODE_VERTICES ? 2 * pieces : SPL_NODE_VERTICES))
         return false;
     for (double coarse = spacing; !simplify_lines(wires, pieces, spacing, coarse, out);)

@@ -14,8 +14,15 @@ static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_p
     if (rc)
         return rc;
     spl_tile_dispatch_splats(tile, &kernels, &(struct spl_dispatch){.phases = phases});
+    static const struct spl_panel_kernels panels = {.panels = "panel_nearest",
+                                                     .meshes = "mesh_nearest",
+                                                     .panel_cells = "nearest_cells",
+                                                     .mesh_cells = "nearest_mesh_cells"};
+    rc = spl_tile_dispatch_panels(tile, &panels, key, phases, err);
+    struct spl_kernel_key lines = {"line_nearest", true, {group, pass}};
+    rc = rc ? rc : spl_tile_dispatch_lines(tile, lines, phases, err);
     spl_gpu_barrier(r->gpu);
-    return SPL_OK;
+    return rc;
 }
 
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
@@ -49,7 +56,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_nearest = {
     .info = {.name = "nearest",
              .help = "oriented discs, the nearest alone, colours smoothed over the samples around",
-             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(maps),
+             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(maps) | SPL_PARAM_BIT(primitives),
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},
     .discs = true,

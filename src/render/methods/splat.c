@@ -4,21 +4,39 @@
 #include "render/method.h"
 #include "render/renderer.h"
 
+/* Depths of discs, panels, meshes and lines of a phase. */
+static int draw_depth(struct spl_tile *tile, const struct spl_disc_kernels *depth, enum spl_phase phase,
+                      struct spl_error *err)
+{
+    spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = phase});
+    static const struct spl_panel_kernels panels = {.panels = "panel_depth",
+                                                     .meshes = "mesh_depth",
+                                                     .panel_cells = "splat_depth_cells",
+                                                     .mesh_cells = "splat_depth_mesh_cells"};
+    int rc = spl_tile_dispatch_panels(tile, &panels, (struct spl_kernel_key){0}, phase, err);
+    rc = rc ? rc : spl_tile_dispatch_lines(tile, (struct spl_kernel_key){.name = "line_depth"}, phase, err);
+    spl_gpu_barrier(tile->renderer->gpu);
+    return rc;
+}
+
 static int record_depth(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     struct spl_disc_kernels depth;
-    struct spl_dispatch what = {.phases = SPL_PHASE_FRONT};
     int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, err);
-    if (rc)
-        return rc;
-    spl_tile_dispatch_splats(tile, &depth, &what);
-    spl_gpu_barrier(r->gpu);
-    rc = spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, false, err);
-    what.phases = SPL_PHASE_BACK;
-    spl_tile_dispatch_splats(tile, &depth, &what);
-    spl_gpu_barrier(r->gpu);
+    rc = rc ? rc : draw_depth(tile, &depth, SPL_PHASE_FRONT, err);
+    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, false, err);
+    rc = rc ? rc : draw_depth(tile, &depth, SPL_PHASE_BACK, err);
     return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, false, err);
+}
+
+static int shade_panels(struct spl_tile *tile, uint32_t group, struct spl_error *err)
+{
+    static const struct spl_panel_kernels panels = {.panels = "panel_shade",
+                                                     .meshes = "mesh_shade",
+                                                     .panel_cells = "splat_shade_cells",
+                                                     .mesh_cells = "splat_shade_mesh_cells"};
+    return spl_tile_dispatch_panels(tile, &panels, (struct spl_kernel_key){NULL, true, {group}}, SPL_PHASE_BOTH, err);
 }
 
 /* The kernels of `what`, by its number of planes. */
@@ -28,10 +46,11 @@ static int get_texture_kernels(struct spl_tile *tile, struct spl_dispatch *what,
     struct spl_renderer *r = tile->renderer;
     what->sum = NULL;
     struct spl_kernel_key key = {"splat_texture", true, {what->planes}}, sum = {"splat_sum", false, {what->planes}};
+    struct spl_kernel_key summed = {.name = "splat_summed", .wide = true};
     if (!what->smooth)
         return spl_tile_get_disc_kernels(tile, key, kernels, err);
     int rc = spl_kernels_get(&r->kernels, r->gpu, &sum, &what->sum, err);
-    return rc ? rc : spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_summed", .wide = true}, kernels, err);
+    return rc ? rc : spl_tile_get_disc_kernels(tile, summed, kernels, err);
 }
 
 /* Colours: chunks with atoms by the kernels of their number of planes, the others by the one that knows none. */
@@ -61,16 +80,31 @@ static int shade_colors(struct spl_tile *tile, const struct spl_disc_kernels *pl
     return rc;
 }
 
+/* Records the shade pass of a group of layers. */
+static int shade(struct spl_tile *tile, uint32_t group, const struct spl_disc_kernels *kernels, struct spl_error *err)
+{
+    if (group != SPL_SUMS_COLOR) {
+        spl_tile_dispatch_splats(tile, kernels, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
+    } else {
+        int rc = shade_colors(tile, kernels, err);
+        if (rc)
+            return rc;
+    }
+    int rc = shade_panels(tile, group, err);
+    struct spl_kernel_key lines = {"line_shade", true, {group}};
+    return rc ? rc : spl_tile_dispatch_lines(tile, lines, SPL_PHASE_BOTH, err);
+}
+
 /* Sums of depths become the surface that maps are asked for; the sums are cleared for colours. */
 static int find_surface(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_gpu *gpu = tile->renderer->gpu;
-    struct spl_disc_kernels shade;
+    struct spl_disc_kernels kernels;
     struct spl_kernel_key key = {"splat_shade", true, {SPL_SUMS_DEPTH}};
-    int rc = spl_tile_get_disc_kernels(tile, key, &shade, err);
+    int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
+    rc = rc ? rc : shade(tile, SPL_SUMS_DEPTH, &kernels, err);
     if (rc)
         return rc;
-    spl_tile_dispatch_splats(tile, &shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
     spl_gpu_barrier(gpu);
     rc = spl_tile_dispatch_samples(tile, &(struct spl_kernel_key){.name = "map_surface"}, err);
     spl_gpu_fill(gpu, tile->renderer->scratch.large, 0, tile->samples * 16, 0);
@@ -81,14 +115,15 @@ static int find_surface(struct spl_tile *tile, struct spl_error *err)
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    struct spl_disc_kernels shade;
+    struct spl_disc_kernels kernels;
     bool mapped = spl_tile_has_map_colors(tile, group);
-    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &shade, err);
+    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &kernels, err);
     if (rc)
         return rc;
     if (first)
         spl_gpu_fill(r->gpu, r->scratch.depth, 0, tile->samples * 4, SPL_NOTHING);
-    if (group != SPL_SUMS_ID)
+    bool identifies = group == SPL_SUMS_ID || group == SPL_SUMS_PRIMITIVE;
+    if (!identifies)
         spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_SUMS), 0, tile->samples * 16, 0);
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
@@ -96,7 +131,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         rc = record_depth(tile, err);
         spl_tile_stamp(tile, SPL_STAGE_DEPTH);
     }
-    if (group == SPL_SUMS_ID) { /* only now: occlusion used the memory */
+    if (identifies) { /* only now: occlusion used the memory */
         spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
         spl_gpu_barrier(r->gpu);
     }
@@ -104,10 +139,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
         spl_tile_begin_area(tile, SPL_AREA_SURFACE);
     if (!rc && mapped)
         rc = find_surface(tile, err);
-    if (group == SPL_SUMS_COLOR)
-        rc = rc ? rc : shade_colors(tile, &shade, err);
-    else
-        spl_tile_dispatch_splats(tile, &shade, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
+    rc = rc ? rc : shade(tile, group, &kernels, err);
     spl_gpu_barrier(r->gpu);
     if (!rc && mapped)
         rc = spl_tile_dispatch_maps(tile, err);
@@ -120,7 +152,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_splat = {
     .info = {.name = "splat",
              .help = "oriented discs, blended within a margin behind the first surface; specks closed",
-             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps),
+             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps) | SPL_PARAM_BIT(primitives),
              .textures = true,
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},

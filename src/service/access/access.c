@@ -242,8 +242,8 @@ static bool refuse_unknown(struct request *request)
     static const char challenge[] = "Bearer realm=\"splatd\"";
     if (request->service->access->key.bytes && has_signature_in_query(request->query))
         return refuse(request, MHD_HTTP_UNAUTHORIZED, "sig", challenge,
-                      "the signature does not match: it allows the GET that was signed, to which nothing is added and in "
-                      "which nothing changes its place; anything else needs a token");
+                      "the signature does not match: it allows the GET that was signed, to which nothing is added and "
+                      "in which nothing changes its place; anything else needs a token");
     return refuse(request, MHD_HTTP_UNAUTHORIZED, "", challenge,
                   "this needs a token; send it as 'Authorization: Bearer TOKEN'");
 }

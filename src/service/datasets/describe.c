@@ -47,6 +47,23 @@ json_t *spl_describe_slot(const struct spl_catalog_slot *slot)
     return json;
 }
 
+/* Methods that take the parameter. */
+static json_t *list_methods(uint32_t param_bit)
+{
+    json_t *methods = json_array();
+    for (int i = 0; i < SPL_METHOD_COUNT; i++)
+        if (spl_method_get((enum spl_method)i)->params & param_bit)
+            json_array_append_new(methods, json_string(spl_method_name((enum spl_method)i)));
+    return methods;
+}
+
+static json_t *describe_primitives(const struct spl_dataset_info *info)
+{
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "panels", count(info->panels), "panel_points",
+                     count(info->panel_points), "meshes", count(info->meshes), "mesh_points", count(info->mesh_points),
+                     "pieces", count(info->pieces), "methods", list_methods(SPL_PARAM_BIT(primitives)));
+}
+
 static json_t *describe_textures(const struct spl_dataset_info *info)
 {
     json_t *methods = json_array();
@@ -56,14 +73,13 @@ static json_t *describe_textures(const struct spl_dataset_info *info)
     return json_pack("{s:i, s:i, s:o}", "size", (int)info->texture_size, "atoms", (int)info->atoms, "methods", methods);
 }
 
-static json_t *describe_maps(const struct spl_dataset_info *info)
+static json_t *describe_maps(const struct spl_catalog_entry *entry)
 {
-    json_t *methods = json_array();
-    for (int i = 0; i < SPL_METHOD_COUNT; i++)
-        if (spl_method_get((enum spl_method)i)->params & SPL_PARAM_BIT(maps))
-            json_array_append_new(methods, json_string(spl_method_name((enum spl_method)i)));
-    return json_pack("{s:o, s:o, s:o, s:o}", "stations", count(info->maps), "texels", count(info->map_texels), "bytes",
-                     count(info->map_bytes), "methods", methods);
+    const struct spl_dataset_info *info = entry->info;
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "stations", count(info->maps), "texels",
+                     count(info->map_texels), "bytes", count(info->map_bytes), "methods",
+                     list_methods(SPL_PARAM_BIT(maps)), "at_once",
+                     count(atomic_load(&entry->maps_at_once)), "limit_bytes", count(atomic_load(&entry->limit_bytes)));
 }
 
 /* What picks give of a splat beside what every dataset has. */
@@ -81,6 +97,13 @@ static json_t *describe_color(const struct spl_dataset *dataset)
 {
     const json_t *color = json_object_get(spl_dataset_get_meta(dataset), "color");
     return color ? json_deep_copy(color) : json_null();
+}
+
+/* Of how many leaf splats those are that pruning has left. */
+static json_t *describe_pruned(const struct spl_dataset *dataset)
+{
+    const json_t *of = json_object_get(json_object_get(spl_dataset_get_meta(dataset), "pruned"), "of");
+    return json_is_integer(of) ? json_pack("{s:I}", "of", json_integer_value(of)) : json_null();
 }
 
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
@@ -108,6 +131,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     spl_profile_finish(&profile);
     set(json, "levels", count(info->levels));
     set(json, "leaf_splats", count(info->leaf_splats));
+    set(json, "pruned", describe_pruned(entry->dataset));
     set(json, "page_bytes", count(info->page_bytes));
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", describe_layers());
@@ -115,7 +139,8 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "attributes", describe_attributes(info));
     set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
-    set(json, "maps", info->maps ? describe_maps(info) : json_null());
+    set(json, "maps", info->maps ? describe_maps(entry) : json_null());
+    set(json, "primitives", info->panels || info->meshes || info->pieces ? describe_primitives(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)
         if (spl_format_is_built((enum spl_format)i))

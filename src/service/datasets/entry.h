@@ -39,6 +39,8 @@ struct spl_catalog_entry {
     void (*release)(struct spl_catalog_entry *entry, void *context); // by the last unref; NULL: it is destroyed
     void *release_context;
     _Atomic uint64_t resident_bytes; /* on the device */
+    _Atomic uint32_t maps_at_once;   /* maps of stations that the memory limit has room for at a time */
+    _Atomic uint64_t limit_bytes;    /* about the memory limit that holds all of it; 0 = not known, or it has no maps */
 
     /* Owned by whoever it was passed to last: the loop, or the gpu thread between add or release and the change. */
     STAILQ_ENTRY(spl_catalog_entry) link;
@@ -50,7 +52,8 @@ struct spl_catalog_entry {
 };
 
 /* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. Ends with
- * SPL_E_CANCELLED soon after *how->cancelled (borrowed for the entry's life; may be NULL) is set. Blocks on disk, any thread. The caller owns the one reference to *out. */
+ * SPL_E_CANCELLED soon after *how->cancelled (borrowed for the entry's life; may be NULL) is set. Blocks on disk, any
+ * thread. The caller owns the one reference to *out. */
 int spl_catalog_entry_open(const char *path, const char *place, const struct spl_dataset_opening *how,
                            struct spl_catalog_entry **out, struct spl_error *err);
 

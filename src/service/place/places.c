@@ -57,8 +57,8 @@ static uint32_t read_epsg(const char *text)
     return count && count <= 6 && !*rest ? (uint32_t)strtoul(text, NULL, 10) : 0;
 }
 
-/* What in a WKT makes PROJ read files or run a pipeline of the text's: an extension, a grid, a method whose name is a text
- * of PROJ's own ("PROJ utm zone=10", "PROJ defmodel model=FILE"; no other word of WKT ends with PROJ), a setting. */
+/* What in a WKT makes PROJ read files or run a pipeline of the text's: an extension, a grid, a method whose name is a
+ * text of PROJ's own ("PROJ utm zone=10", "PROJ defmodel model=FILE"; no other word of WKT ends so), a setting. */
 static bool names_files(const char *wkt)
 {
     static const char *const words[] = {"@", "EXTENSION", "PARAMETERFILE", "grids", "="};
@@ -267,8 +267,8 @@ int spl_places_from_world(struct spl_places *places, uint32_t crs, bool waits, c
     pthread_mutex_unlock(&mutex);
     if (!(distance_m <= reach_m))
         return spl_fail_field(err, SPL_E_INPUT, "world",
-                              "world %.10g,%.10g,%.10g lies %.0f km from the dataset; at most %.0f km are allowed", in[0],
-                              in[1], in[2], distance_m / 1000, reach_m / 1000);
+                              "world %.10g,%.10g,%.10g lies %.0f km from the dataset; at most %.0f km are allowed",
+                              in[0], in[1], in[2], distance_m / 1000, reach_m / 1000);
     if (good && isfinite(out[2]))
         return 0;
     return spl_fail_field(err, SPL_E_INPUT, "crs", "the world's %.10g,%.10g,%.10g has no place in EPSG:%u", in[0],

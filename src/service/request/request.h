@@ -18,7 +18,7 @@ struct spl_view_request {
     struct spl_view view;             /* deadline_ns is left at "none" */
     enum spl_layer layer;             /* the one bit of view.layers, or the first of several */
     enum spl_container container;     /* of `layers`; NONE: there is one layer, sent as it is */
-    struct spl_encode_options encode; /* of `layer`; see spl_view_get_encoding() for several; the dataset's unit of all */
+    struct spl_encode_options encode; /* of `layer`; spl_view_get_encoding() for several; the dataset's unit of all */
     bool natural;                     /* format was left out: each layer has its own */
     bool picks;                       /* no image is wanted but what `pick` shows; view.camera sees that point alone */
     struct spl_picked_point {
@@ -60,7 +60,8 @@ struct spl_views_request {
     struct spl_view_request *views;
 };
 
-/* `limits` hold for each view, its pixels and samples for all of them together as well. On success the caller finishes *out. */
+/* `limits` hold for each view, its pixels and samples for all of them together as well. On success the caller finishes
+ * *out. */
 int spl_views_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                 const struct spl_camera_limits *limits, struct spl_views_request *out,
                                 struct spl_error *err);

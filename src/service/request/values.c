@@ -9,7 +9,7 @@
 
 #include "image/color.h"
 
-#define LAYER_NAMES "color, depth, range, normal, id, coverage"
+#define LAYER_NAMES "color, depth, range, normal, id, coverage, primitive"
 
 const struct param_info spl_params[PARAM_COUNT] = {
 #define PARAM(name, alias, kind, places, help) {#name, alias, SPL_KIND_##kind, places},
@@ -57,8 +57,8 @@ static int parse_color(struct spl_value *value, const char *name, const char *te
 {
     uint8_t rgba[4];
     if (!spl_color_from_text(text, rgba))
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write " SPL_COLOR_FORMS "%s", name, text,
-                              *text ? "" : "; '#' is written %23 in a URL, or left out");
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no colour; write " SPL_COLOR_FORMS "%s", name,
+                              text, *text ? "" : "; '#' is written %23 in a URL, or left out");
     for (int i = 0; i < 4; i++)
         value->n[i] = rgba[i];
     return 0;

@@ -102,7 +102,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
     if (json_object_get(settings, "camera"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
     if (json_object_get(settings, "crs"))
-        return spl_fail_field(err, SPL_E_INPUT, "settings.crs", "crs goes into the path, beside its keyframes or frames");
+        return spl_fail_field(err, SPL_E_INPUT, "settings.crs",
+                              "crs goes into the path, beside its keyframes or frames");
     json_t *sized = settings ? json_copy((json_t *)settings) : json_object();
     for (int i = 0; sized && i < 2; i++) // what is left out follows from the path, and is held against the limits there
         if (json_object_get(sized, sides[!i]) && !json_object_get(sized, sides[i]))
@@ -123,7 +124,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
     if (view->versioned)
         return spl_fail_field(err, SPL_E_INPUT, "settings.v", "a tour stays with the version that it began with");
     if (view->view.partial)
-        return spl_fail_field(err, SPL_E_INPUT, "settings.wait", "frames of a tour wait for what they show; leave it out");
+        return spl_fail_field(err, SPL_E_INPUT, "settings.wait",
+                              "frames of a tour wait for what they show; leave it out");
     if (view->planned)
         return spl_fail_field(err, SPL_E_INPUT, isnan(view->demand.budget_ms) ? "settings.psnr" : "settings.budget",
                               "frames of a tour look alike only with one setting: give method, lod and supersample");

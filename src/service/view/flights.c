@@ -132,8 +132,8 @@ static struct spl_rendering *unload(struct flight *flight, struct spl_job *job)
     struct spl_views *views = flight->service->views;
     struct spl_rendering *rendering = NULL;
     if (!job->err.code)
-        rendering = spl_rendering_create(job, &flight->key, job->large ? &views->large_reply_bytes : &views->reply_bytes,
-                                         &job->err);
+        rendering = spl_rendering_create(job, &flight->key,
+                                         job->large ? &views->large_reply_bytes : &views->reply_bytes, &job->err);
     if (rendering &&
         job->renderer != flight->renderer) // reopened as another one meanwhile: the key is not of these bytes
         rendering->reusable = false;

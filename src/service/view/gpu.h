@@ -18,6 +18,7 @@ struct gpu {
     struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
     TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
     uint64_t pages_loaded, pages_evicted;    /* of this renderer, as published */
+    uint64_t working_bytes;                  /* of the device's memory, whatever is drawn */
     bool loading_waits;                      /* for a page to be read */
     bool uploads_left;                       /* pages that have been read and are not on the device yet */
 };
@@ -33,8 +34,8 @@ void spl_gpu_take_orders(struct gpu *gpu);
 /* The entry whose pages are to be loaded next, or NULL. */
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
 
-/* Takes up those that have come, asks for the next and reports the entry with the last. SPL_E_DEVICE_LOST; everything else
- * is the entry's fault. */
+/* Takes up those that have come, asks for the next and reports the entry with the last. SPL_E_DEVICE_LOST; everything
+ * else is the entry's fault. */
 int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err);
 
 /* Gives back what is still to be loaded when the service stops. */

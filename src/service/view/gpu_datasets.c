@@ -1,5 +1,7 @@
 /* Datasets on the gpu thread's device: which ones the renderer knows, their pages, and what has no room. Versions are
  * added a page at a time between frames, so that nobody waits for them. Owned by the gpu thread. */
+#include <inttypes.h>
+
 #include "base/clock.h"
 #include "base/log.h"
 #include "dataset/dataset.h"
@@ -47,8 +49,40 @@ static void on_page_read(void *context)
     spl_queue_interrupt(pipeline->render);
 }
 
-/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place, or whose disk
- * does not answer, costs its own views only. */
+/* How many of the dataset's maps have room at a time, beside what is always there: working memory, the first page, and
+ * of a GPU what a slot goes through on its way. What never has is told once, with the limit that holds everything. */
+static void judge_maps(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    const struct spl_dataset_info *info = entry->info;
+    const uint64_t mib = 1 << 20;
+    uint64_t always = gpu->working_bytes + spl_dataset_get_page_bytes(entry->dataset, 0), most = 0, room;
+    struct spl_residency_info residency;
+    uint32_t fit = 0;
+    for (uint32_t map = 0; map < info->maps; map++) {
+        uint64_t bytes = spl_dataset_get_map_bytes(entry->dataset, map);
+        most = bytes > most ? bytes : most;
+    }
+    if (!info->maps)
+        return;
+    spl_renderer_get_residency(gpu->renderer, entry->dataset, &residency);
+    always += spl_renderer_get_device(gpu->renderer)->software ? 0 : most;
+    room = residency.limit_bytes > always ? residency.limit_bytes - always : 0;
+    for (uint32_t map = 0; map < info->maps; map++) {
+        uint64_t bytes = spl_dataset_get_map_bytes(entry->dataset, map);
+        fit += bytes <= room;
+        room -= bytes <= room ? bytes : 0;
+    }
+    /* an eighth more than all pages: lists of what is drawn */
+    uint64_t holds = (always + info->page_bytes + info->page_bytes / 8 + mib - 1) / mib;
+    atomic_store(&entry->maps_at_once, fit);
+    if (!atomic_exchange(&entry->limit_bytes, holds * mib) && fit < info->maps)
+        spl_log_warn("dataset %s: memory-limit, %" PRIu64 " bytes, has room for the maps of %u of its %u stations at a "
+                     "time; the others' show the splats' own colours. --memory-limit %" PRIu64 "M holds all",
+                     info->id, residency.limit_bytes, fit, info->maps, holds);
+}
+
+/* Page by page, so that nobody who stops waits for a dataset. A file that was cut or overwritten in place, or whose
+ * disk does not answer, costs its own views only. */
 static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struct spl_error *err)
 {
     struct spl_error why = {0};
@@ -106,6 +140,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     struct spl_pipeline *pipeline = gpu->pipeline;
     struct spl_catalog_entry *entry, *next;
     struct spl_renderer_options options = pipeline->options.renderer;
+    uint64_t maps = 0;
     options.wake = on_page_read;
     options.wake_context = pipeline;
     TAILQ_FOREACH(entry, &gpu->entries, resident)
@@ -113,15 +148,21 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
         size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
+        maps = entry->info->map_bytes > maps ? entry->info->map_bytes : maps;
         uint32_t chunks = spl_dataset_get_tables(entry->dataset, 0)->chunk_count; // which are always kept
         if (options.first_page_chunks < chunks)
             options.first_page_chunks = chunks;
     }
-    int rc = spl_renderer_create(&options, &gpu->renderer, err);
+    struct spl_error why = {0};
+    int rc = spl_renderer_create(&options, &gpu->renderer, &why);
     spl_pipeline_touch(pipeline);
+    if (rc == SPL_E_LIMIT && maps)
+        return spl_fail_field(err, rc, why.field, "%s; with the maps of all stations %" PRIu64 "M more", why.message,
+                              (maps >> 20) + 1);
     if (rc)
-        return rc;
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
     gpu->pages_loaded = gpu->pages_evicted = 0;
+    gpu->working_bytes = spl_renderer_get_memory(gpu->renderer);
     pthread_mutex_lock(&pipeline->mutex);
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
@@ -132,6 +173,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
         entry->pages_wanted = 0;
         if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
             return rc;
+        judge_maps(gpu, entry);
     }
     for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
         next = TAILQ_NEXT(entry, resident);
@@ -198,6 +240,7 @@ int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct s
         refuse_entry(gpu, entry, &why);
     } else if (!more) {
         entry->loading = false;
+        judge_maps(gpu, entry);
         spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
     }
     return 0;

@@ -149,7 +149,7 @@ static int begin(struct gpu *gpu, struct spl_job *job)
     return spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
 }
 
-/* What others took, before the first tile and between tiles, was waiting and no part of the frame; what pages took, is. */
+/* What others took, before the first tile and between tiles, was waiting, no part of the frame; what pages took is. */
 static void resume(struct spl_job *job)
 {
     uint64_t now = spl_now_ns(), waited = now - (job->steps ? job->paused_ns : job->accepted_ns);
@@ -278,7 +278,7 @@ static uint64_t look_after_all(struct gpu *gpu)
     return gpu->behind && gpu->behind->waits && until > soon ? soon : until;
 }
 
-/* Waits for a job, unless there is something else to do. NULL: there is, somebody has come by another way, or a page. */
+/* Waits for a job, unless there is something else to do. NULL: there is, or somebody or a page has come. */
 static struct spl_job *choose(struct gpu *gpu, bool idle)
 {
     struct spl_queue *render = gpu->pipeline->render;

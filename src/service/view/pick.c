@@ -40,6 +40,16 @@ static json_t *attributes(const struct spl_dataset *dataset, int64_t splat)
     return json_null();
 }
 
+static json_t *plane(const struct spl_pick *p)
+{
+    const struct spl_pick_plane *plane = &p->plane;
+    if (p->primitive != SPL_SHAPE_PANEL)
+        return json_null();
+    return json_pack("{s:o, s:o, s:f, s:f, s:I}", "point", vector(plane->point), "normal", vector(plane->normal),
+                     "error_mean", plane->error_mean, "error_most", plane->error_most, "points",
+                     (json_int_t)plane->points);
+}
+
 static void fill(json_t *json, const struct spl_pick *p, const struct spl_dataset *dataset)
 {
     bool hit = p->hit;
@@ -52,6 +62,9 @@ static void fill(json_t *json, const struct spl_pick *p, const struct spl_datase
     json_object_set_new(json, "depth", hit ? json_real(p->depth) : json_null());
     json_object_set_new(json, "distance", hit && isfinite(p->distance) ? json_real(p->distance) : json_null());
     json_object_set_new(json, "splat", hit && p->splat >= 0 ? json_integer(p->splat) : json_null());
+    json_object_set_new(json, "primitive",
+                        p->primitive == SPL_SHAPE_NONE ? json_null() : json_string(spl_shape_name(p->primitive)));
+    json_object_set_new(json, "plane", plane(p));
 }
 
 /* The position in EPSG:`crs`; where it is in the world is said as well. */

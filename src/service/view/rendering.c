@@ -37,7 +37,8 @@ static void add_plan(struct spl_headers *headers, const struct spl_job *job)
     spl_headers_add(headers, "Splatd-Demand", "%s", !choice->meets ? "best-effort" : late ? "missed" : "met");
     if (!choice->meets)
         spl_headers_add(headers, "Splatd-Demand-Reason", "%s",
-                        isfinite(job->request.demand.psnr) && !isfinite(choice->psnr) ? "not-measured" : "out-of-reach");
+                        isfinite(job->request.demand.psnr) && !isfinite(choice->psnr) ? "not-measured"
+                                                                                      : "out-of-reach");
 }
 
 static bool write_headers(const struct spl_job *job, char **text, size_t *length)
@@ -71,10 +72,11 @@ struct spl_rendering *spl_rendering_create(struct spl_job *job, const struct spl
     }
     const struct spl_frame_stats *s = &job->stats;
     snprintf(rendering->timing, sizeof rendering->timing,
-             "queue;dur=%.3f, pages;dur=%.3f, frame;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, resolve;dur=%.3f, "
+             "queue;dur=%.3f, pages;dur=%.3f, frame;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, "
+             "resolve;dur=%.3f, "
              "readback;dur=%.3f, encode;dur=%.3f",
-             job->queue_ms, job->pages_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms, s->readback_ms,
-             job->encode_ms);
+             job->queue_ms, job->pages_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms,
+             s->readback_ms, job->encode_ms);
     rendering->references = 1;
     rendering->key = *key;
     rendering->reusable = s->complete && !job->request.planned;

@@ -105,7 +105,8 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
 {
     spl_view_set_unit(view, info);
     if (view->versioned && view->version != info->version)
-        return spl_fail_field(err, SPL_E_NOT_FOUND, "v", "version %016llx of dataset '%s' is not served; it is %016llx now",
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "v",
+                              "version %016llx of dataset '%s' is not served; it is %016llx now",
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);
     if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
         view->view.layers &= ~(1u << SPL_LAYER_NORMAL);

@@ -34,8 +34,8 @@ void spl_views_finish(struct spl_service *service);
 /* Hands out every job that is done. */
 void spl_views_complete(struct spl_service *service);
 
-/* Whatever is wrong with a view is the client's to change, but for want of memory and for coordinate systems that are not
- * known yet, or never. Returns the code. */
+/* Whatever is wrong with a view is the client's to change, but for want of memory and for coordinate systems that are
+ * not known yet, or never. Returns the code. */
 int spl_view_blame(struct spl_error *err);
 
 /* What lengths of the view are in, for its headers and files: view->encode.unit. check_dataset() does it as well. */

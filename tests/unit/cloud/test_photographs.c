@@ -316,7 +316,9 @@ static void transforms_give_cameras_and_lenses(void **state)
          "transform_matrix", "frames[0]"}, /* scaled */
         {"{" LENS "\"camera_model\":\"EQUIRECTANGULAR\",\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX
          "}]}",
-         "camera_model", "EQUIRECTANGULAR"},
+         "camera_model", "panoramas.json"},
+        {"{\"w\":64,\"h\":32,\"camera_model\":\"EQUIRECTANGULAR\",\"frames\":[{\"file_path\":\"a\"}]}", "camera_model",
+         "panoramas.json"},
         {"{" LENS "\"k1\":\"x\",\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX "}]}", "k1", "text"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -1,4 +1,4 @@
-/* splatd info of datasets with maps and of pruned ones, as people and scripts meet it. */
+/* splatd info of datasets with maps, of pruned ones and of primitives, as people and scripts meet it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,7 +15,7 @@
 
 #include "dataset/rewrite.h"
 #include "support/make_dataset.h"
-#include "support/make_look_map.h"
+#include "support/mapped_dataset.h"
 
 static char folder[256];
 
@@ -48,10 +48,11 @@ static const char *place(const char *name)
     return path;
 }
 
-static void look(const double direction[3], uint8_t color[3], double *range)
+static void look(const struct make_map *map, const double d[3], double color[3], double *range)
 {
-    memset(color, direction[2] > 0 ? 200 : 20, 3);
-    *range = direction[2] > 0 ? INFINITY : 5;
+    (void)map;
+    color[0] = color[1] = color[2] = d[2] > 0 ? 200 : 20;
+    *range = d[2] > 0 ? INFINITY : 5;
 }
 
 static long long number(const json_t *json, const char *key)
@@ -64,11 +65,11 @@ static long long number(const json_t *json, const char *key)
 static void test_maps(void **state)
 {
     const struct spl_dataset *plain = *state;
-    struct spl_map_row row = make_look_row((double[]){1, 2, 3}, 128, 100);
-    make_look_file(plain, &row, look, place("mapped.spld"));
+    const struct make_map map = {.row = mapped_row((double[]){1, 2, 3}, 0, 128, SPL_MAP_LEVELS_MAX, 100), .look = look};
+    write_mapped_alike(plain, &map, 1, true, place("mapped.spld"));
     json_t *json = tell_json("mapped.spld");
     const json_t *maps = json_object_get(json, "maps"), *only = json_array_get(json_object_get(maps, "by_station"), 0);
-    long long bytes = (long long)(spl_map_words(&row) * 4), texels = 6 * 128 * 128;
+    long long bytes = (long long)(spl_map_words(&map.row) * 4), texels = 6 * 128 * 128;
     assert_true(number(maps, "stations") == 1 && number(maps, "texels") == texels && number(maps, "bytes") == bytes);
     assert_float_equal(json_real_value(json_object_get(maps, "bytes_per_texel")), (double)bytes / (double)texels, 1e-9);
     assert_true(number(only, "side") == 128 && number(only, "range_side") == 100 && number(only, "bytes") == bytes);
@@ -77,6 +78,10 @@ static void test_maps(void **state)
     long long resident = number(json, "page_bytes");
     json_decref(json);
     assert_non_null(strstr(tell("mapped.spld"), "\n  maps          1 station of side 128, 98,304 texels, "));
+    char pages[64]; /* maps may stay where they are */
+    snprintf(pages, sizeof pages, ", %.1f MB resident, %.1f MB with all maps\n", (double)(resident - bytes) / 1e6,
+             (double)resident / 1e6);
+    assert_non_null(strstr(tell("mapped.spld"), pages));
 
     /* maps are bytes of the dataset, not of its splats; the stations of their chunks are */
     int rc = spl_dataset_rewrite(&(struct spl_rewrite){.from = plain}, place("plain.spld"), NULL);
@@ -98,14 +103,60 @@ static void test_pruned(void **state)
     bool *leaf = calloc(spl_dataset_get_info(plain)->nodes, sizeof *leaf);
     assert_non_null(leaf);
     leaf[0] = true;
-    struct spl_rewrite what = {.from = plain, .leaf = leaf};
+    json_t *scanned = json_pack("[{s:s, s:s, s:i}]", "from", "rgb", "source", "a.ply", "points", 400), *photographs;
+    json_object_set_new((json_t *)spl_dataset_get_meta(plain), "color", scanned);
+    photographs = json_pack("{s:s, s:s, s:i}", "from", "photographs", "source", "poses.json", "points", 300);
+    struct spl_rewrite what = {.from = plain, .leaf = leaf, .color_source = photographs};
     assert_int_equal(spl_dataset_rewrite(&what, place("pruned.spld"), NULL), 0);
+    json_decref(photographs);
     free(leaf);
     json_t *json = tell_json("pruned.spld");
     assert_true(number(json_object_get(json, "pruned"), "of") == 400 && number(json, "points") == 400);
     assert_true(number(json, "leaf_splats") < 400);
     json_decref(json);
-    assert_non_null(strstr(tell("pruned.spld"), "\n  pruned        of 400 points\n"));
+    const char *told = tell("pruned.spld");
+    assert_non_null(strstr(told, "\n  pruned        of 400 points\n"));
+    assert_non_null(strstr(told, "\n  color from    photographs: 300 points, with the poses of poses.json\n"));
+    assert_non_null(strstr(told, "rgb: the other 100 points, of a.ply\n")); /* counted before they were pruned */
+}
+
+/* Two planes and a wire: what each kind counts, takes and is off, and nothing of those that are coarser. */
+static void test_primitives(void **state)
+{
+    (void)state;
+    static struct spl_panel panels[3];
+    static struct make_splat wire[3];
+    for (int i = 0; i < 3; i++) {
+        panels[i] = (struct spl_panel){.column = (uint8_t)i, .cells = {1u << i}};
+        wire[i] = (struct make_splat){
+            .position = {0.5 * i, 0.2, 1}, .normal = {0, 0, 1}, .radius = 0.01f, .vertex = true, .linear = i < 2};
+    }
+    const struct make_panels made[] = {
+        {.plane = {.normal = {0, 0, 1}, .cell = 0.1f, .error_mean = 0.003f, .error_most = 0.007f, .points = 90},
+         .panels = panels,
+         .count = 3},
+        {.plane = {.normal = {1, 0, 0}, .cell = 0.1f, .error_mean = 0.001f, .error_most = 0.009f, .points = 10},
+         .panels = panels,
+         .count = 1}};
+    make_dataset_file_panels(place("planes.spld"), wire, 3, made, 2, 1);
+    json_t *json = tell_json("planes.spld");
+    const json_t *kinds = json_object_get(json, "kinds"), *all = json_object_get(json, "primitives");
+    const json_t *planes = json_object_get(all, "panels"), *lines = json_object_get(all, "lines");
+    assert_true(number(planes, "count") == 4 && number(planes, "points") == 100);
+    double mean = sqrt((90 * 0.003 * 0.003 + 10 * 0.001 * 0.001) / 100);
+    assert_float_equal(json_real_value(json_object_get(planes, "error_mean")), mean, 1e-8);
+    assert_float_equal(json_real_value(json_object_get(planes, "error_most")), 0.009, 1e-8);
+    assert_true(number(lines, "count") == 2);
+    assert_true(number(planes, "bytes") == number(json_object_get(kinds, "panels"), "bytes") &&
+                number(planes, "bytes") > 0);
+    assert_true(number(lines, "bytes") == number(json_object_get(kinds, "lines"), "bytes") &&
+                number(lines, "bytes") > 0);
+    assert_true(number(json, "leaf_splats") == 100 && number(json, "splats") == 0);
+    json_decref(json);
+    json = tell_json("plain.spld");
+    planes = json_object_get(json_object_get(json, "primitives"), "panels");
+    assert_true(number(planes, "count") == 0 && number(planes, "points") == 0 && number(planes, "bytes") == 0);
+    json_decref(json);
 }
 
 static int begin(void **state)
@@ -113,8 +164,10 @@ static int begin(void **state)
     enum { side = 20 };
     static struct make_splat splats[side * side];
     for (int i = 0; i < side * side; i++)
-        splats[i] = (struct make_splat){
-            .position = {0.1 * (i % side), 0.1 * (i / side)}, .normal = {0, 0, 1}, .radius = 0.07f, .color = {90, 90, 90}};
+        splats[i] = (struct make_splat){.position = {0.1 * (i % side), 0.1 * (i / side)},
+                                        .normal = {0, 0, 1},
+                                        .radius = 0.07f,
+                                        .color = {90, 90, 90}};
     make_folder(folder);
     *state = make_dataset_levels(splats, side * side, 2);
     return 0;
@@ -133,6 +186,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_maps),
         cmocka_unit_test(test_pruned),
+        cmocka_unit_test(test_primitives),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }

@@ -250,6 +250,61 @@ static int clean(void **state)
     return rmdir(folder);
 }
 
+/* Five splats, three panels for 40 points and two meshes for 25. */
+static void make_primitives(const char *name)
+{
+    char path[300];
+    struct make_splat splats[5];
+    struct spl_panel panels[3] = {{.column = 1}, {.column = 2}, {.column = 3}};
+    struct spl_relief reliefs[2] = {{.level = 1, .height = {0.01f, 0.02f}}, {.level = 1}};
+    for (int i = 0; i < 5; i++)
+        splats[i] = (struct make_splat){.position = {i, 0, 0}, .normal = {0, 0, 1}, .radius = 0.5f};
+    for (int i = 0; i < 3; i++)
+        panels[i].cells[4] = 7;
+    struct make_panels made[2] = {{.plane = {.normal = {0, 0, 1}, .cell = 0.1f, .error_mean = 0.003f,
+                                             .error_most = 0.009f, .points = 40},
+                                   .panels = panels,
+                                   .count = 3},
+                                  {.plane = {.normal = {0, 0, 1}, .cell = 0.1f, .error_mean = 0.004f,
+                                             .error_most = 0.02f, .points = 25},
+                                   .panels = panels,
+                                   .reliefs = reliefs,
+                                   .count = 2}};
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    make_dataset_file_panels(path, splats, 5, made, 2, 1);
+}
+
+static void test_panels_and_meshes(void **state)
+{
+    (void)state;
+    char output[8192];
+    make_primitives("shapes.spld");
+    assert_int_equal(run("--json shapes.spld", output, sizeof output), 0);
+    json_t *json = json_loads(output, 0, NULL);
+    const json_t *all = json_object_get(json, "primitives"), *kinds = json_object_get(json, "kinds");
+    const json_t *panels = json_object_get(all, "panels"), *meshes = json_object_get(all, "meshes");
+    const json_t *level = json_array_get(json_object_get(json, "by_level"), 0);
+    assert_true(number(json, "leaf_splats") == 70 && number(json, "splats") == 5);
+    assert_true(number(panels, "count") == 3 && number(panels, "points") == 40);
+    assert_true(number(meshes, "count") == 2 && number(meshes, "points") == 25);
+    assert_float_equal(number(panels, "error_mean"), 0.003, 1e-7);
+    assert_float_equal(number(panels, "error_most"), 0.009, 1e-7);
+    assert_float_equal(number(meshes, "error_mean"), 0.004, 1e-7);
+    assert_float_equal(number(meshes, "error_most"), 0.02, 1e-7);
+    assert_true(number(meshes, "bytes") == 60 + 4 * 2 * (2 + 3 + 1 + 1)); /* of one mask and one colour each */
+    assert_true(number(json_object_get(kinds, "meshes"), "bytes") == number(meshes, "bytes"));
+    assert_true(number(json_object_get(kinds, "meshes"), "meshes") == 2);
+    assert_true(number(level, "panels") == 3 && number(level, "meshes") == 2);
+    assert_float_equal(number(json_object_get(json, "bytes_per_splat"), "meshes"), number(meshes, "bytes") / 70, 1e-9);
+    json_decref(json);
+    assert_int_equal(run("shapes.spld", output, sizeof output), 0);
+    assert_non_null(strstr(output, "  panels        3 for 40 points (57.14 %)"));
+    assert_non_null(
+        strstr(output, "  meshes        2 for 25 points (35.71 %), 0.1 kB; points off them 0.004 us-ft, 0.02"));
+    assert_non_null(strstr(output, "panels      meshes"));
+    assert_non_null(strstr(output, "bytes a point"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -258,6 +313,7 @@ int main(void)
         cmocka_unit_test(test_texts_of_files_are_shown_not_carried_out),
         cmocka_unit_test(test_exit_codes),
         cmocka_unit_test(test_textures),
+        cmocka_unit_test(test_panels_and_meshes),
     };
     return cmocka_run_group_tests(tests, prepare, clean);
 }

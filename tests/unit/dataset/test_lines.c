@@ -91,6 +91,29 @@ static void a_piece_costs_few_bytes(void **state)
         assert_true(a == SPL_ATTRIBUTE_LINES || bits[a] == 0);
 }
 
+/* Within a code's rounding, 1 + 16 log2(width / 0.25 mm); 0 is not known, and of discs nothing is. */
+static void widths_come_back(void **state)
+{
+    (void)state;
+    static struct made m;
+    struct spl_chunk_options with_width = options;
+    make(&m, 40, 20);
+    assert_true(spl_chunk_line_width(&m.chunk) == 0);
+    for (double width = 1e-6; width < 100; width *= 1.3) {
+        with_width.width = width;
+        spl_chunk_encode(m.vertices, (const double(*)[3])m.position, 40, &with_width, &m.chunk, m.words, NULL);
+        assert_null(spl_chunk_get_codec(SPL_CHUNK_LINES)->judge(&m.chunk));
+        double within = fmin(fmax(width, 0.25e-3), 0.25e-3 * exp2(254 / 16.0));
+        assert_true(fabs(spl_chunk_line_width(&m.chunk) / within - 1) < 0.0221);
+        assert_int_equal(spl_chunk_count_pieces(&m.chunk), 38);
+        assert_int_equal(m.used, spl_chunk_words(&m.chunk));
+    }
+    assert_int_equal(spl_line_width_code(NAN), 0);
+    assert_int_equal(spl_line_width_code(INFINITY), 255);
+    m.chunk.extra_bits &= 0xffffff;
+    assert_true(spl_chunk_line_width(&m.chunk) == 0);
+}
+
 /* Colours change, nothing else does. */
 static void lines_are_recoloured(void **state)
 {
@@ -153,7 +176,7 @@ static void what_lines_do_not_have_is_refused(void **state)
     assert_null(judge(&m.chunk));
     struct spl_chunk forged[] = {m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk, m.chunk};
     forged[0].extra_bits |= 3; /* bits that no chunk has */
-    forged[1].extra_bits |= 1 << 15;
+    forged[1].geometry_bits |= 3 << SPL_GEOMETRY_AXIS;
     forged[2].extra_bits += 19 << SPL_EXTRA_LINES;                   /* 21 lines of 40 vertices */
     forged[3].extra_bits &= ~(255u << SPL_EXTRA_LINES);              /* none */
     forged[4].geometry_bits ^= 3u << SPL_GEOMETRY_LINEAR;            /* all are joined, to what? */
@@ -171,6 +194,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(vertices_come_back),
         cmocka_unit_test(a_piece_costs_few_bytes),
+        cmocka_unit_test(widths_come_back),
         cmocka_unit_test(lines_are_recoloured),
         cmocka_unit_test(ids_go_on_over_both_kinds),
         cmocka_unit_test(what_lines_do_not_have_is_refused),

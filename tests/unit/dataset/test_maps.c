@@ -208,6 +208,7 @@ static void what_cannot_be_written_leaves_nothing(void **state)
     }
 FORGE(rotation_nan, rows[1].rotation[4] = NAN)
 FORGE(rotation_scaled, rows[0].rotation[8] = 1.1)
+FORGE(rotation_mirrored, (rows[0].rotation[0] *= -1, rows[0].rotation[1] *= -1, rows[0].rotation[2] *= -1))
 FORGE(position_infinite, rows[0].position[2] = INFINITY)
 FORGE(side_zero, rows[1].side = 0)
 FORGE(side_odd, rows[1].side = 65)
@@ -256,6 +257,7 @@ static void what_is_wrong_is_refused(void **state)
         const char *part;
     } rows[] = {
         {rotation_nan, "section PANO: station 1 has a rotation that is none"},
+        {rotation_mirrored, "section PANO: station 0 has a rotation that mirrors"},
         {rotation_scaled, "section PANO: station 0 has a rotation that is none"},
         {position_infinite, "section PANO: station 0 has a position that is no number"},
         {side_zero, "section PANO: station 1 has sides or levels"},

@@ -292,6 +292,38 @@ static void nothing_dropped_is_nothing_changed(void **state)
     free(leaf);
 }
 
+/* Panels and meshes are copied as they are, and counted. */
+static void panels_and_meshes_stay(void **state)
+{
+    (void)state;
+    struct spl_panel panels[40] = {0};
+    struct spl_relief reliefs[40] = {0};
+    for (int i = 0; i < 40; i++) {
+        panels[i].column = (uint8_t)i;
+        panels[i].cells[i % 16] = (uint16_t)(i * 1601 + 1);
+        reliefs[i].level = 3;
+        for (int k = 0; k < SPL_RELIEF_POINTS_MAX; k++)
+            reliefs[i].height[k] = 0.01f * (float)((i * k) % 17);
+    }
+    const struct spl_panel_plane plane = {.normal = {0, 0.6f, 0.8f}, .cell = 0.1f, .points = 90};
+    const struct make_panels made[2] = {{.plane = plane, .panels = panels, .count = 40},
+                                        {.plane = plane, .panels = panels, .reliefs = reliefs, .count = 40}};
+    make_dataset_file_panels(path, NULL, 0, made, 2, 1);
+    struct spl_dataset *from = open_it(UINT64_MAX), *copy = prune(from, NULL, UINT64_MAX);
+    const struct spl_dataset_info *a = spl_dataset_get_info(from), *b = spl_dataset_get_info(copy);
+    struct side s[2] = {take_side(from), take_side(copy)};
+    size_t bytes[2];
+    assert_true(b->panels == 40 && b->panel_points == 90 && b->meshes == 40 && b->mesh_points == 90);
+    assert_memory_equal(a->attribute_bits, b->attribute_bits, sizeof a->attribute_bits);
+    assert_true(s[0].chunk_count == 4 && s[1].chunk_count == 4);
+    assert_memory_equal(s[0].chunks, s[1].chunks, 4 * sizeof *s[0].chunks);
+    const void *words = spl_dataset_get_page(from, 0, &bytes[0]), *copied = spl_dataset_get_page(copy, 0, &bytes[1]);
+    assert_true(bytes[0] == bytes[1] && bytes[0] > 40 * 4 * (2 + 2 + 21));
+    assert_memory_equal(words, copied, bytes[0]);
+    spl_dataset_close(from);
+    spl_dataset_close(copy);
+}
+
 struct coding {
     const struct spl_dictionary *dictionary;
     struct side *from;
@@ -336,8 +368,8 @@ static void new_colors_and_codes_go_by_old_numbers(void **state)
         uint64_t up = n;
         while (up && up != s.nodes[0].first_child) {
             uint64_t parent = 0;
-            while (up < s.nodes[parent].first_child || up >= s.nodes[parent].first_child + s.nodes[parent].child_count ||
-                   !s.nodes[parent].child_count)
+            while (up < s.nodes[parent].first_child ||
+                   up >= s.nodes[parent].first_child + s.nodes[parent].child_count || !s.nodes[parent].child_count)
                 parent++;
             up = parent;
         }
@@ -444,6 +476,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_stays_is_what_it_was),
         cmocka_unit_test(nothing_dropped_is_nothing_changed),
+        cmocka_unit_test(panels_and_meshes_stay),
         cmocka_unit_test(new_colors_and_codes_go_by_old_numbers),
         cmocka_unit_test(refused_memory_leaves_nothing),
         cmocka_unit_test(what_has_lines_alone_is_no_dataset),

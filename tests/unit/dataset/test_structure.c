@@ -196,7 +196,8 @@ FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
 FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
 static void set_color(struct parts *p, const char *from, int points)
 {
-    json_object_set_new(p->meta, "color", json_pack("[{s:s, s:s, s:i}]", "source", "a", "from", from, "points", points));
+    json_object_set_new(p->meta, "color",
+                        json_pack("[{s:s, s:s, s:i}]", "source", "a", "from", from, "points", points));
 }
 FORGE(color, set_color(p, "rgb", 400))
 FORGE(color_text, json_object_set_new(p->meta, "color", json_string("rgb")))
@@ -243,11 +244,13 @@ static const struct {
     {two_of_a_name, "section META: \"streams[2].name\" is \"class\", and must be another: a stream"},
     {empty_name, "section META: \"streams[2].name\" is \"\", and must be a text of 1"},
     {long_name, "section META: \"streams[2].name\" is \"a-name-of"},
-    {long_unit, "section META: \"streams[2].unit\" is \"a-unit-of-thirty-two-characters-\", and must be a text of at most"},
+    {long_unit,
+     "section META: \"streams[2].unit\" is \"a-unit-of-thirty-two-characters-\", and must be a text of at most"},
     {taken_name, "section META: \"streams[2].name\" is \"position\", and must be another: this is what every"},
     {total_name, "section META: \"streams[2].name\" is \"total\", and"},
     {uncertainty_negative, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative"},
-    {uncertainty_wide, "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative or not finite, or codes"},
+    {uncertainty_wide,
+     "section HEAD 0: attribute uncertainty of chunk 0 has a largest value that is negative or not finite, or codes"},
     {unit_text, "section META: \"unit\" is \"furlong\", and must be m, ft"},
     {unit_number, "section META: \"unit\" is 1, and must be m, ft"},
     {unit_gone, NULL},
@@ -424,8 +427,9 @@ FORGE_RAW(raw_fewer_children, set_children(r, 0, 3))
 FORGE_RAW(raw_chunks_none, set_chunks(r, 1, 0))
 FORGE_RAW(raw_chunks_beyond, set_chunks(r, 4, 4096))
 FORGE_RAW(raw_chunks_many, set_chunks(r, 4, 4097))
-FORGE_RAW(raw_unknown_kind, (r->data[r->table[HEAD].offset + 5 * SPL_NODE_BYTES + SPL_CHUNK_BYTES - 1] = SPL_CHUNK_KINDS,
-                             rehash(r, HEAD)))
+FORGE_RAW(raw_unknown_kind,
+          (r->data[r->table[HEAD].offset + 5 * SPL_NODE_BYTES + SPL_CHUNK_BYTES - 1] = SPL_CHUNK_KINDS,
+           rehash(r, HEAD)))
 FORGE_RAW(raw_head_damaged, r->data[r->table[HEAD].offset] ^= 1)
 FORGE_RAW(raw_splats, set_meta(r, "\"splats\": 450", "\"splats\": 449"))
 FORGE_RAW(raw_splats_many, set_meta(r, "\"splats\": 450", "\"splats\": 451"))
@@ -501,7 +505,7 @@ static const struct {
     {raw_unknown_kind, SPL_E_CORRUPT, "section HEAD 0: chunk 0 is of a kind"},
     {raw_head_damaged, SPL_E_CORRUPT, "section HEAD 0 fails its checksum; copy"},
     {raw_splats, SPL_E_CORRUPT, "section META: \"counts\" is not what the nodes and chunks hold"},
-    {raw_splats_many, SPL_E_CORRUPT, "section META: \"counts\" has more splats or pieces than PDIR"},
+    {raw_splats_many, SPL_E_CORRUPT, "section META: \"counts\" has more splats, pieces, panels or meshes than PDIR"},
     {raw_splats_few, SPL_E_CORRUPT, "section META: \"counts.splats\" is "},
     {raw_splats_negative, SPL_E_CORRUPT, "section META: \"counts\" is an object, and must be"},
     {raw_pieces, SPL_E_CORRUPT, "section META: \"counts\" is not what"},
@@ -535,7 +539,8 @@ static void test_forged_layout(void **state)
     release(&p);
 }
 
-/* What a later writer adds, by a type that this reader does not know: it is passed over, and those behind it are read. */
+/* What a later writer adds, by a type that this reader does not know: it is passed over, and those behind it are read.
+ */
 static void test_unknown_streams(void **state)
 {
     (void)state;

@@ -93,6 +93,10 @@ static void normals_are_unit_and_ids_are_whole(void **state)
     spl_image_enlarge(&from, 0.5, &to, 0, to.height);
     const uint32_t wanted[] = {7, 7, UINT32_MAX, UINT32_MAX, 9, 7, 7, UINT32_MAX, UINT32_MAX, 9};
     assert_memory_equal(large, wanted, sizeof wanted);
+    from.layer = to.layer = SPL_LAYER_PRIMITIVE;
+    memset(large, 0, sizeof large);
+    spl_image_enlarge(&from, 0.5, &to, 0, to.height);
+    assert_memory_equal(large, wanted, sizeof wanted);
 }
 
 static void coverage_fades(void **state)

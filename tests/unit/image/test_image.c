@@ -149,7 +149,7 @@ static void png_depth_is_big_endian_in_the_file(void **state)
     spl_encoded_finish(&png);
 }
 
-static void png_of_normals_ids_and_coverage(void **state)
+static void png_of_the_other_layers(void **state)
 {
     (void)state;
     float normals[] = {0, 0, 0, 1, 0, -1, 0, 0.6f, 0.8f, NAN, 0, 1};
@@ -171,6 +171,19 @@ static void png_of_normals_ids_and_coverage(void **state)
     png = ENCODE(&id_image, .format = SPL_FORMAT_PNG);
     decoded = decode_png(&png, &header, NULL);
     assert_memory_equal(decoded, id_bytes, sizeof id_bytes);
+    free(decoded);
+    spl_encoded_finish(&png);
+
+    uint32_t shapes[] = {SPL_SHAPE_NONE, SPL_SHAPE_SPLAT, SPL_SHAPE_LINE, SPL_SHAPE_PANEL, SPL_SHAPE_MESH, UINT32_MAX};
+    static const uint8_t shape_bytes[] = {0,   0,  0, 86, 180, 233, 240, 228, 66,
+                                          213, 94, 0, 0,  158, 115, 255, 255, 255};
+    struct spl_image shape_image = {SPL_LAYER_PRIMITIVE, SPL_PIXEL_U32, 3, 2, shapes};
+    png = ENCODE(&shape_image, .format = SPL_FORMAT_PNG);
+    decoded = decode_png(&png, &header, note);
+    assert_int_equal(header.color_type, SPNG_COLOR_TYPE_TRUECOLOR);
+    assert_int_equal(header.bit_depth, 8);
+    assert_memory_equal(decoded, shape_bytes, sizeof shape_bytes);
+    assert_string_equal(note, "");
     free(decoded);
     spl_encoded_finish(&png);
 
@@ -257,16 +270,18 @@ static void jpeg_of_the_other_layers(void **state)
 {
     (void)state;
     float normals[3 * 256] = {0}, coverage[256];
-    uint32_t ids[256];
+    uint32_t ids[256], shapes[256];
     for (int i = 0; i < 256; i++) {
+        shapes[i] = i < 128 ? SPL_SHAPE_SPLAT : SPL_SHAPE_NONE;
         normals[3 * i + 2] = i < 128 ? 1 : 0;
         ids[i] = i < 128 ? 12345 : UINT32_MAX;
         coverage[i] = i < 128 ? 1 : 0;
     }
     struct spl_image images[] = {{SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 16, 16, normals},
                                  {SPL_LAYER_ID, SPL_PIXEL_U32, 16, 16, ids},
+                                 {SPL_LAYER_PRIMITIVE, SPL_PIXEL_U32, 16, 16, shapes},
                                  {SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 16, 16, coverage}};
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         struct spl_encoded jpeg = ENCODE(&images[i], .format = SPL_FORMAT_JPEG, .quality = 100);
         int width, height, sampling;
         uint8_t *rgb = decode_jpeg(&jpeg, &width, &height, &sampling);
@@ -306,13 +321,15 @@ static void npy_header_is_as_numpy_writes_it(void **state)
     uint32_t id = 7;
     struct spl_image others[] = {{SPL_LAYER_DEPTH, SPL_PIXEL_F32, 3, 2, numbers},
                                  {SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 2, 1, numbers},
-                                 {SPL_LAYER_ID, SPL_PIXEL_U32, 1, 1, &id}};
+                                 {SPL_LAYER_ID, SPL_PIXEL_U32, 1, 1, &id},
+                                 {SPL_LAYER_PRIMITIVE, SPL_PIXEL_U32, 1, 1, &id}};
     static const char *const dictionaries[] = {
         "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3), }",
         "{'descr': '<u4', 'fortran_order': False, 'shape': (1, 1), }",
+        "{'descr': '<u4', 'fortran_order': False, 'shape': (1, 1), }",
     };
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         npy = ENCODE(&others[i], .format = SPL_FORMAT_NPY);
         size_t header_bytes = 10u + npy.bytes[8] + 256u * npy.bytes[9];
         assert_int_equal(header_bytes % 64, 0);
@@ -465,7 +482,7 @@ int main(void)
         cmocka_unit_test(png_color_is_lossless_and_keeps_alpha),
         cmocka_unit_test(png_depth_is_16_bit_with_scale_and_saturation),
         cmocka_unit_test(png_depth_is_big_endian_in_the_file),
-        cmocka_unit_test(png_of_normals_ids_and_coverage),
+        cmocka_unit_test(png_of_the_other_layers),
         cmocka_unit_test(jpeg_of_color_is_close_and_opaque),
         cmocka_unit_test(jpeg_of_depth_ends_its_map_at_the_robust_range),
         cmocka_unit_test(jpeg_of_flat_and_empty_depth),

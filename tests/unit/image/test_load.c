@@ -140,8 +140,9 @@ static void npy_comes_back_to_the_bit(void **state)
         {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 3, 2, words}, {SPL_LAYER_DEPTH, SPL_PIXEL_F32, 2, 3, words},
         {SPL_LAYER_RANGE, SPL_PIXEL_F32, 6, 1, words},   {SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 2, 1, words},
         {SPL_LAYER_ID, SPL_PIXEL_U32, 1, 6, words},      {SPL_LAYER_COVERAGE, SPL_PIXEL_F32, 3, 2, words},
+        {SPL_LAYER_PRIMITIVE, SPL_PIXEL_U32, 2, 3, words},
     };
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 7; i++) {
         struct spl_encoded encoded = put_encoded(&images[i], SPL_FORMAT_NPY);
         spl_encoded_finish(&encoded);
         struct spl_image back;

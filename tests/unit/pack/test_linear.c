@@ -11,6 +11,7 @@
 
 #include "clouds.h"
 #include "pack/linear.h"
+#include "support/sanitised.h"
 
 enum { most = 200000 };
 
@@ -229,6 +230,7 @@ static double cpu_s(void)
 static void test_cancelled_within_a_level(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct cloud *c = new_cloud(0.002);
     double took[2];
     for (int w = 0; w < 60; w++)

@@ -165,6 +165,22 @@ static void put_png(const char *name, uint32_t width, uint32_t height, const uin
     free(image.pixels);
 }
 
+/* 16 bit grey. */
+static void put_deep_png(const char *name, uint32_t width, uint32_t height)
+{
+    struct spl_image image = {.layer = SPL_LAYER_DEPTH, .type = SPL_PIXEL_F32, .width = width, .height = height};
+    const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
+    struct spl_encoded png;
+    image.pixels = calloc((size_t)width * height, sizeof(float));
+    assert_int_equal(spl_image_encode(&image, &options, &png, NULL), 0);
+    FILE *file = fopen(in(name), "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(png.bytes, 1, png.length, file), png.length);
+    fclose(file);
+    spl_encoded_finish(&png);
+    free(image.pixels);
+}
+
 static void refused(const struct spl_map_row *row, const char *field, const char *part)
 {
     struct spl_image picture = make_picture();
@@ -220,8 +236,14 @@ static void edits_that_do_not_fit_are_refused(void **state)
     refused(&row, "", "neither PNG nor JPEG");
     unlink(in("station-1.color.png"));
     refused(&row, "", "no such file");
-    put_text("maps.json", "{\"maps\": [{\"name\": \"station-1\", \"color\": \"a.png\", \"side\": 1e9}]}");
+    put_text("maps.json", "{\"maps\": [{\"name\": \"station-1\", \"color\": \"a.png\", \"side\": 1000000000}]}");
     refused(&row, "side", "has a side of");
+    put_text("maps.json", "{\"maps\": [{\"name\": \"station-1\", \"color\": \"a.png\", \"side\": 64.5}]}");
+    refused(&row, "side", "no side that is a whole number");
+    put_text("maps.json", "{\"maps\": [{\"name\": \"station-1\", \"color\": \"deep.png\", \"side\": 64}]}");
+    put_deep_png("deep.png", 6 * side, side);
+    refused(&row, "color", "16 bits a channel");
+    unlink(in("deep.png"));
     put_text("maps.json", "{\"maps\": [{\"name\": 3, \"color\": \"a.png\", \"side\": 64}]}");
     refused(&row, "name", "map 1");
     put_text("maps.json", "{\"maps\": []}");

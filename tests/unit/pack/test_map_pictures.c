@@ -16,27 +16,9 @@
 #include "pack/maps/pictures.h"
 #include "pack/texture/photo_image.h"
 #include "support/e57_writer.h"
+#include "support/folder.h"
 
 enum { width = 64, height = 32 };
-
-static char folder[] = "/tmp/splatd-map-pictures-XXXXXX";
-
-static const char *at(const char *name)
-{
-    static char paths[4][256];
-    static unsigned next;
-    char *path = paths[next++ % 4];
-    snprintf(path, sizeof *paths, "%s/%s", folder, name);
-    return path;
-}
-
-static void put(const char *name, const void *bytes, size_t length)
-{
-    FILE *file = fopen(at(name), "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    fclose(file);
-}
 
 static struct spl_encoded make_png(uint32_t w, uint32_t h)
 {
@@ -52,7 +34,7 @@ static struct spl_encoded make_png(uint32_t w, uint32_t h)
 static void put_png(const char *name, uint32_t w, uint32_t h)
 {
     struct spl_encoded png = make_png(w, h);
-    put(name, png.bytes, png.length);
+    folder_put(name, png.bytes, png.length);
     spl_encoded_finish(&png);
 }
 
@@ -65,7 +47,7 @@ static void put_deep_png(const char *name)
     const struct spl_encode_options options = {.size = sizeof options, .format = SPL_FORMAT_PNG};
     struct spl_encoded png;
     assert_int_equal(spl_image_encode(&image, &options, &png, NULL), 0);
-    put(name, png.bytes, png.length);
+    folder_put(name, png.bytes, png.length);
     spl_encoded_finish(&png);
 }
 
@@ -76,7 +58,7 @@ static void put_list(const char *name, const char *const *images, size_t count)
         sprintf(json + strlen(json), "%s{\"name\": \"p%zu\", \"color\": \"%s\", \"position\": [%zu, 0, 0], "
                                      "\"quaternion\": [1, 0, 0, 0]}", i ? "," : "", i, images[i], i);
     strcat(json, "]}");
-    put(name, json, strlen(json));
+    folder_put(name, json, strlen(json));
 }
 
 /* One scan; with an image of an E57 file's own kinds where `image` says one. */
@@ -99,7 +81,7 @@ static void put_e57(const char *name, bool posed)
                   e57_pose(1, 0, 0, 0, 0, 0, 0), posed ? "sphericalRepresentation" : "visualReferenceRepresentation",
                   blob, png.length, posed ? "sphericalRepresentation" : "visualReferenceRepresentation");
     uint8_t *file = e57_end(&w, NULL, &length);
-    put(name, file, length);
+    folder_put(name, file, length);
     free(file);
     spl_encoded_finish(&png);
 }
@@ -109,12 +91,13 @@ static void scans_bring_panoramas_along(void **state)
     struct spl_map_sources found;
     struct spl_view_list list;
     (void)state;
-    assert_int_equal(mkdir(at("scan"), 0777), 0);
-    put("scan/a.ply", "ply", 3);
-    put("scan/b.ply", "ply", 3);
+    assert_int_equal(mkdir(in_folder("scan"), 0777), 0);
+    folder_put("scan/a.ply", "ply", 3);
+    folder_put("scan/b.ply", "ply", 3);
     put_e57("scan/with.e57", true);
     put_e57("scan/without.e57", false);
-    const char *scans[] = {at("scan/a.ply"), at("scan/b.ply"), at("scan/with.e57"), at("scan/without.e57")};
+    const char *scans[] = {in_folder("scan/a.ply"), in_folder("scan/b.ply"), in_folder("scan/with.e57"),
+                           in_folder("scan/without.e57")};
     assert_int_equal(spl_map_sources_find(scans, 4, &found, NULL), 0);
     assert_int_equal(found.count, 1);
     assert_string_equal(found.paths[0], scans[2]);
@@ -123,17 +106,17 @@ static void scans_bring_panoramas_along(void **state)
     assert_int_equal(found.count, 0);
     spl_map_sources_finish(&found);
 
-    assert_int_equal(mkdir(at("scan/panoramas"), 0777), 0);
-    put("scan/panoramas/else.json", "{}", 2);
+    assert_int_equal(mkdir(in_folder("scan/panoramas"), 0777), 0);
+    folder_put("scan/panoramas/else.json", "{}", 2);
     assert_int_equal(spl_map_sources_find(scans, 2, &found, NULL), 0);
     assert_int_equal(found.count, 0);
     spl_map_sources_finish(&found);
     put_list("scan/panoramas/panoramas.json", (const char *const[]){"s.png"}, 1);
     put_png("scan/panoramas/s.png", width, height);
-    const char *again[] = {at("scan/a.ply"), at("scan/b.ply"), at("scan/with.e57")};
+    const char *again[] = {in_folder("scan/a.ply"), in_folder("scan/b.ply"), in_folder("scan/with.e57")};
     assert_int_equal(spl_map_sources_find(again, 3, &found, NULL), 0);
     assert_int_equal(found.count, 2);
-    assert_string_equal(found.paths[0], at("scan/panoramas"));
+    assert_string_equal(found.paths[0], in_folder("scan/panoramas"));
 
     /* both, in one list */
     const struct spl_map_picture_options both = {.paths = (const char *const *)found.paths, .count = 2};
@@ -151,7 +134,7 @@ static void scans_bring_panoramas_along(void **state)
 
     /* a name alone lies in the folder where one is */
     char *old = getcwd(NULL, 0);
-    assert_int_equal(chdir(at("scan")), 0);
+    assert_int_equal(chdir(in_folder("scan")), 0);
     assert_int_equal(spl_map_sources_find((const char *const[]){"a.ply"}, 1, &found, NULL), 0);
     assert_int_equal(found.count, 1);
     assert_string_equal(found.paths[0], "panoramas");
@@ -196,15 +179,15 @@ static void headers_are_checked_before_packing(void **state)
     };
     struct spl_encoded png = make_png(width, height);
     (void)state;
-    put("empty.png", "", 0);
-    put("cut.png", png.bytes, 20);
+    folder_put("empty.png", "", 0);
+    folder_put("cut.png", png.bytes, 20);
     put_deep_png("deep.png");
     put_png("square.png", 32, 32);
     put_png("good.png", width, height);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_view_list list;
         struct spl_error err = {0};
-        const char *path = at("panoramas.json");
+        const char *path = in_folder("panoramas.json");
         struct spl_map_picture_options options = {.paths = &path, .count = 1};
         put_list("panoramas.json", (const char *const[]){"good.png", cases[i].image, "good.png"}, 3);
         assert_int_equal(spl_map_pictures_load(&options, &list, &err), cases[i].code);
@@ -220,8 +203,8 @@ static void headers_are_checked_before_packing(void **state)
         assert_string_equal(list.views[0].name, "p0-front");
         assert_string_equal(list.views[6].name, "p2-front");
         spl_view_list_finish(&list);
-        put("other.json", "{}", 2);
-        options.paths = (const char *const[]){at("other.json"), path};
+        folder_put("other.json", "{}", 2);
+        options.paths = (const char *const[]){in_folder("other.json"), path};
         options.count = 2;
         assert_int_equal(spl_map_pictures_load(&options, &list, NULL), 0);
         assert_int_equal(refused_count, 3);
@@ -235,25 +218,11 @@ static void headers_are_checked_before_packing(void **state)
     spl_encoded_finish(&png);
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    char command[256];
-    (void)state;
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scans_bring_panoramas_along),
         cmocka_unit_test(headers_are_checked_before_packing),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

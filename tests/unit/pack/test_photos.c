@@ -14,6 +14,7 @@
 #include "pack/texture/resample.h"
 #include "pack/texture/colors.h"
 #include "support/make_dataset.h"
+#include "support/sanitised.h"
 
 enum { side = 64 };
 
@@ -68,6 +69,7 @@ static void what_is_no_photograph_of_the_camera_is_refused(void **state)
 static void samples_follow_the_footprint_and_leave_the_sky_out(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_named_view view = make_view();
     struct spl_photo photo;
     struct spl_image image = make_image(side, side, 40, 200);
@@ -92,6 +94,7 @@ static void samples_follow_the_footprint_and_leave_the_sky_out(void **state)
 static void what_hides_a_splat_is_seen(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_named_view view = make_view();
     struct spl_image image = make_image(side, side, 90, 90);
     struct spl_photo photo;
@@ -130,6 +133,7 @@ static void what_hides_a_splat_is_seen(void **state)
 static void the_best_are_kept_in_any_order(void **state)
 {
     (void)state;
+    skip_under_tsan();
     static const uint16_t scores[6] = {500, 900, 100, 900, 700, 800};
     for (int turn = 0; turn < 6; turn++) {
         struct spl_candidates candidates;
@@ -213,7 +217,7 @@ static void exposures_are_found_among_outliers(void **state)
     const double factor[5] = {0.8, 1, 1.25, 0.9, 1 / 0.9};
     struct spl_candidates candidates;
     struct spl_gain gains[6];
-    assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
+    assert_int_equal(spl_candidates_init(&candidates, TEST_SIZE(20000, 5000), 4, NULL), 0);
     assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, 2, NULL), 0); /* nothing is seen: nothing changes */
     for (int i = 0; i < 6; i++)
         assert_true(gains[i].factor[0][0] == 1 && gains[i].shared == 0 && !spl_gain_contradicts(&gains[i]));
@@ -224,7 +228,7 @@ static void exposures_are_found_among_outliers(void **state)
         assert_false(spl_gain_contradicts(&gains[i]) || spl_gain_doubtful(&gains[i]));
     }
     spl_candidates_finish(&candidates);
-    assert_int_equal(spl_candidates_init(&candidates, 20000, 4, NULL), 0);
+    assert_int_equal(spl_candidates_init(&candidates, TEST_SIZE(20000, 5000), 4, NULL), 0);
     fill(&candidates, 5, factor, true);
     assert_int_equal(spl_gains_find(&candidates, NULL, 5, gains, 2, NULL), 0);
     assert_true(spl_gain_contradicts(&gains[2]) && spl_gain_doubtful(&gains[2]));
@@ -237,6 +241,7 @@ static void exposures_are_found_among_outliers(void **state)
 static void a_scan_of_print_brightens_nothing(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_candidates candidates;
     struct spl_gain gains[3];
     enum { splats = 20000 };
@@ -328,6 +333,7 @@ static float smooth(double x, double y)
 static void textures_show_the_plane_and_not_the_view(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_named_view view = make_view();
     assert_int_equal(
         spl_camera_look_at(&view.camera, (double[]){0.6, -1.5, 0.4}, (double[]){0, 0, 0}, (double[]){0, 0, 1}, NULL),
@@ -401,6 +407,7 @@ static void textures_show_the_plane_and_not_the_view(void **state)
 static void resampling_is_measured_through_a_lens(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_named_view view = make_view();
     view.camera.fx = view.camera.fy = 200;
     view.camera.width = view.camera.height = 200;

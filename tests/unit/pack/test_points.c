@@ -10,6 +10,7 @@
 #include "clouds.h"
 #include "dataset/format.h"
 #include "geom/morton.h"
+#include "pack/eyes.h"
 #include "pack/neighbours.h"
 #include "pack/order.h"
 
@@ -52,6 +53,27 @@ static void test_order_sorts_and_drops(void **state)
         free(position);
         spl_points_finish(&p);
     }
+}
+
+/* Fewer points than threads, or few more: some threads have none. */
+static void test_few_points_in_many_threads(void **state)
+{
+    (void)state;
+    enum { most = 129 };
+    static const unsigned many_threads[] = {2, 7, 64};
+    double(*position)[3] = shape_points(SHAPE_SPHERE, most, 5);
+    for (size_t count = 1; count <= most; count += 1 + count / 4)
+        for (size_t t = 0; t < sizeof many_threads / sizeof *many_threads; t++) {
+            unsigned threads = many_threads[t];
+            struct spl_points one = sorted((const double(*)[3])position, count, 1);
+            struct spl_points many = sorted((const double(*)[3])position, count, threads);
+            assert_int_equal(many.count, count);
+            for (int c = 0; c < 3; c++)
+                assert_memory_equal(one.axis[c], many.axis[c], count * sizeof(double));
+            spl_points_finish(&one);
+            spl_points_finish(&many);
+        }
+    free(position);
 }
 
 static void test_first_duplicate_stays(void **state)
@@ -269,6 +291,33 @@ static void test_normals_face_the_station(void **state)
         assert_true(p.normal[i][0] * p.axis[0][i] + p.normal[i][1] * p.axis[1][i] + p.normal[i][2] * p.axis[2][i] < 0);
     free(position);
     spl_points_finish(&p);
+}
+
+/* The same without a scanner, but for cameras: of thousands as many as are enough. A plane shows the side that they are
+ * on, also where that is below it. */
+static void test_normals_face_the_eyes(void **state)
+{
+    (void)state;
+    enum { eyes = 3000, count = 5000 };
+    struct spl_view_list list = {.views = calloc(eyes, sizeof *list.views)};
+    for (int inside = 0; inside < 2; inside++) {
+        double(*position)[3] = shape_points(inside ? SHAPE_SPHERE : SHAPE_PLANE, count, 4);
+        struct spl_points p = sorted((const double(*)[3])position, count, 2);
+        for (list.count = 0; list.count < eyes; list.count++)
+            list.views[list.count].camera.eye[2] = inside ? 0.2 : -3 - 0.001 * (double)list.count;
+        assert_int_equal(spl_eyes_take(&p, &list, NULL), 0);
+        assert_in_range(p.eye_count, 1, 100);
+        surface(&p, 2);
+        for (size_t i = 0; i < p.count; i++) {
+            double inwards = 0;
+            for (int c = 0; c < 3; c++)
+                inwards -= (double)p.normal[i][c] * p.axis[c][i];
+            assert_true(inside ? inwards > 0 : p.normal[i][2] < 0);
+        }
+        free(position);
+        spl_points_finish(&p);
+    }
+    free(list.views);
 }
 
 static void test_given_normals_stay(void **state)
@@ -506,10 +555,12 @@ static void test_threads_do_not_matter(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_order_sorts_and_drops),        cmocka_unit_test(test_first_duplicate_stays),
+        cmocka_unit_test(test_order_sorts_and_drops),        cmocka_unit_test(test_few_points_in_many_threads),
+        cmocka_unit_test(test_first_duplicate_stays),
         cmocka_unit_test(test_order_below_key_resolution),   cmocka_unit_test(test_neighbours_against_brute_force),
         cmocka_unit_test(test_normals_of_a_sphere),
         cmocka_unit_test(test_lines_at_borders),          cmocka_unit_test(test_normals_face_the_station),
+        cmocka_unit_test(test_normals_face_the_eyes),
         cmocka_unit_test(test_given_normals_stay),           cmocka_unit_test(test_radius_of_a_grid),
         cmocka_unit_test(test_spacing_of_bare_points),
         cmocka_unit_test(test_random_points_leave_no_holes), cmocka_unit_test(test_no_blobs),

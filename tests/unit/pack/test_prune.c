@@ -18,9 +18,10 @@
 #include "pack/prune.h"
 #include "pack/prune_loss.h"
 #include "support/make_dataset.h"
+#include "support/sanitised.h"
 
 /* Side by side, 30 m from each other: two walls, grey and as coloured as can be, foliage, and three wires. */
-enum { places = 4, each = 40000, side = 200, wire_points = 1500 };
+enum { places = 4, side = TEST_SIZE(200, 100), each = side * side, wire_points = 1500 };
 enum place { GREY, COLOURED, FOLIAGE, WIRES };
 
 static char folder[256], scan[300];
@@ -192,6 +193,7 @@ static uint64_t discs_below(uint64_t node)
 static void a_node_loses_what_the_naive_sum_says(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_prune_shapes *shapes = spl_prune_shapes_create(NULL);
     static struct drawn drawn[SPL_CHUNK_SPLATS * 1024];
     assert_non_null(shapes);
@@ -278,6 +280,7 @@ static struct planned plan(const struct spl_prune_options *options, unsigned thr
 static void the_number_is_about_the_one_wanted(void **state)
 {
     (void)state;
+    skip_sanitised();
     for (double factor = 2; factor <= 8; factor *= 2) {
         struct planned p = plan(&(struct spl_prune_options){.factor = factor}, 2);
         double wanted = (double)p.report.before / factor;
@@ -291,6 +294,7 @@ static void the_number_is_about_the_one_wanted(void **state)
 static void nothing_is_dropped_at_factor_1(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct planned p = plan(&(struct spl_prune_options){.factor = 1}, 1);
     assert_int_equal(p.report.after, p.report.before);
     assert_int_equal(p.report.by_steps[0], p.report.before);
@@ -303,6 +307,7 @@ static void nothing_is_dropped_at_factor_1(void **state)
 static void a_root_is_never_dropped(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct planned p = plan(&(struct spl_prune_options){.factor = SPL_PRUNE_FACTOR_MAX}, 1);
     const struct spl_prune_loss loss = {.dataset = scene, .nodes = nodes, .chunks = chunks};
     assert_true(p.leaf[0]);
@@ -324,6 +329,7 @@ static void threads_change_nothing(void **state)
 static void splats_stay_where_they_are_needed(void **state)
 {
     (void)state;
+    skip_sanitised();
     struct planned mapped = plan(&(struct spl_prune_options){.factor = 8}, 2);
     struct planned plain = plan(&(struct spl_prune_options){.factor = 8, .no_maps = true}, 2);
     /* with maps foliage keeps more than walls, whatever is painted on them */
@@ -341,6 +347,7 @@ static void splats_stay_where_they_are_needed(void **state)
 static void what_no_map_shows_keeps_its_colours(void **state)
 {
     (void)state;
+    skip_sanitised();
     uint64_t chunk_count;
     spl_dataset_get_chunks(scene, &chunk_count);
     float *seen = calloc(chunk_count, sizeof *seen);
@@ -363,6 +370,7 @@ static void what_no_map_shows_keeps_its_colours(void **state)
 static void no_whole_level_is_better(void **state)
 {
     (void)state;
+    skip_under_tsan();
     const struct spl_prune_options mapped = {.factor = 4};
     const struct spl_prune_loss loss = {scene, &mapped, nodes, chunks};
     struct spl_prune_shapes *shapes = spl_prune_shapes_create(NULL);

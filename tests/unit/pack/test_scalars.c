@@ -212,10 +212,13 @@ static void hear(void *context, const char *text)
     strncat(said, text, sizeof said - strlen(said) - 1);
 }
 
+static enum spl_pack_primitives primitives; /* of the next packs */
+
 static int pack(const char *const *inputs, size_t count, const char *keep, const char *output, struct spl_error *err)
 {
     struct spl_pack_options options;
     spl_pack_options_init(&options);
+    options.primitives = primitives;
     options.inputs = inputs;
     options.input_count = count;
     options.output = output;
@@ -345,6 +348,45 @@ static void several_scans_are_numbered(void **state)
     spl_dataset_close(dataset);
 }
 
+/* The panel with this id: its points are a patch of the plane, whose middle says what they have. */
+static void check_panel(const struct spl_dataset *dataset, const struct spl_node *node, uint64_t id)
+{
+    struct spl_splat splat;
+    assert_true(spl_dataset_find_splat(dataset, id, &splat));
+    double x = node->origin[0] + (double)splat.position[0], y = node->origin[1] + (double)splat.position[1];
+    double time = value(dataset, "time", id), intensity = value(dataset, "intensity", id);
+    double uncertainty = value(dataset, "uncertainty", id);
+    assert_true(value(dataset, "flat", id) == 9);
+    assert_true(intensity >= 0 && intensity < 3000 && intensity == rint(intensity));
+    assert_true(uncertainty > 0.009 && uncertainty < 0.03); /* about the spacing */
+    /* a row is 50; cells reach over the points by one or two, where a node's border cuts through them */
+    assert_true(fabs(time - (1e5 + 0.25 * (side * 100 * y + 100 * x))) < 2.5 * 50);
+    if (fabs(x - 1) > (double)splat.radius)
+        assert_true(value(dataset, "return_number", id) == (x < 1 ? 1 : 2));
+}
+
+static void panels_have_what_their_points_have(void **state)
+{
+    (void)state;
+    const char *scan = write_csv("flat.csv", 0, true);
+    primitives = SPL_PRIMITIVES_ALL;
+    struct spl_dataset *dataset = open_packed(&scan, 1, "time,flat");
+    primitives = SPL_PRIMITIVES_OFF;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    uint64_t nodes, chunks, panels[2] = {0};
+    const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
+    const struct spl_chunk *all = spl_dataset_get_chunks(dataset, &chunks);
+    assert_true(info->panel_points > 0.95 * points);
+    for (uint64_t n = 0; n < nodes; n++)
+        for (uint64_t c = node[n].first_chunk; c < node[n].first_chunk + node[n].chunk_count; c++)
+            for (uint32_t i = 0; i < all[c].count && spl_chunk_kind(&all[c]) == SPL_CHUNK_PANELS; i++) {
+                check_panel(dataset, &node[n], all[c].first_id + i);
+                panels[node[n].child_count > 0]++;
+            }
+    assert_true(panels[0] > points / 400 && panels[1] > 10);
+    spl_dataset_close(dataset);
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -368,6 +410,7 @@ int main(void)
         cmocka_unit_test(points_without_any),
         cmocka_unit_test(a_dataset_has_what_scans_brought),
         cmocka_unit_test(several_scans_are_numbered),
+        cmocka_unit_test(panels_have_what_their_points_have),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -202,7 +202,7 @@ static void make_cloud(struct cloud *c, size_t count)
 static void join_cloud(struct cloud *c)
 {
     struct spl_stage stage = {.threads = 1};
-    assert_int_equal(spl_wires_find(&c->wires, &c->points, &stage, NULL), SPL_OK);
+    assert_int_equal(spl_wires_find(&c->wires, &c->points, NULL, &stage, NULL), SPL_OK);
 }
 
 static void free_cloud(struct cloud *c)
@@ -233,7 +233,7 @@ static void a_gap_is_crossed_on_the_arc(void **state)
         struct spl_error err = {0};
         struct spl_stage stage = {.threads = 1};
         spl_memory_fail_after(n);
-        int rc = spl_wires_find(&c.wires, &c.points, &stage, &err);
+        int rc = spl_wires_find(&c.wires, &c.points, NULL, &stage, &err);
         spl_memory_fail_after(0);
         if (!rc) {
             assert_true(n > 5);
@@ -290,7 +290,7 @@ static void joining_is_reported_and_ends_when_it_is_cancelled(void **state)
         struct spl_error err = {0};
         p.stage.context = &p;
         p.stage.cancelled = &p.cancelled;
-        assert_int_equal(spl_wires_find(&c.wires, &c.points, &p.stage, &err), cancels ? SPL_E_CANCELLED : SPL_OK);
+        assert_int_equal(spl_wires_find(&c.wires, &c.points, NULL, &p.stage, &err), cancels ? SPL_E_CANCELLED : SPL_OK);
         assert_int_equal(err.code, cancels ? SPL_E_CANCELLED : SPL_OK);
         assert_true(p.total > 0 && (cancels ? p.done < p.total / 20 : p.reports > 40 && p.done == p.total));
         spl_wires_finish(&c.wires);

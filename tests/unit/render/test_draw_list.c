@@ -17,12 +17,22 @@ static void add(struct spl_draw_list *list, uint32_t page, uint32_t splats, uint
                                        &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
 }
 
-static void add_lines(struct spl_draw_list *list, uint32_t page, uint32_t vertices)
+static void add_kind(struct spl_draw_list *list, uint32_t page, uint32_t kind, uint32_t count)
 {
-    const struct spl_draw_chunk chunk = {.count = vertices};
-    assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, SPL_CHUNK_LINES, 0}, &chunk,
+    const struct spl_draw_chunk chunk = {.count = count};
+    assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, kind, 0}, &chunk,
                                        &(struct spl_chunk_bounds){0}, NULL),
                      SPL_OK);
+}
+
+static void add_lines(struct spl_draw_list *list, uint32_t page, uint32_t vertices)
+{
+    add_kind(list, page, SPL_CHUNK_LINES, vertices);
+}
+
+static void add_panels(struct spl_draw_list *list, uint32_t page, uint32_t panels)
+{
+    add_kind(list, page, SPL_CHUNK_PANELS, panels);
 }
 
 /* Batches are of one key each, in the order in which these were met, and keep the order of their chunks. */
@@ -107,7 +117,7 @@ static void pages_take_two_rounds(void **state)
         add(&list, page, 128, 0, true);
     }
     assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
-    uint64_t rounds = spl_draw_list_count_rounds(&list, 1 << 20, 1 << 10, 1 << 10);
+    uint64_t rounds = spl_draw_list_count_rounds(&list, &(struct spl_draw_rounds){1 << 20, 1 << 10, 1 << 10, 1 << 10});
     assert_int_equal(rounds, 2 * pages);
     assert_true(rounds < SPL_PARAMS_MAX);
     spl_draw_list_finish(&list);
@@ -126,21 +136,24 @@ static void rounds_cover_the_entries(void **state)
         add(&list, 1, 100, smooth, false);
     for (int i = 0; i < 25; i++) /* of the same page, but for another kernel */
         add_lines(&list, 1, 50);
+    for (int i = 0; i < 25; i++)
+        add_panels(&list, 1, 9); /* 2 entries */
     assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
     static const uint64_t limits[][2] = {{UINT64_MAX, UINT64_MAX}, {100, 100}, {99, 7}, {1, 1}, {3, 1000}};
     for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
-        uint64_t rounds = spl_draw_list_count_rounds(&list, limits[l][0], limits[l][1], limits[l][1]), next = 0, entries = 0;
+        const struct spl_draw_rounds most = {limits[l][0], limits[l][1], limits[l][1], limits[l][1]};
+        uint64_t rounds = spl_draw_list_count_rounds(&list, &most), next = 0, entries = 0;
         for (size_t i = 0; i < list.batch_count; i++) {
             const struct spl_draw_batch *batch = &list.batches[i];
             assert_int_equal(batch->first_round, next);
             assert_true(batch->round_entries >= 1 && batch->round_entries <= limits[l][0] &&
                         (!batch->key.smooth || batch->round_entries <= limits[l][1]) &&
-                        (batch->key.kind != SPL_CHUNK_LINES || batch->round_entries <= limits[l][1]));
+                        (batch->key.kind == SPL_CHUNK_DISCS || batch->round_entries <= limits[l][1]));
             next += (batch->entries + batch->round_entries - 1) / batch->round_entries;
             entries += batch->entries;
         }
         assert_int_equal(next, rounds);
-        assert_int_equal(entries, 250);
+        assert_int_equal(entries, 300);
     }
     spl_draw_list_finish(&list);
 }
@@ -182,6 +195,27 @@ static void the_nearer_half_goes_first(void **state)
     spl_draw_list_finish(&list);
 }
 
+/* A panel is as much work as SPL_PANEL_WORTH splats, with relief or without: the halves are of work. */
+static void panels_count_as_much_work(void **state)
+{
+    struct spl_draw_list list = {0};
+    (void)state;
+    spl_draw_list_clear(&list);
+    add_panels(&list, 0, 4);
+    add_kind(&list, 0, SPL_CHUNK_MESHES, 9);
+    for (int i = 0; i < 2; i++)
+        add(&list, 0, 128, 0, false);
+    assert_int_equal(list.listed_splats, 13 * SPL_PANEL_WORTH + 2 * 128);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    assert_int_equal(list.first_back_chunk, 2);
+    assert_int_equal(list.batches[1].key.kind, SPL_CHUNK_MESHES);
+    assert_int_equal(list.batches[1].entries, 2);
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_PANELS) && spl_draw_list_has(&list, SPL_CHUNK_DISCS));
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_MESHES));
+    assert_false(spl_draw_list_has(&list, SPL_CHUNK_LINES));
+    spl_draw_list_finish(&list);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -191,6 +225,7 @@ int main(void)
         cmocka_unit_test(rounds_cover_the_entries),
         cmocka_unit_test(runs_hold_every_splat),
         cmocka_unit_test(the_nearer_half_goes_first),
+        cmocka_unit_test(panels_count_as_much_work),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -80,14 +80,22 @@ static void weights_leave_room_for_every_sum(void **state)
 {
     (void)state;
     for (uint64_t splats = 1; splats < 1ull << 40; splats = splats * 3 + 1) {
-        uint64_t weight = spl_occupancy_weight(splats);
+        uint64_t weight = spl_occupancy_weight(splats, 0);
         assert_true(weight <= 255);
         /* the largest words that a splat adds: colour 255 w, depth (w (2^18 - 1)) >> 9 and 511 */
         if (weight > 0)
             assert_true(weight * 512 * splats <= UINT32_MAX && 511 * splats <= UINT32_MAX);
     }
-    assert_int_equal(spl_occupancy_weight(0), 255);
-    assert_int_equal(spl_occupancy_weight(1u << 24), 0);
+    for (uint64_t panels = 1; panels < 1ull << 40; panels = panels * 3 + 1)
+        for (uint64_t splats = 1; splats < 1ull << 40; splats = splats * 5 + 1) {
+            uint64_t weight = spl_occupancy_weight(splats, panels);
+            if (weight > 0) /* a panel and each of its 256 cells, of weight 1 */
+                assert_true(512 * (weight * (splats + panels) + 256 * panels) <= UINT32_MAX);
+        }
+    assert_int_equal(spl_occupancy_weight(0, 0), 255);
+    assert_int_equal(spl_occupancy_weight(10, 10), 255);
+    assert_int_equal(spl_occupancy_weight(1u << 24, 0), 0);
+    assert_int_equal(spl_occupancy_weight(0, 1u << 15), 0);
 }
 
 int main(void)

@@ -9,6 +9,8 @@
 
 #include <splatd/render.h>
 
+#include "render/method.h"
+
 static const char *refusal(enum spl_method method, enum spl_layer layer, bool surface, uint64_t splats)
 {
     static struct spl_error err;
@@ -103,11 +105,31 @@ static void test_maps_are_on_unless_told(void **state)
     assert_true(spl_method_param_check(maps, SPL_MAPS_COUNT, NULL) < 0);
 }
 
+/* Where a dataset has nothing that a parameter changes, views with any value of it are one. */
+static void test_what_a_dataset_lacks_does_not_count(void **state)
+{
+    (void)state;
+    const struct spl_dataset_info plain = {.splats = 1};
+    const struct {
+        enum spl_method_param param;
+        struct spl_dataset_info has;
+    } rows[] = {{SPL_PARAM_atoms, {.atoms = 1}},
+                {SPL_PARAM_maps, {.maps = 1}},
+                {SPL_PARAM_primitives, {.panels = 1}},
+                {SPL_PARAM_primitives, {.pieces = 1}}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        assert_false(spl_method_param_counts(spl_method_param_get(rows[i].param), &plain));
+        assert_true(spl_method_param_counts(spl_method_param_get(rows[i].param), &rows[i].has));
+        assert_true(spl_method_param_counts(spl_method_param_get(SPL_PARAM_margin), &rows[i].has));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_normals_need_a_surface),
         cmocka_unit_test(test_ids_have_32_bits),
+        cmocka_unit_test(test_what_a_dataset_lacks_does_not_count),
         cmocka_unit_test(test_what_is_no_method_is_answered),
         cmocka_unit_test(test_maps_are_on_unless_told),
         cmocka_unit_test(test_a_camera_is_whole_with_a_lens_and_a_pose),

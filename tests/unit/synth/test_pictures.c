@@ -17,6 +17,7 @@
 
 #include "base/memory.h"
 #include "image/load.h"
+#include "support/sanitised.h"
 #include "synth/exact.h"
 #include "synth/photos.h"
 #include "synth/pictures.h"
@@ -201,6 +202,7 @@ static void a_marked_place_is_where_the_ids_show_it(void **state)
 static void photographers_stand_free(void **state)
 {
     (void)state;
+    skip_under_tsan();
     for (size_t s = 0; spl_synth_scene_name(s); s++) {
         struct spl_scene *scene = NULL;
         assert_int_equal(spl_scene_create(spl_synth_scene_name(s), &scene, NULL), 0);
@@ -279,6 +281,7 @@ static void panoramas_come_with_poses(void **state)
 static void what_is_wrong_is_named_and_nothing_is_written(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_named_view view = small_view();
     view.camera.width = 1u << 30;
     const struct spl_view_list views = {.views = &view, .count = 1};

@@ -17,6 +17,7 @@
 
 #include "base/memory.h"
 #include "cloud/cloud.h"
+#include "support/sanitised.h"
 #include "synth/light.h"
 #include "synth/scene.h"
 #include "synth/synth.h"
@@ -88,7 +89,7 @@ static void files_depend_on_the_seed_and_not_on_threads(void **state)
     (void)state;
     const char *const names[] = {"one", "three", "again", "other"};
     for (int i = 0; i < 4; i++) {
-        struct spl_synth_options o = options_for(in_folder(names[i]), 20000);
+        struct spl_synth_options o = options_for(in_folder(names[i]), TEST_SIZE(20000, 4000));
         o.threads = i == 1 ? 3 : 1;
         o.seed = i == 3 ? 2 : 1;
         scan(o);
@@ -105,7 +106,7 @@ static void counts_come_within_two_percent(void **state)
 {
     (void)state;
     const uint64_t wanted[] = {1000, 1234, 5000, 77777, 200001};
-    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+    for (size_t i = 0; i < TEST_SIZE(sizeof wanted / sizeof *wanted, 3); i++) {
         struct spl_synth_options o = options_for(in_folder("count"), wanted[i]);
         o.formats = "ply";
         uint64_t points = scan(o);
@@ -142,9 +143,9 @@ static void every_scene_comes_within_two_percent(void **state)
 static void faulty_scans_do_not_depend_on_threads(void **state)
 {
     (void)state;
-    static const char *const scenes[] = {"railway", "powerline", "courtyard"};
+    static const char *const scenes[] = {"courtyard", "railway", "powerline"};
     const char *const names[] = {"faulty-one", "faulty-three", "faulty-other"};
-    for (size_t s = 0; s < 3; s++) {
+    for (size_t s = 0; s < TEST_SIZE(3, 1); s++) {
         for (int i = 0; i < 3; i++) {
             struct spl_synth_options o = options_for(in_folder(names[i]), 2000);
             o.scene = scenes[s];
@@ -247,7 +248,7 @@ static void check_truth(const char *directory, uint64_t points, double sigma)
 static void points_lie_on_the_surfaces(void **state)
 {
     (void)state;
-    struct spl_synth_options o = options_for(in_folder("exact/deeper"), 60000);
+    struct spl_synth_options o = options_for(in_folder("exact/deeper"), TEST_SIZE(60000, 10000));
     o.noise = 0;
     check_truth(o.directory, scan(o), 0);
     o.noise = 0.01;

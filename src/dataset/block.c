@@ -1,7 +1,7 @@
-/* BC1 without its mode of three colours. Texels are coded by their place along the main axis; then in turns ends are put
- * on the steps of 5, 6 and 5 bits that are best for the codes, and texels choose the nearest of the four colours. An even
- * surface lies between the steps: one colour of two ends is nearer to it. */
-#include "pack/maps/blocks.h"
+/* BC1 without its mode of three colours. Texels are coded by their place along the main axis; then in turns ends are
+ * put on the steps of 5, 6 and 5 bits that are best for the codes, and texels choose the nearest of the four colours.
+ * An even surface lies between the steps: one colour of two ends is nearer to it. */
+#include "dataset/block.h"
 
 #include <math.h>
 #include <string.h>
@@ -127,7 +127,7 @@ static void fit(const float texels[16][3], const uint8_t codes[16], struct ends 
     }
 }
 
-double spl_map_block_encode(const float texels[16][3], uint32_t words[2])
+double spl_block_encode(const float texels[16][3], uint32_t words[2])
 {
     struct ends best = {{{0}}}, tried;
     uint8_t codes[16] = {0}, tried_codes[16];
@@ -153,4 +153,21 @@ double spl_map_block_encode(const float texels[16][3], uint32_t words[2])
     for (int i = 0; i < 16; i++)
         words[1] |= (uint32_t)codes[i] << 2 * i;
     return (double)error;
+}
+
+static void expand_color(uint32_t color, float out[3])
+{
+    const int at[3] = {color >> 11 & 31, color >> 5 & 63, color & 31};
+    for (int c = 0; c < 3; c++)
+        out[c] = level(c, at[c]);
+}
+
+void spl_block_get_color(const uint32_t words[2], uint32_t texel, float color[3])
+{
+    uint32_t code = words[1] >> 2 * texel & 3;
+    float share = code < 2 ? (float)code : (float)(code - 1) * (1.0f / 3.0f), a[3], b[3];
+    expand_color(words[0] & 0xffff, a);
+    expand_color(words[0] >> 16, b);
+    for (int c = 0; c < 3; c++)
+        color[c] = a[c] + (b[c] - a[c]) * share;
 }

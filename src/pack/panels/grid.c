@@ -1,0 +1,103 @@
+/* Where the discs of a plane's points lie on its cells. Pure; any thread. */
+#include "pack/panels/raster_parts.h"
+
+#include <math.h>
+
+static const double most_cells = 1 << 29; /* either way from the plane's origin */
+static const double least_up = 0.6;       /* cosine of the steepest tilt of a disc on a piece with relief */
+
+static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *group)
+{
+    struct spl_panel_plane plane = {.cell = (float)group->cell};
+    struct spl_panel_frame frame;
+    struct spl_chunk chunk;
+    for (int c = 0; c < 3; c++)
+        plane.normal[c] = (float)group->plane->normal[c];
+    spl_panels_begin(&plane, &chunk);
+    spl_panels_get_frame(&chunk, &frame);
+    *g = (struct spl_panel_grid){.group = group, .inverse = 1 / group->cell};
+    for (int c = 0; c < 3; c++) {
+        g->u[c] = frame.u[c];
+        g->v[c] = frame.v[c];
+        g->normal[c] = frame.normal[c];
+        g->normal_f[c] = plane.normal[c];
+    }
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void get_offset(const struct spl_panel_grid *g, size_t i, double off[3])
+{
+    for (int c = 0; c < 3; c++)
+        off[c] = g->group->points->axis[c][i] - g->group->plane->origin[c];
+}
+
+/* How a disc of that normal rises: no steeper than pieces are. */
+static void get_tilt(const struct spl_panel_grid *g, const float normal[3], double tilt[2])
+{
+    const double n[3] = {normal[0], normal[1], normal[2]};
+    double up = dot(n, g->normal);
+    tilt[0] = -dot(n, g->u) / copysign(fmax(fabs(up), least_up), up);
+    tilt[1] = -dot(n, g->v) / copysign(fmax(fabs(up), least_up), up);
+}
+
+struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *g, uint32_t member)
+{
+    const struct spl_points *p = g->group->points;
+    size_t i = g->group->first + member;
+    double off[3];
+    get_offset(g, i, off);
+    struct spl_panel_disc d = {.x = dot(off, g->u) * g->inverse,
+                               .y = dot(off, g->v) * g->inverse,
+                               .radius = (double)p->radius[i] * g->inverse,
+                               .clip_offset = INFINITY};
+    const struct spl_point_clip *clip = p->clip ? &p->clip[i] : NULL;
+    if (g->group->plane->heights)
+        get_tilt(g, p->normal[i], d.tilt);
+    if (g->group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2])) {
+        double direction[3] = {clip->direction[0] / 127.0, clip->direction[1] / 127.0, clip->direction[2] / 127.0};
+        d.clip[0] = dot(direction, g->u) + d.tilt[0] * dot(direction, g->normal);
+        d.clip[1] = dot(direction, g->v) + d.tilt[1] * dot(direction, g->normal);
+        d.clip_offset = d.radius * clip->offset / 255;
+    }
+    return d;
+}
+
+void spl_panel_disc_range(const struct spl_panel_disc *d, int32_t low[2], int32_t high[2])
+{
+    const double at[2] = {d->x, d->y};
+    for (int a = 0; a < 2; a++) {
+        int32_t own = (int32_t)floor(at[a]);
+        low[a] = (int32_t)ceil(at[a] - d->radius - 0.5);
+        high[a] = (int32_t)floor(at[a] + d->radius - 0.5);
+        low[a] = low[a] < own ? low[a] : own;
+        high[a] = high[a] > own ? high[a] : own;
+    }
+}
+
+/* Where the group's cells begin; false: they cannot be counted. */
+static bool find_first(struct spl_panel_grid *g)
+{
+    g->first[0] = g->first[1] = INT32_MAX;
+    for (size_t m = 0; m < g->group->count; m++) {
+        struct spl_panel_disc d = spl_panel_grid_disc(g, g->group->members[m]);
+        int32_t low[2], high[2];
+        if (!(fabs(d.x) < most_cells && fabs(d.y) < most_cells && d.radius <= SPL_PANEL_RADIUS_MAX))
+            return false;
+        spl_panel_disc_range(&d, low, high);
+        for (int a = 0; a < 2; a++)
+            g->first[a] = low[a] < g->first[a] ? low[a] : g->first[a];
+    }
+    for (int a = 0; g->group->plane->heights && a < 2; a++) /* lattices of all nodes are parts of one */
+        g->first[a] -= (g->first[a] % SPL_PANEL_SIDE + SPL_PANEL_SIDE) % SPL_PANEL_SIDE;
+    return true;
+}
+
+bool spl_panel_grid_init(struct spl_panel_grid *g, const struct spl_panel_group *group)
+{
+    init_grid(g, group);
+    return find_first(g);
+}

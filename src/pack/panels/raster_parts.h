@@ -1,0 +1,92 @@
+/* The parts of rasterising: where a group's cells lie (grid.c), which panels its discs reach into (places.c), what they
+ * are then (raster.c, values.c). One worker's. */
+#ifndef SPL_PACK_PANELS_RASTER_PARTS_H
+#define SPL_PACK_PANELS_RASTER_PARTS_H
+
+#include "pack/panels/raster.h"
+
+/* A panel that discs reach into. */
+struct spl_panel_place {
+    int32_t column, row;
+    uint64_t order;
+    uint32_t touches; /* how many; of a sorted one where they end */
+    uint32_t was;     /* its index before they were sorted */
+    uint8_t level;    /* of its mesh; 0 of what is flat */
+    float low, high;  /* of its heights; likewise */
+};
+
+struct spl_panel_touch {
+    uint32_t place, member;
+};
+
+/* Where the group's cells lie. */
+struct spl_panel_grid {
+    const struct spl_panel_group *group;
+    double u[3], v[3], normal[3];
+    float normal_f[3];
+    double inverse;
+    int32_t first[2]; /* cell that panel (0, 0) begins with: those of a node begin where its cells do */
+};
+
+struct spl_panel_disc {
+    double x, y, radius;         /* in cells */
+    double clip[2], clip_offset; /* not drawn where clip . d > clip_offset, d from its middle */
+    double tilt[2];              /* how it rises along u and v; 0 on what is flat */
+};
+
+/* The square of how far the place (dx, dy) cells from the disc's middle is from it, along the disc. */
+static inline double spl_panel_disc_squared(const struct spl_panel_disc *disc, double dx, double dy)
+{
+    double up = disc->tilt[0] * dx + disc->tilt[1] * dy;
+    return dx * dx + dy * dy + up * up;
+}
+
+/* False: its cells cannot be counted. */
+bool spl_panel_grid_init(struct spl_panel_grid *grid, const struct spl_panel_group *group);
+struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *grid, uint32_t member);
+
+/* The cells whose middles a disc can cover, and its own. */
+void spl_panel_disc_range(const struct spl_panel_disc *disc, int32_t low[2], int32_t high[2]);
+
+/* The column, axis 0, or row of the panel that has a cell, counted from the grid's first on. */
+static inline int32_t spl_panel_of_cell(const struct spl_panel_grid *grid, int axis, int32_t cell)
+{
+    return (cell - grid->first[axis]) / SPL_PANEL_SIDE;
+}
+
+/* Fills raster->places, in Morton order, and raster->sorted, by place. False: no memory. */
+bool spl_panel_places_find(struct spl_panel_raster *raster, const struct spl_panel_grid *grid);
+
+/* Where the touches of a place begin; they end where it says. */
+static inline uint32_t spl_panel_first_touch(const struct spl_panel_raster *raster, size_t place)
+{
+    return place ? raster->places[place - 1].touches : 0;
+}
+
+/* Whether the touch's member lies in its place: each does in one. */
+bool spl_panel_touch_is_own(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid,
+                            const struct spl_panel_touch *touch);
+
+/* The mesh of a panel (relief.c). */
+struct spl_panel_relief {
+    struct spl_relief relief; /* heights over the piece's plane, rounded to steps */
+    float low, high;          /* of them */
+};
+
+/* The step of heights of a chunk whose heights differ by `range`, metres, at most: as fine as it should be for a group
+ * with relief, or coarser where the range asks for it. */
+unsigned spl_panel_relief_step(const struct spl_panel_group *group, float range);
+
+/* Makes the mesh, in heights of `step`, of the panel whose cell (0, 0) is the plane's (column, row). */
+void spl_panel_relief_make(const struct spl_panel_grid *grid, const struct spl_panel *panel, int32_t column,
+                           int32_t row, unsigned step, unsigned level, struct spl_panel_relief *made);
+
+/* The one of the least level that follows the surface wherever a cell is there, or of the greatest. */
+void spl_panel_relief_choose(const struct spl_panel_grid *grid, const struct spl_panel *panel, int32_t column,
+                             int32_t row, struct spl_panel_relief *made);
+
+/* Appends what the points of a place have beside colour, as its panel's. False: no memory. */
+bool spl_panel_values_add(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid, size_t place,
+                          struct spl_node_panels *out);
+
+#endif

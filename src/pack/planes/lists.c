@@ -1,0 +1,82 @@
+/* Lists are filled cell by cell from the points, which lie in a row: each by one worker, in their order. A cell with
+ * more labels than a list holds keeps the first ones; what it leaves out is met at a finer level. */
+#include "pack/planes/lists.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "pack/planes/planes.h"
+
+enum { grain = 1 << 12 };
+static const double cell_points = 6; /* of the finest level, on the average */
+
+struct fill {
+    const struct spl_points *points;
+    const struct spl_cells *cells;
+    const uint32_t *label;
+    struct spl_plane_list *lists;
+};
+
+int spl_plane_levels_init(struct spl_plane_levels *levels, const struct spl_points *points, unsigned threads,
+                          struct spl_error *err)
+{
+    *levels = (struct spl_plane_levels){0};
+    int rc = spl_cells_init(&levels->cells[0], points, cell_points, threads, err);
+    levels->count = 1;
+    while (!rc && levels->count < SPL_PLANE_LEVELS) {
+        const struct spl_cells *below = &levels->cells[levels->count - 1];
+        if (below->count < 8 || below->shift + 1 > SPL_CELLS_SHIFT_MAX)
+            break;
+        rc = spl_cells_init_above(&levels->cells[levels->count++], below, threads, err);
+    }
+    if (!rc && !(levels->lists = spl_alloc_raw(levels->cells[0].count, sizeof *levels->lists, err)))
+        rc = SPL_E_NOMEM;
+    return rc;
+}
+
+static void fill_lists(void *context, size_t begin, size_t end, unsigned worker)
+{
+    const struct fill *f = context;
+    const uint8_t *linear = f->points->linear;
+    (void)worker;
+    for (size_t k = begin; k < end; k++) {
+        struct spl_plane_list *list = &f->lists[k];
+        memset(list->label, 0xff, sizeof list->label);
+        memset(list->count, 0, sizeof list->count);
+        list->open = list->linear = 0;
+        for (size_t i = f->cells->cells[k].begin; i < f->cells->cells[k + 1].begin; i++) {
+            uint32_t label = f->label[i];
+            if (label == SPL_NO_PLANE) {
+                bool thin = linear && linear[i];
+                list->open += !thin;
+                list->linear += thin && list->linear < UINT16_MAX;
+                continue;
+            }
+            for (int s = 0; s < SPL_PLANE_LIST; s++) {
+                if (list->label[s] == SPL_NO_PLANE)
+                    list->label[s] = label;
+                if (list->label[s] != label)
+                    continue;
+                list->count[s] += list->count[s] < UINT16_MAX;
+                break;
+            }
+        }
+    }
+}
+
+void spl_plane_levels_fill(struct spl_plane_levels *levels, unsigned k, const struct spl_points *points,
+                           const uint32_t *label, unsigned threads)
+{
+    struct fill fill = {points, &levels->cells[k], label, levels->lists};
+    spl_parallel_for(threads, fill.cells->count, grain, fill_lists, &fill);
+}
+
+void spl_plane_levels_finish(struct spl_plane_levels *levels)
+{
+    for (unsigned k = 0; k < levels->count; k++)
+        spl_cells_finish(&levels->cells[k]);
+    free(levels->lists);
+    *levels = (struct spl_plane_levels){0};
+}

@@ -1,0 +1,170 @@
+/* What lies beside chains. A pole or a pipe has, where it is scanned closely, several points side by side all along it:
+ * chains would be so many lines, and the pole a bundle of wires. It is a surface, which discs show. Of a pole that one
+ * row of points lies on nothing says how thick it is; but it is thicker than a wire, so no line is made of what stands
+ * upright.
+ *
+ * The search for linear points judges cells, and misses points at a wire's joints, ends and gaps: each would be a disc, as
+ * large as the points are apart, on the line that runs through it. */
+#include "pack/wires/sides.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pack/planes/planes.h"
+#include "pack/wires/grid.h"
+
+static const double upright = 0.7;    /* share of a chain's length that it rises */
+static const double around = 1.5;     /* spacings within which others are looked for */
+static const double aside = 0.5;      /* spacings off the chain from which on they are beside it */
+enum { beside_least = 2, looks_most = 64, every = 4096 };
+
+static double median_spacing(const struct spl_wire_point *p, uint32_t count)
+{
+    double sum = 0; /* the geometric mean, which needs no memory */
+    for (uint32_t i = 0; i < count; i++)
+        sum += log(p[i].spacing);
+    return exp(sum / count);
+}
+
+/* Has point `i` of a chain that goes along `axis` others beside it? */
+static bool is_accompanied(const struct spl_wires_grid *grid, const struct spl_wire_point *p, uint32_t i,
+                           const double axis[3])
+{
+    double reach = fmin(around * p[i].spacing, grid->edge), limit = aside * p[i].spacing;
+    uint32_t beside = 0;
+    for (int k = 0; k < 27; k++) {
+        size_t first, end = spl_wires_grid_find(grid, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}, &first);
+        end = end - first > looks_most ? first + looks_most : end;
+        for (size_t m = first; m < end; m++) {
+            double squared = 0, along = 0;
+            for (int c = 0; c < 3; c++) {
+                double off = p[grid->cells[m].item].position[c] - p[i].position[c];
+                squared += off * off;
+                along += off * axis[c];
+            }
+            beside += squared <= reach * reach && squared - along * along >= limit * limit;
+        }
+    }
+    return beside >= beside_least;
+}
+
+int spl_wires_drop_thick(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work,
+                         struct spl_error *err)
+{
+    struct spl_wires_grid grid = {.edge = count ? around * median_spacing(points, count) : 1};
+    int rc = SPL_OK;
+    for (uint32_t i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            grid.low[c] = i ? fmin(grid.low[c], points[i].position[c]) : points[i].position[c];
+    for (uint32_t i = 0; i < count && !rc; i++)
+        rc = spl_wires_grid_add(&grid, points[i].position, i, err);
+    spl_wires_grid_sort(&grid);
+    for (uint32_t i = 0; i < count && !rc; i++) {
+        const struct spl_wire_point *from = &points[i], *to = &points[from->other];
+        uint32_t all = 0, accompanied = 0;
+        double axis[3], length = 0;
+        if (!spl_wires_is_begin(points, i))
+            continue;
+        for (int c = 0; c < 3; c++) {
+            axis[c] = to->position[c] - from->position[c];
+            length += axis[c] * axis[c];
+        }
+        for (int c = 0; c < 3; c++)
+            axis[c] /= sqrt(length);
+        bool stands = fabs(axis[2]) >= upright;
+        for (uint32_t pass = 0; pass < 2; pass++)
+            for (uint32_t before = SPL_WIRE_END, at = i; at != SPL_WIRE_END;) {
+                uint32_t next = points[at].next[before != SPL_WIRE_END && points[at].next[0] == before];
+                if (pass)
+                    points[at].width = stands || 2 * accompanied > all ? 0 : points[at].width;
+                accompanied += !pass && !stands && is_accompanied(&grid, points, at, axis);
+                all += !pass;
+                before = at;
+                at = at == from->other ? SPL_WIRE_END : next;
+            }
+        rc = spl_stage_check(work->stage, err);
+    }
+    for (uint32_t i = 0; i < count && !rc; i++)
+        if (points[i].beside != SPL_WIRE_END)
+            points[i].width = points[points[i].beside].width;
+    spl_wires_grid_finish(&grid);
+    return rc;
+}
+
+/* How far off a piece points are its line's. */
+static double reach_of(const struct spl_wire_vertex *v, double noise)
+{
+    return fmax(0.75 * (double)v->width + 3 * noise, 0.25 * (double)v->radius);
+}
+
+static bool is_on(const struct spl_wire_vertex *v, const double at[3], double reach)
+{
+    double along = 0, length = 0, squared = 0;
+    for (int c = 0; c < 3; c++) {
+        double way = v[1].position[c] - v[0].position[c];
+        along += (at[c] - v[0].position[c]) * way;
+        length += way * way;
+    }
+    double t = length > 0 ? fmin(fmax(along / length, 0), 1) : 0;
+    for (int c = 0; c < 3; c++) {
+        double off = v[0].position[c] + t * (v[1].position[c] - v[0].position[c]) - at[c];
+        squared += off * off;
+    }
+    return squared <= reach * reach;
+}
+
+/* Adds a piece to all cells that lie within its reach. */
+static int add_piece(struct spl_wires_grid *grid, const struct spl_wire_vertex *v, uint32_t piece, double reach,
+                     struct spl_error *err)
+{
+    double length = 0;
+    for (int c = 0; c < 3; c++)
+        length += (v[1].position[c] - v[0].position[c]) * (v[1].position[c] - v[0].position[c]);
+    uint32_t steps = (uint32_t)fmin(2 * sqrt(length) / grid->edge, 1e6) + 1;
+    int rc = SPL_OK;
+    for (uint32_t s = 0; s <= steps; s++)
+        for (int k = 0; k < 27 && !rc; k++) {
+            double at[3];
+            for (int c = 0; c < 3; c++)
+                at[c] = v[0].position[c] + (v[1].position[c] - v[0].position[c]) * s / steps +
+                        (reach + grid->edge / 4) * (k / (c == 0 ? 1 : c == 1 ? 3 : 9) % 3 - 1);
+            rc = spl_wires_grid_add(grid, at, piece, err);
+        }
+    return rc;
+}
+
+static void claim_points(const struct spl_wires_grid *grid, const struct spl_wires *w, struct spl_points *p,
+                         double noise, const struct spl_stage *stage)
+{
+    for (size_t i = 0; i < p->count; i++) {
+        if (i % every == 0 && spl_stage_is_cancelled(stage))
+            return;
+        if (p->linear[i] || (p->plane && p->plane[i] != SPL_NO_PLANE))
+            continue;
+        const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+        size_t first, end = spl_wires_grid_find(grid, at, (int[3]){0}, &first);
+        for (; first < end && !p->linear[i]; first++) {
+            const struct spl_wire_vertex *v = &w->vertices[grid->cells[first].item];
+            p->linear[i] = is_on(v, at, reach_of(v, noise));
+        }
+    }
+}
+
+int spl_wires_claim(const struct spl_wires *wires, struct spl_points *points, double noise,
+                    const struct spl_stage *stage, struct spl_error *err)
+{
+    struct spl_wires_grid grid = {0};
+    int rc = SPL_OK;
+    for (size_t i = 0; i < wires->count; i++)
+        grid.edge = fmax(grid.edge, 4 * reach_of(&wires->vertices[i], noise));
+    memcpy(grid.low, points->bounds_min, sizeof grid.low);
+    for (size_t i = 0; i + 1 < wires->count && !rc; i++)
+        if (wires->vertices[i].point != SPL_WIRE_END)
+            rc = add_piece(&grid, &wires->vertices[i], (uint32_t)i, reach_of(&wires->vertices[i], noise), err);
+    spl_wires_grid_sort(&grid);
+    if (!rc)
+        claim_points(&grid, wires, points, noise, stage);
+    spl_wires_grid_finish(&grid);
+    return rc ? rc : spl_stage_check(stage, err);
+}

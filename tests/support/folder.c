@@ -1,0 +1,50 @@
+/* See folder.h. */
+#include "support/folder.h"
+
+#include <ftw.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "support/make_dataset.h"
+
+char test_folder[256];
+
+int folder_make(void **state)
+{
+    (void)state;
+    make_folder(test_folder);
+    return 0;
+}
+
+static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *where)
+{
+    (void)info, (void)kind, (void)where;
+    return remove(path);
+}
+
+int folder_remove(void **state)
+{
+    (void)state;
+    return nftw(test_folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+}
+
+const char *in_folder(const char *name)
+{
+    static char paths[8][512];
+    static unsigned next;
+    char *path = paths[next++ % 8];
+    snprintf(path, sizeof *paths, "%s/%s", test_folder, name);
+    return path;
+}
+
+void folder_put(const char *name, const void *bytes, size_t length)
+{
+    FILE *file = fopen(in_folder(name), "wb");
+    spl_assert(file && fwrite(bytes, 1, length, file) == length && !fclose(file));
+}
+
+void folder_put_text(const char *name, const char *text)
+{
+    folder_put(name, text, strlen(text));
+}
