@@ -128,6 +128,9 @@ def test_picks_say_which_primitive_and_plane():
                 offs.append(abs(sum((a - b) * n for a, b, n in zip(pick["position"], plane["point"], plane["normal"]))))
             # beside splats depths blend
             assert sorted(offs)[len(offs) // 2] < 0.001 and max(offs) < 0.2, sorted(offs)
+            headers = d.ask(f"{where}/view?width=32&height=24").headers
+            drawn = {kind: int(headers[f"Splatd-{kind}"]) for kind in ("Splats", "Panels", "Meshes", "Lines")}
+            assert drawn["Panels"] > 20 and drawn["Splats"] > 0, drawn
             asked = f"{where}/view?width=32&height=24&layer=primitive"
             assert d.ask(f"{asked}&primitives=off").headers["ETag"] != d.ask(asked).headers["ETag"]
             told = d.ask(where).json()["primitives"]
