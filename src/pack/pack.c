@@ -284,6 +284,7 @@ static int join_wires(struct pack *p, struct spl_error *err)
 struct drawing {
     char *text; /* owned; NULL = none */
     size_t length;
+    struct spl_drawing_report report;
 };
 
 static int export_primitives(struct pack *p, struct drawing *drawing, struct spl_error *err)
@@ -291,7 +292,7 @@ static int export_primitives(struct pack *p, struct drawing *drawing, struct spl
     if (!p->options->export_primitives)
         return 0;
     return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
-                                 p->stage, &drawing->text, &drawing->length, err);
+                                 p->stage, &drawing->text, &drawing->length, &drawing->report, err);
 }
 
 /* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */
@@ -500,6 +501,8 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                  : pack_scan(&found, &inputs, found.output, NULL, NULL, NULL, &drawing, &stage, report, err);
     if (!rc && drawing.text)
         rc = spl_file_replace(found.export_primitives, drawing.text, drawing.length, err);
+    if (!rc && report)
+        report->drawing = drawing.report;
     free(drawing.text);
     spl_passes_finish(&p);
     spl_inputs_finish(&inputs);
