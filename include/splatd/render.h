@@ -208,7 +208,7 @@ struct spl_pick {
     double position[3];  /* world, on the ray through the point */
     double depth;        /* along the viewing axis */
     double distance;     /* from the eye */
-    double normal[3];    /* unit, world axes; (0,0,0) = none is known */
+    double normal[3];    /* unit, world axes; (0,0,0) = none is known; of a panel its plane's */
     uint8_t color[4];    /* of the splats, without textures */
     int32_t classification; /* of the nearest splat; -1 = the dataset has none */
     int64_t splat;       /* its index in the dataset, or that of a panel, mesh or vertex of a line; -1 =

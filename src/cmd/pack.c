@@ -346,7 +346,7 @@ int spl_cmd_pack(int argc, char **argv)
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);
     if (!rc)
-        spl_cmd_pack_print(a.pack.output, &report);
+        spl_cmd_pack_print(a.pack.output, a.pack.export_primitives, &report);
     spl_cmd_pack_finish_left_out(&listener, !rc);
     return rc ? spl_cmd_fail(&err) : 0;
 }

@@ -162,8 +162,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         const char *what;
     } others[] = {{stats->panels_drawn, "panels"}, {stats->meshes_drawn, "meshes"}, {stats->lines_drawn, "lines"}};
     uint64_t drawn = stats->splats_drawn;
-    fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name, device->software ? " (software)" : "",
-            (unsigned long long)stats->splats_drawn);
+    fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name,
+            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         drawn += others[i].count;
         if (others[i].count)

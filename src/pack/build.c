@@ -165,7 +165,7 @@ static int export_primitives(struct spl_build *p, struct spl_build_outputs *out,
     if (!p->options->export_primitives)
         return 0;
     return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
-                                 p->stage, &out->drawing, &out->drawing_length, err);
+                                 p->stage, &out->drawing, &out->drawing_length, &out->drawn, err);
 }
 
 /* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */

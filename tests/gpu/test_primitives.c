@@ -191,6 +191,10 @@ static void a_pick_says_the_same_and_the_plane(void **state)
             assert_true(pick.plane.points == 1234 && pick.plane.error_mean == (double)0.004f &&
                         pick.plane.error_most == (double)0.01f);
             assert_true(fabs(pick.plane.normal[1] + 1) < 1e-6);
+            assert_int_equal(spl_method_has_normals(view.method, spl_dataset_get_info(dataset)),
+                             fabs(pick.normal[1]) > 0.5);
+            for (int i = 0; i < 3; i++)
+                assert_true(pick.normal[1] == 0 || fabs(pick.normal[i]) == fabs(pick.plane.normal[i]));
             double off = 0;
             for (int i = 0; i < 3; i++) {
                 assert_true(fabs(pick.plane.point[i] - center[i]) < side * cell);

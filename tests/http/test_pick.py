@@ -124,6 +124,7 @@ def test_picks_say_which_primitive_and_plane():
             for pick in planes:
                 plane = pick["plane"]
                 assert abs(math.hypot(*plane["normal"]) - 1) < 1e-5
+                assert pick["normal"] in (plane["normal"], [-n for n in plane["normal"]]), pick
                 assert 0 <= plane["error_mean"] <= plane["error_most"] < 0.1 and plane["points"] > 0, plane
                 offs.append(abs(sum((a - b) * n for a, b, n in zip(pick["position"], plane["point"], plane["normal"]))))
             # beside splats depths blend
