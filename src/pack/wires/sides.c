@@ -122,8 +122,8 @@ static double length_of(const struct spl_wire_vertex *v)
     return sqrt(squared);
 }
 
-/* Adds a piece to the cells that its reach, which is a quarter of one at most, touches: stretch by stretch, each no longer
- * than a cell, those of the box around it. `grid` NULL: only counts them. */
+/* Adds a piece to the cells that its reach, which is a quarter of one at most, touches: stretch by stretch, each no
+ * longer than a cell, those of the box around it. `grid` NULL: only counts them. */
 static int add_piece(struct spl_wires_grid *grid, double edge, const double low[3], const struct spl_wire_vertex *v,
                      uint32_t piece, double reach, size_t *count, struct spl_error *err)
 {
@@ -151,8 +151,8 @@ static int add_piece(struct spl_wires_grid *grid, double edge, const double low[
     return rc;
 }
 
-/* The pieces by the cells that they reach into: some 2 to 6 each, of 16 bytes, since a cell is twice as wide as pieces are
- * long. */
+/* The pieces by the cells that they reach into: some 2 to 6 each, of 16 bytes, since a cell is twice as wide as pieces
+ * are long. */
 static int lay_pieces(struct spl_wires_grid *grid, const struct spl_wires *w, double noise, struct spl_error *err)
 {
     double length = 0;
