@@ -16,6 +16,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "pack/bound.h"
 #include "pack/build_parts.h"
 #include "pack/check.h"
 #include "pack/export/export.h"
@@ -98,9 +99,16 @@ static int find_planes(struct spl_build *p, struct spl_error *err)
 {
     double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
     const struct spl_planes_options planes = {.error = p->options->error / unit, .relief = true};
+    const struct spl_bound bound = {.error = planes.error, .unit_m = unit};
+    char doubt[SPL_BOUND_TEXT_MAX];
     if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
         return 0;
-    return spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
+    int rc = spl_bound_check(&bound, &p->points, err);
+    if (!rc)
+        rc = spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
+    if (!rc && p->options->warn && spl_bound_find_doubt(&bound, &p->planes, doubt))
+        p->options->warn(p->options->progress_context, doubt);
+    return rc;
 }
 
 /* The tree with its levels; panels first, which inner nodes are made of too. */
@@ -157,7 +165,7 @@ static int export_primitives(struct spl_build *p, struct spl_build_outputs *out,
     if (!p->options->export_primitives)
         return 0;
     return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
-                                 p->stage, &out->drawing, &out->drawing_length, err);
+                                 p->stage, &out->drawing, &out->drawing_length, &out->drawn, err);
 }
 
 /* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */

@@ -14,6 +14,7 @@ struct spl_build_outputs {
     bool has_points;     /* that one was written */
     char *drawing;       /* of options->export_primitives, owned by the caller, free(); NULL = none */
     size_t drawing_length;
+    struct spl_drawing_report drawn; /* what it holds */
 };
 
 /* Writes the datasets and makes the drawing, which the caller writes once all is done. `later` (NULL = nothing) is what

@@ -119,6 +119,8 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                  : spl_build(&found, &inputs, NULL, &out, &stage, report, err);
     if (!rc && out.drawing)
         rc = spl_file_replace(found.export_primitives, out.drawing, out.drawing_length, err);
+    if (!rc && report)
+        report->drawing = out.drawn;
     free(out.drawing);
     spl_passes_finish(&p);
     spl_inputs_finish(&inputs);

@@ -52,9 +52,26 @@ static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_sample
     return count < chunk->count ? count : chunk->count;
 }
 
+/* What of a splat, panel, mesh or piece of a line is drawn as one: how many of them, each within a ball of `radius`;
+ * `looks`: instead of it, samples that are looked at for each at most, 0 = as of the ball. */
+struct pieces {
+    uint64_t count;
+    double radius;
+    uint64_t looks;
+};
+
+/* Samples that are looked at for a splat, panel, mesh or piece of a line on samples [low, high] at most. */
+static uint64_t count_looks(const struct walk *w, const struct pieces *pieces, const double low[2],
+                            const double high[2], double near)
+{
+    uint64_t one = spl_footprint_samples(w->params->camera, low, high, pieces->radius, near);
+    return pieces->count * (pieces->looks && pieces->looks < one ? pieces->looks : one);
+}
+
 /* Lists the chunk once for every window of the tile that samples [low, high] reach into. */
 static int add_windows(struct walk *w, const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk,
-                       const double low[2], const double high[2], double near, struct spl_error *err)
+                       const struct pieces *pieces, const double low[2], const double high[2], double near,
+                       struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
     double size[2] = {camera->width, camera->height};
@@ -71,7 +88,12 @@ static int add_windows(struct walk *w, const struct spl_draw_origin *origin, con
             struct spl_draw_chunk part = *chunk;
             struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, from, to, near);
             part.count |= (x + 1) << SPL_COUNT_BITS | y << (SPL_COUNT_BITS + SPL_WINDOW_BITS);
-            rc = spl_draw_list_add(w->list, origin, &part, &bounds, err);
+            for (int i = 0; i < 2; i++) {
+                from[i] = fmax(from[i], low[i]);
+                to[i] = fmin(to[i], high[i]);
+            }
+            uint64_t looks = count_looks(w, pieces, from, to, near);
+            rc = spl_draw_list_add(w->list, origin, &part, &bounds, looks, err);
         }
     }
     return rc;
@@ -195,13 +217,15 @@ static struct reach reach_of(const struct walk *w, struct spl_occupancy *counted
 
 /* Lists the chunk, by windows where what is `radius` around its middle may be wider than `side` samples. */
 static int list_chunk(struct walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,
-                      const struct reach *reach, double radius, double side, struct spl_error *err)
+                      const struct pieces *pieces, const struct reach *reach, double radius, double side,
+                      struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
     if (w->params->discs && spl_footprint_side(camera, radius, reach->near) > side)
-        return add_windows(w, from, chunk, reach->low, reach->high, reach->near, err);
+        return add_windows(w, from, chunk, pieces, reach->low, reach->high, reach->near, err);
     struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, reach->low, reach->high, reach->near);
-    return spl_draw_list_add(w->list, from, chunk, &bounds, err);
+    uint64_t looks = w->params->discs ? count_looks(w, pieces, reach->low, reach->high, reach->near) : pieces->count;
+    return spl_draw_list_add(w->list, from, chunk, &bounds, looks, err);
 }
 
 /* Does a chunk of lines stand for linear splats of its node? */
@@ -211,12 +235,12 @@ static bool stands_for_splats(const struct walk *w, const struct spl_chunk *chun
            spl_chunk_line_width(chunk) > 0;
 }
 
-/* May a piece of lines that are `half` as wide take more samples than an invocation looks at? */
-static bool needs_windows(const struct spl_camera *camera, double half, double near, double focal)
+/* Samples that are looked at for a piece of lines that are `half` as wide, at most. */
+static double count_line_looks(const struct spl_camera *camera, double half, double near, double focal)
 {
     double widest = fmax(SPL_LINE_SLANT * focal * half / fmax(near, camera->near), SPL_LINE_THIN);
     double across = ceil(2 * sqrt(2) * widest) + 1, along = fmax(camera->width, camera->height);
-    return across * along > SPL_LINE_ROUNDS;
+    return across * along;
 }
 
 /* Marks the cells that the stations of a chunk, whose box is `box`, give colours to; returns the station that trims it,
@@ -244,17 +268,22 @@ static int draw_lines(struct walk *w, const double node_to_eye[3], const struct 
         !spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
     struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
+    w->list->drawn[SPL_CHUNK_LINES] += spl_chunk_count_pieces(chunk);
     if (!w->params->discs)
-        return spl_draw_list_add(w->list, &from, &out, &(struct spl_chunk_bounds){0}, err);
+        return spl_draw_list_add(w->list, &from, &out, &(struct spl_chunk_bounds){0},
+                                 camera->width > camera->height ? camera->width : camera->height, err);
     out.texture_scale = (float)half;
     int trims = add_map_cells(w, chunk, &box, whole, err); /* none: lines are of no station */
     if (trims < 0)
         return trims;
     struct reach reach = reach_of(w, &w->splats, &box, chunk->count);
-    if (needs_windows(camera, half, reach.near, w->focal))
-        return add_windows(w, &from, &out, reach.low, reach.high, reach.near, err);
+    double looks = fmin(count_line_looks(camera, half, reach.near, w->focal), (double)UINT32_MAX);
+    const struct pieces pieces = {.count = 1, .radius = INFINITY, .looks = (uint64_t)looks};
+    if (looks > SPL_LINE_ROUNDS) // more than an invocation looks at
+        return add_windows(w, &from, &out, &pieces, reach.low, reach.high, reach.near, err);
     struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, reach.low, reach.high, reach.near);
-    return spl_draw_list_add(w->list, &from, &out, &bounds, err);
+    return spl_draw_list_add(w->list, &from, &out, &bounds,
+                             count_looks(w, &pieces, reach.low, reach.high, reach.near), err);
 }
 
 /* What the node and its descendants draw, in view space, but for discs much larger than most. */
@@ -319,13 +348,13 @@ static int draw_discs(struct walk *w, const struct spl_found_node *found, const 
     out.count = count;
     out.texture = drawn_texture(w, chunk, page, reach.near);
     out.texture_scale = (float)scale;
-    w->list->splats += count;
+    w->list->drawn[SPL_CHUNK_DISCS] += count;
     int trims = add_map_cells(w, chunk, &box, whole, err);
     if (trims < 0)
         return trims;
     const struct spl_draw_origin from = {
         .page = page, .kind = SPL_CHUNK_DISCS, .trims = (uint16_t)trims, .lined = lined};
-    return list_chunk(w, &from, &out, &reach, radius, SPL_WINDOW, err);
+    return list_chunk(w, &from, &out, &(struct pieces){1, radius, 0}, &reach, radius, SPL_WINDOW, err);
 }
 
 /* The rectangle of a chunk of panels, as thick as its relief may be, in view space, and where its origin lies from the
@@ -403,13 +432,18 @@ static int draw_panels(struct walk *w, const double node_to_eye[3], const struct
     out.color_word = chunk->geometry_word + chunk->color_bits - 1; // reads are held within the chunk
     out.color_bits = spl_panels_get_level(chunk);
     out.color_base = 0;
-    w->list->splats += chunk->count;
+    w->list->drawn[kind] += chunk->count;
     int trims = add_map_cells(w, chunk, &box, node_box, err);
     if (trims < 0)
         return trims;
     const struct spl_draw_origin from = {.page = page, .kind = kind, .trims = (uint16_t)trims};
-    return whole ? list_chunk(w, &from, &out, &reach, half, mesh ? SPL_MESH_WINDOW : SPL_PANEL_WINDOW, err)
-                 : list_chunk(w, &from, &out, &reach, disc, SPL_WINDOW, err);
+    if (!whole)
+        return list_chunk(w, &from, &out, &(struct pieces){cells, disc, 0}, &reach, disc, SPL_WINDOW, err);
+    const unsigned level = spl_panels_get_level(chunk);
+    const double square = sqrt(0.5) * SPL_PANEL_SIDE / (1 << level) * (double)chunk->step;
+    const struct pieces pieces = {.count = mesh ? 2u << 2 * level : 1,
+                                  .radius = hypot(square, (double)spl_panels_get_reach(chunk))};
+    return list_chunk(w, &from, &out, &pieces, &reach, half, mesh ? SPL_MESH_WINDOW : SPL_PANEL_WINDOW, err);
 }
 
 static int draw_node(struct walk *w, const struct spl_found_node *found, struct spl_error *err)

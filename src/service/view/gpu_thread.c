@@ -146,7 +146,10 @@ static bool is_over(const struct gpu *gpu, struct spl_job *job)
 static int begin(struct gpu *gpu, struct spl_job *job)
 {
     inject(gpu);
-    return spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
+    int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
+    if (!rc)
+        spl_frame_set_cancel(job->steps, &job->dropped);
+    return rc;
 }
 
 /* What others took, before the first tile and between tiles, was waiting, no part of the frame; what pages took is. */

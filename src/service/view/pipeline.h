@@ -29,7 +29,7 @@ struct spl_job {
     struct spl_view_request request;
     uint64_t accepted_ns;
     _Atomic uint64_t deadline_ns;      /* the loop may raise it at any time */
-    atomic_bool dropped;               /* set by the loop at any time: nobody waits for it, skip the work */
+    struct spl_cancel dropped;         /* set by the loop at any time: nobody waits for it, skip the work */
     bool behind;                       /* a tour's frame: made while nobody's view waits */
     size_t frame_number;               /* of it */
     void *owner;                       // owned by: loop

@@ -184,7 +184,7 @@ static void a_large_view_ends_between_tiles_when_nobody_waits(void **state)
     job = take(pipeline); // now one of the others is begun
     assert_ptr_equal(job, small);
     spl_job_destroy(job);
-    atomic_store(&left->dropped, true);
+    spl_cancel_set(&left->dropped);
     for (int i = 0; i < 2; i++) {
         job = take(pipeline);
         assert_int_equal(job->err.code, job == left ? SPL_E_CANCELLED : SPL_E_TIMEOUT);
@@ -268,7 +268,7 @@ static void views_that_wait_for_pages_end(void **state)
     assert_ptr_equal(job, late);
     assert_int_equal(job->err.code, SPL_E_TIMEOUT);
     spl_job_destroy(job);
-    atomic_store(&left->dropped, true);
+    spl_cancel_set(&left->dropped);
     job = take(pipeline);
     assert_ptr_equal(job, left);
     assert_int_equal(job->err.code, SPL_E_CANCELLED);
@@ -326,7 +326,7 @@ static void dropped_and_late_jobs_are_not_rendered(void **state)
     assert_int_equal(spl_pipeline_submit(pipeline, first, NULL), 0);
     assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
     assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
-    atomic_store(&left->dropped, true);
+    spl_cancel_set(&left->dropped);
     for (int i = 0; i < 3; i++) {
         job = take(pipeline);
         assert_int_equal(job->err.code, job == late ? SPL_E_TIMEOUT : job == left ? SPL_E_CANCELLED : 0);
