@@ -162,6 +162,13 @@ static inline void spl_pack_options_init(struct spl_pack_options *options)
     spl_sized_init(options, sizeof *options);
 }
 
+/* What --export-primitives wrote; lengths in `unit` (m, ft, …, or unknown). */
+struct spl_drawing_report {
+    uint64_t planes, polygons, meshes, triangles, lines;
+    double polygon_area, triangle_area, line_length; /* in all */
+    char unit[32];
+};
+
 struct spl_pack_report {
     uint64_t points_read, points_skipped, duplicates, leaf_splats, splats;
     uint64_t linear; /* leaf splats on wires, poles and cables */
@@ -179,6 +186,7 @@ struct spl_pack_report {
     struct spl_map_report maps;
     uint64_t pruned_of; /* leaf splats of which leaf_splats are left; 0 = all are */
     uint64_t panels, panel_points, meshes, mesh_points; /* as in struct spl_dataset_info */
+    struct spl_drawing_report drawing; /* zero without options->export_primitives */
 };
 
 /* Reads, cleans, estimates normals and radii, builds the levels and writes `options->output` (temporary file, sync,

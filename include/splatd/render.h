@@ -64,7 +64,7 @@ SPL_API int spl_view_check_layers(const struct spl_view *view, const struct spl_
                                   struct spl_error *err);
 
 struct spl_frame_stats {
-    uint64_t splats_drawn, chunks_drawn, nodes_drawn;
+    uint64_t splats_drawn, chunks_drawn, nodes_drawn; /* of all tiles together; splats alone, without primitives */
     uint64_t pages_loaded;      /* that the frame has waited for */
     uint32_t tiles;
     bool complete;              /* every chosen page was drawn; else coarser nodes stood in, as the memory limit or
@@ -73,6 +73,7 @@ struct spl_frame_stats {
                                    the device has timestamps, else host times */
     bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the
                                    memory limit has no room for it */
+    uint64_t panels_drawn, meshes_drawn, lines_drawn; /* as whole ones or cell by cell; straight pieces of lines */
 };
 
 struct spl_frame {
@@ -207,7 +208,7 @@ struct spl_pick {
     double position[3];  /* world, on the ray through the point */
     double depth;        /* along the viewing axis */
     double distance;     /* from the eye */
-    double normal[3];    /* unit, world axes; (0,0,0) = none is known */
+    double normal[3];    /* unit, world axes; (0,0,0) = none is known; of a panel its plane's */
     uint8_t color[4];    /* of the splats, without textures */
     int32_t classification; /* of the nearest splat; -1 = the dataset has none */
     int64_t splat;       /* its index in the dataset, or that of a panel, mesh or vertex of a line; -1 =

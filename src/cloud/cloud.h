@@ -117,6 +117,12 @@ void spl_point_batch_finish(struct spl_point_batch *batch);
 /* Whether a name ends as only scans do (".las"), so that a search of a folder takes it. */
 bool spl_cloud_is_named_scan(const char *path);
 
+/* What the drawings of primitives say that `splatd pack` writes (--export-primitives), in a comment among their first
+ * 128 bytes, and whether a file does. Such a PLY is called as a scan is, but is none: opening it is refused. False also
+ * where nothing can be read. */
+#define SPL_DRAWING_MARK "planes, meshes and lines of a scan; unit of length: "
+bool spl_cloud_is_drawing(const char *path);
+
 /* These endings, ".ply, .las, …", into `text`, cut to `size`. */
 void spl_cloud_list_endings(char *text, size_t size);
 

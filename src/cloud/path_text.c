@@ -3,9 +3,9 @@
  * Any thread; no state. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "cloud/path_reader.h"
 #include "geom/size.h"
 #include "cloud/view_list.h"
@@ -30,12 +30,10 @@ static int parse_line(const struct spl_source *source, const char *line, size_t 
             ;
         if (count >= 8)
             continue;
-        char copy[64], *stop = copy;
+        char copy[64];
         snprintf(copy, sizeof copy, "%.*s", (int)(word < 63 ? word : 63), at);
-        /* strtod alone would also take hex floats, "nan" and "infinity" */
-        if (word < sizeof copy && strspn(copy, "0123456789+-.eE") == word)
-            n[count] = strtod(copy, &stop);
-        if (stop == copy || *stop || !isfinite(n[count]))
+        const char *stop = word < sizeof copy ? spl_decimal_parse(copy, &n[count]) : NULL;
+        if (!stop || *stop)
             return spl_source_fail_line(source, source->line, columns[count], err, "'%.32s' is no number%s", copy,
                                         count ? "" : "; text, so it was read as a TUM trajectory; JSON begins with {");
     }

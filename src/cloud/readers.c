@@ -10,12 +10,28 @@
 #include "cloud/fields.h"
 #include "cloud/pcd.h"
 
-enum { first_bytes = 4096 };
+enum { first_bytes = 4096, drawing_bytes = 128 };
 
 static bool begins_with(const uint8_t *bytes, size_t available, const char *text)
 {
     size_t length = strlen(text);
     return available >= length && memcmp(bytes, text, length) == 0;
+}
+
+static bool is_drawing(const uint8_t *bytes, size_t available)
+{
+    return memmem(bytes, available < drawing_bytes ? available : drawing_bytes, SPL_DRAWING_MARK,
+                  strlen(SPL_DRAWING_MARK));
+}
+
+bool spl_cloud_is_drawing(const char *path)
+{
+    uint8_t bytes[drawing_bytes];
+    FILE *file = fopen(path, "rbe");
+    size_t available = file ? fread(bytes, 1, sizeof bytes, file) : 0;
+    if (file)
+        fclose(file);
+    return is_drawing(bytes, available);
 }
 
 static bool is_ply(const uint8_t *bytes, size_t available)
@@ -138,6 +154,10 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
             source, SPL_E_INPUT, "", err,
             "is packed already: \"splatd info\", \"splatd serve\" and \"splatd render\" take it as it "
             "is; pack takes the scans that it was made of");
+    if (is_drawing(bytes, available))
+        return spl_source_fail(source, SPL_E_INPUT, "", err,
+                               "is a drawing that \"splatd pack --export-primitives\" wrote, and no scan; pack takes "
+                               "the scans that it was made of");
     while (found < sizeof readers / sizeof *readers && !readers[found].is(bytes, available))
         found++;
     if (found == sizeof readers / sizeof *readers)

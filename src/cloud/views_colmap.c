@@ -2,11 +2,11 @@
  * QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points as triples, which may be none).
  *
  * What is wrong is named with file, line and field. Any thread; no state. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "cloud/colmap_model.h"
 #include "cloud/fields.h"
 
@@ -36,11 +36,8 @@ static int next_line(struct spl_source *source, char text[text_max], struct spl_
 static int read_number(const struct spl_source *source, char **words, const char *field, double *out,
                        struct spl_error *err)
 {
-    char *word = strtok_r(NULL, " \t", words), *end = word;
-    /* strtod alone would also take hex floats, "nan" and "infinity" */
-    if (word && strspn(word, "0123456789+-.eE") == strlen(word))
-        *out = strtod(word, &end);
-    if (!word || end == word || *end || !isfinite(*out))
+    const char *word = strtok_r(NULL, " \t", words), *end = word ? spl_decimal_parse(word, out) : NULL;
+    if (!end || *end)
         return spl_source_fail_line(source, source->line, field, err, "'%.32s' is no number", word ? word : "");
     return SPL_OK;
 }

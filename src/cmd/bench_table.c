@@ -22,6 +22,8 @@ void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct s
             spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), row->lod,
             row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
             row->select, row->upload, row->clear, row->depth, row->shade, row->resolve, row->readback, row->splats);
+        if (row->panels || row->meshes || row->lines)
+            printf("%-16s and %.0f panels, %.0f meshes, %.0f lines\n", "", row->panels, row->meshes, row->lines);
         if (row->incomplete)
             printf("%-16s %u of %u frames with coarser nodes in the place of pages that were not resident\n", "",
                    row->incomplete, o->frames);
@@ -49,11 +51,12 @@ static json_t *row_json(const struct spl_bench_row *row)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(row->dataset);
     return json_pack(
-        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:i, s:I}",
+        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f, s:i, s:I}",
         "dataset", info->id, "leaf_splats", (json_int_t)info->leaf_splats, "backend", row->device.backend, "device",
         row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
         "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
-        passes_json(row), "splats_drawn", row->splats, "chunks_drawn", row->chunks,
+        passes_json(row), "splats_drawn", row->splats, "panels_drawn", row->panels, "meshes_drawn", row->meshes,
+        "lines_drawn", row->lines, "chunks_drawn", row->chunks,
         "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
 }
 

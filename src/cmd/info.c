@@ -62,8 +62,9 @@ static const struct spl_cmd_table table = {
         "  splatd info --no-verify tiles\n"
         "Only check that files are whole (exit code 2 when one is not):\n"
         "  splatd info *.spld >/dev/null\n"
-        "One line of JSON a dataset, for scripts:\n"
-        "  splatd info --json courtyard.spld | jq .bytes_per_splat.total\n"
+        "One line of JSON a dataset, for scripts: bytes_per_point are the file's, over the points that were kept;\n"
+        "bytes_per_splat over the splats of all levels, or the same points where panels and meshes stand for some:\n"
+        "  splatd info --json courtyard.spld | jq .bytes_per_point.total\n"
         "The atoms that textures are sums of, the most used first, as a picture:\n"
         "  splatd info hall.spld --dictionary atoms.png\n\n",
     .options = options,

@@ -207,13 +207,20 @@ static json_t *primitives_to_json(const struct spl_info_report *report)
                      (json_int_t)report->bytes[SPL_CHUNK_LINES]);
 }
 
+static json_t *bytes_to_json(const struct spl_dataset_info *info, double times)
+{
+    json_t *bytes = json_pack("{s:f}", "total", times * spl_info_total_bytes_per_splat(info));
+    for (int a = 0; a < spl_info_count(info); a++)
+        json_object_set_new(bytes, spl_info_name(info, a), json_real(times * spl_info_bytes_per_splat(info, a)));
+    return bytes;
+}
+
 /* NULL when memory is refused: json_pack passes it on. */
 json_t *spl_info_to_json(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
-    json_t *bytes = json_pack("{s:f}", "total", spl_info_total_bytes_per_splat(info));
-    for (int a = 0; a < spl_info_count(info); a++)
-        json_object_set_new(bytes, spl_info_name(info, a), json_real(spl_info_bytes_per_splat(info, a)));
+    json_t *bytes = bytes_to_json(info, 1);
+    json_t *bytes_of_points = bytes_to_json(info, spl_info_splats_a_point(info));
     json_t *levels = json_array();
     for (uint32_t i = 0; i < report->level_count; i++) {
         const struct spl_info_level *l = &report->levels[i];
@@ -236,7 +243,8 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     }
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
-        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, s:o}",
+        "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, "
+        "s:o}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -246,8 +254,8 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         info->splat_radius, "attributes", "color", (int)info->has_color, "class", (int)info->has_class, "uncertainty",
         (int)info->has_uncertainty, "surface", (int)info->has_surface, "linear", (json_int_t)report->linear,
         "clip_lines", (json_int_t)report->clips, "page_bytes", (json_int_t)info->page_bytes, "kinds",
-        kinds_to_json(report), "bytes_per_splat", bytes, "by_level", levels, "widths", widths, "textures",
-        textures_to_json(report), "maps", maps_to_json(report), "sources",
+        kinds_to_json(report), "bytes_per_splat", bytes, "bytes_per_point", bytes_of_points, "by_level", levels,
+        "widths", widths, "textures", textures_to_json(report), "maps", maps_to_json(report), "sources",
         json_object_get(spl_dataset_get_meta(report->dataset), "sources"), "color",
         json_object_get(spl_dataset_get_meta(report->dataset), "color"), "streams",
         json_object_get(spl_dataset_get_meta(report->dataset), "streams"), "unit", info->unit, "crs",

@@ -50,9 +50,15 @@ static inline bool spl_info_has_primitives(const struct spl_dataset_info *info)
     return info->panels || info->meshes;
 }
 
-/* Of a dataset that has, of a point that was kept. */
+/* Of a dataset that has, of a point that was kept, as spl_info_splats_a_point() says. */
 double spl_info_bytes_per_splat(const struct spl_dataset_info *info, int attribute);
 double spl_info_total_bytes_per_splat(const struct spl_dataset_info *info);
+
+/* Times this, bytes a splat are bytes a point that was kept: coarser levels have splats besides. */
+static inline double spl_info_splats_a_point(const struct spl_dataset_info *info)
+{
+    return spl_info_has_primitives(info) ? 1 : (double)info->splats / (double)info->leaf_splats;
+}
 
 /* The root of the mean squared distance of panels' points to their planes, or of meshes' to them. */
 double spl_info_error_mean(const struct spl_info_report *report, enum spl_chunk_kind kind);

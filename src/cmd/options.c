@@ -1,24 +1,24 @@
-/* Numbers from the command line: all of the text must be the value, so "12abc", "", "1e999" and "nan" are refused here
- * and nowhere else. Pure functions; any thread. */
+/* Numbers from the command line: all of the text must be the value, so "12abc", "", "1e999", "nan" and "0x10" are
+ * refused here and nowhere else. Pure functions; any thread. */
 #include "cmd/options.h"
 
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "base/memory.h"
 #include "geom/size.h"
 #include "image/color.h"
 
 int spl_cmd_parse_real(const char *option, const char *text, double min, double max, double *out, struct spl_error *err)
 {
-    char *end;
-    double value = strtod(text, &end);
-    if (end == text || *end || !isfinite(value) || value < min || value > max)
+    double value;
+    const char *end = spl_decimal_parse(text, &value);
+    if (!end || *end || value < min || value > max)
         return spl_fail(err, SPL_E_USAGE, "%s takes a number from %g to %g, not '%s'", option, min, max, text);
     *out = value;
     return 0;
@@ -30,12 +30,14 @@ int spl_cmd_parse_count(const char *option, const char *text, uint64_t min, uint
     char *end;
     errno = 0;
     uint64_t value = strtoull(text, &end, 10);
+    const char *rest = end;
     if (isdigit((unsigned char)*text) && (*end == '.' || *end == 'e' || *end == 'E')) { /* "2e6" */
-        double real = strtod(text, &end);
+        double real = -1;
+        rest = spl_decimal_parse(text, &real);
         value = real >= 0 && real <= 0x1p53 ? (uint64_t)real : 0;
         errno = (double)value == real ? 0 : ERANGE;
     }
-    if (!isdigit((unsigned char)*text) || *end || errno || value < min || value > max)
+    if (!isdigit((unsigned char)*text) || !rest || *rest || errno || value < min || value > max)
         return spl_fail(err, SPL_E_USAGE, "%s takes a whole number from %" PRIu64 " to %" PRIu64 ", not '%s'", option,
                         min, max, text);
     *out = value;
@@ -60,9 +62,8 @@ int spl_cmd_parse_vector(const char *option, const char *text, double out[3], st
     const char *at = text;
     double value[3];
     for (int i = 0; i < 3; i++) {
-        char *end;
-        value[i] = strtod(at, &end);
-        if (end == at || !isfinite(value[i]) || *end != (i < 2 ? ',' : 0))
+        const char *end = spl_decimal_parse(at, &value[i]);
+        if (!end || *end != (i < 2 ? ',' : 0))
             return spl_fail(err, SPL_E_USAGE, "%s takes three numbers X,Y,Z, not '%s'", option, text);
         at = end + 1;
     }

@@ -13,6 +13,7 @@
 
 #include <splatd/pack.h>
 
+#include "base/decimal.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
 #include "cmd/pack_report.h"
@@ -118,10 +119,10 @@ static const char *const primitive_names[] = {"off", "all", NULL};
 static int take_error(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     struct arguments *a = arguments;
-    char *end;
-    double value = strtod(text, &end), unit = 1;
-    end += *end == ' ' && end > text;
-    bool known = end > text && (!*end || (isalpha((unsigned char)*end) && spl_unit_parse(end, &unit)));
+    double value = 0, unit = 1;
+    const char *end = spl_decimal_parse(text, &value);
+    end += end && *end == ' ';
+    bool known = end && (!*end || (isalpha((unsigned char)*end) && spl_unit_parse(end, &unit)));
     if (!known || !(unit > 0) || !(value * unit > 0 && isfinite(value * unit)))
         return spl_fail_field(err, SPL_E_USAGE, "error",
                               "%s takes a length above 0: 10mm, 0.5cm, 0.01 (metres), not '%.60s'", option, text);
@@ -345,7 +346,7 @@ int spl_cmd_pack(int argc, char **argv)
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);
     if (!rc)
-        spl_cmd_pack_print(a.pack.output, &report);
+        spl_cmd_pack_print(a.pack.output, a.pack.export_primitives, &report);
     spl_cmd_pack_finish_left_out(&listener, !rc);
     return rc ? spl_cmd_fail(&err) : 0;
 }

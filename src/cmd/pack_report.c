@@ -32,7 +32,18 @@ static void print_primitives(const char *what, uint64_t count, uint64_t points, 
                 what, (unsigned long long)points, (unsigned long long)all, 100 * (double)points / (double)all);
 }
 
-void spl_cmd_pack_print(const char *output, const struct spl_pack_report *r)
+static void print_drawing(const char *path, const struct spl_drawing_report *d)
+{
+    const char *unit = strcmp(d->unit, "unknown") ? d->unit : "units";
+    fprintf(stderr,
+            "%s: %llu planes as %llu polygons of %.2f square %s, %llu meshes as %llu triangles of %.2f square %s, "
+            "%llu lines of %.2f %s\n",
+            path, (unsigned long long)d->planes, (unsigned long long)d->polygons, d->polygon_area, unit,
+            (unsigned long long)d->meshes, (unsigned long long)d->triangles, d->triangle_area, unit,
+            (unsigned long long)d->lines, d->line_length, unit);
+}
+
+void spl_cmd_pack_print(const char *output, const char *drawing, const struct spl_pack_report *r)
 {
     uint64_t total = 0;
     double splats = (double)r->splats;
@@ -86,6 +97,8 @@ void spl_cmd_pack_print(const char *output, const struct spl_pack_report *r)
                 (double)r->maps.bytes / 1e6, (double)r->maps.bytes / (double)r->maps.texels, r->maps.block_psnr);
     if (r->maps.edits)
         fprintf(stderr, "colours of %u of these stations are those of --maps\n", r->maps.edited);
+    if (drawing)
+        print_drawing(drawing, &r->drawing);
     fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
 }
 

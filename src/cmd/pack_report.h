@@ -27,6 +27,7 @@ void spl_cmd_pack_say_left_out(void *context, const struct spl_error *why);
 /* Says the list again where `say`, and frees it. */
 void spl_cmd_pack_finish_left_out(struct spl_cmd_pack_listener *listener, bool say);
 
-void spl_cmd_pack_print(const char *output, const struct spl_pack_report *report);
+/* `drawing`: the file of --export-primitives; may be NULL. */
+void spl_cmd_pack_print(const char *output, const char *drawing, const struct spl_pack_report *report);
 
 #endif

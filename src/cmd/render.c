@@ -157,13 +157,24 @@ static void report(const struct spl_device_info *device, const struct spl_datase
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
     const double *low = info->bounds_min, *high = info->bounds_max;
-    fprintf(stderr, "splatd: %s %s%s: %llu splats in %.1f ms", device->backend, device->name,
-            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn, stats->total_ms);
+    const struct {
+        uint64_t count;
+        const char *what;
+    } others[] = {{stats->panels_drawn, "panels"}, {stats->meshes_drawn, "meshes"}, {stats->lines_drawn, "lines"}};
+    uint64_t drawn = stats->splats_drawn;
+    fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name,
+            device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn);
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        drawn += others[i].count;
+        if (others[i].count)
+            fprintf(stderr, ", %llu %s", (unsigned long long)others[i].count, others[i].what);
+    }
+    fprintf(stderr, " in %.1f ms", stats->total_ms);
     if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
     fputc('\n', stderr);
-    if (!stats->splats_drawn)
+    if (!drawn)
         fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
                 low[0], low[1], low[2], high[0], high[1], high[2]);
     if (encoded->saturated)

@@ -4,8 +4,9 @@
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "base/decimal.h"
 
 static const double seven_digits = 1e-7; /* US survey foot and foot are 2e-6 apart, and headers round */
 static const double metres_least = 1e-6, metres_most = 1e9;
@@ -40,9 +41,8 @@ bool spl_unit_parse(const char *text, double *metres)
             *metres = units[i].metres;
             return true;
         }
-    char *end;
-    bool decimal = isdigit((unsigned char)*text) && !strpbrk(text, "xX");
-    double value = decimal ? strtod(text, &end) : 0;
+    double value = 0;
+    const char *end = isdigit((unsigned char)*text) ? spl_decimal_parse(text, &value) : NULL;
     if (!(value >= metres_least && value <= metres_most))
         return false;
     end += *end == ' ';

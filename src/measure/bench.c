@@ -148,6 +148,9 @@ static void summarise_row(struct bench *b, size_t index)
 #include "render/stages.def"
 #undef STAGE
     row->splats = SUMMARY(s->stats.splats_drawn).median;
+    row->panels = SUMMARY(s->stats.panels_drawn).median;
+    row->meshes = SUMMARY(s->stats.meshes_drawn).median;
+    row->lines = SUMMARY(s->stats.lines_drawn).median;
     row->chunks = SUMMARY(s->stats.chunks_drawn).median;
     row->memory = spl_renderer_get_memory(b->renderers[row_device(b->options, index)]);
     for (uint32_t f = 0; f < frames; f++)

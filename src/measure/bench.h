@@ -40,6 +40,7 @@ struct spl_bench_row {
 #include "render/stages.def"
 #undef STAGE
     double splats, chunks;               /* drawn, medians */
+    double panels, meshes, lines;        /* likewise; lines by their straight pieces */
     uint32_t incomplete;                 /* frames in which coarser nodes stood in for pages that were not resident */
     uint64_t memory;                     /* device bytes held, all datasets together */
 };

@@ -9,21 +9,19 @@
 #include <string.h>
 
 #include "base/array.h"
+#include "base/decimal.h"
 
 /* Cuts the last field off `line` and parses it. */
 static int take_number(char *line, const char *field, double least, const char *path, size_t number, double *out,
                        struct spl_error *err)
 {
-    char *comma = strrchr(line, ','), *end;
+    char *comma = strrchr(line, ',');
     if (!comma)
         return spl_fail_field(err, SPL_E_INPUT, field, "%s: line %zu: a row is name,ms,psnr; '%.80s' has fewer fields",
                               path, number, line);
     *comma = 0;
-    *out = strtod(comma + 1, &end);
-    end += strspn(end, " \t");
-    /* strtod alone would also take hex floats */
-    if (end == comma + 1 || comma[1 + strspn(comma + 1, "0123456789+-.eE \t")] || *end || !isfinite(*out) ||
-        *out <= least)
+    const char *end = spl_decimal_parse(comma + 1 + strspn(comma + 1, " \t"), out);
+    if (!end || end[strspn(end, " \t")] || *out <= least)
         return spl_fail_field(err, SPL_E_INPUT, field, "%s: line %zu: '%.40s' is no %s", path, number, comma + 1,
                               field);
     return SPL_OK;

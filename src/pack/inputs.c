@@ -39,6 +39,7 @@ struct finder {
     struct seen seen;
     struct spl_names again; /* of what was seen before */
     struct spl_names other; /* of what the folder at work has besides scans */
+    struct spl_names drawings; /* of our own, that lie beside the scans they were made of */
     size_t pending;         /* names that are read and not yet entered */
 };
 
@@ -222,6 +223,8 @@ static int search(struct finder *f, const char *path, unsigned depth, struct spl
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the names in %.300s", path);
         } else if (entries.list[i].folder) {
             rc = search(f, inner, depth + 1, err);
+        } else if (spl_cloud_is_drawing(inner)) {
+            spl_names_add(&f->drawings, inner);
         } else {
             rc = add_file(f, inner, stat(inner, &status) ? NULL : &status, err);
         }
@@ -346,6 +349,8 @@ int spl_inputs_find(struct spl_inputs *inputs, const char *const *given, size_t 
     *inputs = (struct spl_inputs){.listener = *listener};
     for (size_t i = 0; !rc && i < count; i++)
         rc = given[i][0] == '@' ? add_list(&f, given[i] + 1, err) : add_path(&f, given[i], err);
+    if (!rc && f.drawings.count)
+        say(&f, "left out, since \"splatd pack --export-primitives\" drew them: %s", spl_names_list(&f.drawings));
     if (!rc && f.again.count)
         say(&f, "taken once, though named more than once: %s", spl_names_list(&f.again));
     free(f.seen.places);

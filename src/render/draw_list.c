@@ -3,6 +3,7 @@
 #include "render/draw_list.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "dataset/format.h" /* enum spl_chunk_kind */
@@ -61,7 +62,8 @@ static uint64_t word_of(const struct spl_draw_key *key)
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
-    list->splats = list->listed_splats = list->sample_splats = list->sample_panels = 0;
+    memset(list->drawn, 0, sizeof list->drawn);
+    list->listed_splats = list->sample_splats = list->sample_panels = 0;
     list->nodes = 0;
     list->complete = true;
 }

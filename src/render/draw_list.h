@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "dataset/format.h"
 #include "shared.h"
 
 /* For the halves of what is drawn a panel is so many splats: about as much work. */
@@ -53,8 +54,9 @@ struct spl_draw_list {
     size_t chunk_capacity, entry_capacity, batch_capacity, map_capacity;
     struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
     uint64_t *work_of_chunk;           /* the same */
-    uint64_t splats;                   /* that are drawn, and panels */
-    uint64_t listed_splats;            /* the same, once for every window that they are drawn in; a panel counts as
+    uint64_t drawn[SPL_CHUNK_KINDS];   /* splats, pieces of lines, panels, meshes; of the latter two those whose cells
+                                          are drawn one by one, too */
+    uint64_t listed_splats;            /* splats and panels, once for every window that they are drawn in; a panel counts as
                                           SPL_PANEL_WORTH */
     uint32_t nodes;                    /* that the chunks came from */
     uint64_t sample_splats;            /* upper bound of the splats that reach any one sample */

@@ -274,7 +274,10 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     spl_readback_tile(tile, spl_gpu_buffer_map(r->scratch.readback), job->frame->images);
     stats->readback_ms += spl_since_ms(&clock);
     add_times(tile, stats);
-    stats->splats_drawn += r->list.splats;
+    stats->splats_drawn += r->list.drawn[SPL_CHUNK_DISCS];
+    stats->lines_drawn += r->list.drawn[SPL_CHUNK_LINES];
+    stats->panels_drawn += r->list.drawn[SPL_CHUNK_PANELS];
+    stats->meshes_drawn += r->list.drawn[SPL_CHUNK_MESHES];
     stats->chunks_drawn += r->list.chunk_count;
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;

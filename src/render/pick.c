@@ -1,6 +1,6 @@
 /* The geometry of picks, shared by the library and the service. The world position is the point on the pixel's ray at
  * the depth that was rendered, so it agrees with the depth layer to the bit; class and primitive are those of the
- * nearest splat, panel or mesh; a mesh lies on no plane that a pick could name. Pure functions; any thread. */
+ * nearest splat, panel or mesh, the normal is its plane's; a mesh lies on no plane that a pick could name. Pure functions; any thread. */
 #include "render/pick.h"
 
 #include <math.h>
@@ -59,6 +59,12 @@ static void find_primitive(const struct spl_dataset *dataset, uint32_t id, struc
     plane->error_mean = (double)spl_panels_get_error_mean(&chunk);
     plane->error_most = (double)spl_panels_get_error_most(&chunk);
     plane->points = spl_panels_get_points(&chunk);
+    /* which the layer has of fewer bits and blended with what lies beside it; the side is the layer's */
+    double cosine = 0;
+    for (int i = 0; i < 3; i++)
+        cosine += plane->normal[i] * pick->normal[i];
+    for (int i = 0; i < 3 && cosine != 0; i++)
+        pick->normal[i] = cosine < 0 ? -plane->normal[i] : plane->normal[i];
 }
 
 void spl_pick_read(const struct spl_camera *camera, double x, double y, const struct spl_frame *frame,

@@ -268,6 +268,7 @@ static int draw_lines(struct walk *w, const double node_to_eye[3], const struct 
         !spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
     struct spl_draw_chunk out = begin_chunk(w, chunk, origin);
+    w->list->drawn[SPL_CHUNK_LINES] += spl_chunk_count_pieces(chunk);
     if (!w->params->discs)
         return spl_draw_list_add(w->list, &from, &out, &(struct spl_chunk_bounds){0},
                                  camera->width > camera->height ? camera->width : camera->height, err);
@@ -347,7 +348,7 @@ static int draw_discs(struct walk *w, const struct spl_found_node *found, const 
     out.count = count;
     out.texture = drawn_texture(w, chunk, page, reach.near);
     out.texture_scale = (float)scale;
-    w->list->splats += count;
+    w->list->drawn[SPL_CHUNK_DISCS] += count;
     int trims = add_map_cells(w, chunk, &box, whole, err);
     if (trims < 0)
         return trims;
@@ -431,7 +432,7 @@ static int draw_panels(struct walk *w, const double node_to_eye[3], const struct
     out.color_word = chunk->geometry_word + chunk->color_bits - 1; // reads are held within the chunk
     out.color_bits = spl_panels_get_level(chunk);
     out.color_base = 0;
-    w->list->splats += chunk->count;
+    w->list->drawn[kind] += chunk->count;
     int trims = add_map_cells(w, chunk, &box, node_box, err);
     if (trims < 0)
         return trims;

@@ -7,10 +7,10 @@
 #include "service/pages.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+#include "base/decimal.h"
 #include "service/exchange.h"
 #include "service/reply.h"
 
@@ -71,7 +71,10 @@ static double wish(const char *accept, const char *type)
         const char *end = item + strcspn(item, ","), *q = item + length;
         while (q < end && (strncasecmp(q, "q=", 2) || !strchr("; \t", q[-1])))
             q++;
-        return q < end ? strtod(q + 2, NULL) : 1;
+        double weight = 0;
+        if (q < end)
+            spl_decimal_parse(q + 2, &weight);
+        return q < end ? weight : 1;
     }
     return 0;
 }

@@ -114,6 +114,30 @@ static void each_pixel_says_what_it_shows(void **state)
     done(dataset);
 }
 
+/* What a frame has drawn is counted by kind: of the scene's one panel, its wire and its splats. */
+static void each_kind_is_counted_by_itself(void **state)
+{
+    (void)state;
+    struct spl_panel panel;
+    struct make_panels panels = make_wall(&panel);
+    struct spl_dataset *dataset = make_scene(&panels);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        for (int away = 0; away < 2; away++) {
+            struct spl_view view = squarely((enum spl_method)method);
+            const double up[3] = {0, 0, 1}, eye[3] = {100.05, 198.7, 5.25}, behind[3] = {100.05, 190, 5.25};
+            struct spl_frame frame;
+            if (away)
+                assert_int_equal(spl_camera_look_at(&view.camera, eye, behind, up, NULL), SPL_OK);
+            assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+            assert_int_equal(frame.stats.splats_drawn, away ? 0 : splat_count);
+            assert_int_equal(frame.stats.panels_drawn, !away);
+            assert_int_equal(frame.stats.lines_drawn, !away && method == SPL_METHOD_FILL);
+            assert_int_equal(frame.stats.meshes_drawn, 0);
+            spl_frame_finish(&frame);
+        }
+    done(dataset);
+}
+
 /* Alone it is drawn as beside all others, of samples as of pixels. */
 static void it_needs_no_other_layer(void **state)
 {
@@ -167,6 +191,10 @@ static void a_pick_says_the_same_and_the_plane(void **state)
             assert_true(pick.plane.points == 1234 && pick.plane.error_mean == (double)0.004f &&
                         pick.plane.error_most == (double)0.01f);
             assert_true(fabs(pick.plane.normal[1] + 1) < 1e-6);
+            assert_int_equal(spl_method_has_normals(view.method, spl_dataset_get_info(dataset)),
+                             fabs(pick.normal[1]) > 0.5);
+            for (int i = 0; i < 3; i++)
+                assert_true(pick.normal[1] == 0 || fabs(pick.normal[i]) == fabs(pick.plane.normal[i]));
             double off = 0;
             for (int i = 0; i < 3; i++) {
                 assert_true(fabs(pick.plane.point[i] - center[i]) < side * cell);
@@ -184,6 +212,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(each_pixel_says_what_it_shows),
+        frames_test(each_kind_is_counted_by_itself),
         frames_test(it_needs_no_other_layer),
         frames_test(a_pick_says_the_same_and_the_plane),
     };

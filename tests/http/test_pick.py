@@ -124,10 +124,14 @@ def test_picks_say_which_primitive_and_plane():
             for pick in planes:
                 plane = pick["plane"]
                 assert abs(math.hypot(*plane["normal"]) - 1) < 1e-5
+                assert pick["normal"] in (plane["normal"], [-n for n in plane["normal"]]), pick
                 assert 0 <= plane["error_mean"] <= plane["error_most"] < 0.1 and plane["points"] > 0, plane
                 offs.append(abs(sum((a - b) * n for a, b, n in zip(pick["position"], plane["point"], plane["normal"]))))
             # beside splats depths blend
             assert sorted(offs)[len(offs) // 2] < 0.001 and max(offs) < 0.2, sorted(offs)
+            headers = d.ask(f"{where}/view?width=32&height=24").headers
+            drawn = {kind: int(headers[f"Splatd-{kind}"]) for kind in ("Splats", "Panels", "Meshes", "Lines")}
+            assert drawn["Panels"] > 20 and drawn["Splats"] > 0, drawn
             asked = f"{where}/view?width=32&height=24&layer=primitive"
             assert d.ask(f"{asked}&primitives=off").headers["ETag"] != d.ask(asked).headers["ETag"]
             told = d.ask(where).json()["primitives"]

@@ -54,12 +54,30 @@ int spl_export_check(const char *path, const char *const *scans, size_t count, s
     return rc;
 }
 
+static void describe(const struct spl_shapes *s, struct spl_drawing_report *r)
+{
+    r->planes = s->plane_count;
+    r->meshes = s->mesh_count;
+    r->lines = s->line_count;
+    for (uint32_t k = 0; k < s->plane_count; k++) {
+        r->polygons += s->planes[k].outline.polygon_count;
+        r->polygon_area += s->planes[k].area;
+    }
+    for (uint32_t k = 0; k < s->mesh_count; k++) {
+        r->triangles += s->meshes[k].triangle_count;
+        r->triangle_area += s->meshes[k].area;
+    }
+    for (size_t k = 0; k < s->line_count; k++)
+        r->line_length += s->lines[k].length;
+}
+
 int spl_export_primitives(const char *path, const struct spl_points *points, const struct spl_planes *planes,
                           const struct spl_wires *wires, double unit_m, struct spl_stage *stage, char **text,
-                          size_t *length, struct spl_error *err)
+                          size_t *length, struct spl_drawing_report *report, struct spl_error *err)
 {
     struct spl_shapes shapes;
-    char unit[SPL_UNIT_TEXT_MAX];
+    *report = (struct spl_drawing_report){0};
+    spl_unit_print(unit_m, report->unit);
     *text = NULL;
     *length = 0;
     int format = find_format(path);
@@ -68,7 +86,7 @@ int spl_export_primitives(const char *path, const struct spl_points *points, con
     int rc = spl_shapes_init(&shapes, points, planes, wires, stage, err);
     FILE *out = rc ? NULL : open_memstream(text, length);
     if (out)
-        formats[format].write(&shapes, spl_unit_print(unit_m, unit), out);
+        formats[format].write(&shapes, report->unit, out);
     if (!rc && (!out || ferror(out)))
         rc = SPL_E_NOMEM;
     if (out && fclose(out))
@@ -78,6 +96,8 @@ int spl_export_primitives(const char *path, const struct spl_points *points, con
     if (rc) {
         free(*text);
         *text = NULL;
+    } else {
+        describe(&shapes, report);
     }
     spl_shapes_finish(&shapes);
     return rc;

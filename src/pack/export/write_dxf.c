@@ -120,7 +120,7 @@ static void put_mesh(const struct spl_shapes *s, uint32_t k, FILE *out)
 
 void spl_shapes_write_dxf(const struct spl_shapes *s, const char *unit, FILE *out)
 {
-    fprintf(out, "999\nplanes, meshes and lines of a scan; unit of length: %s\n", unit);
+    fprintf(out, "999\n" SPL_DRAWING_MARK "%s\n", unit);
     put_pair(out, 0, "SECTION");
     put_pair(out, 2, "HEADER");
     put_pair(out, 9, "$ACADVER");

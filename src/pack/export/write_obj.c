@@ -12,7 +12,7 @@ void spl_shapes_write_obj(const struct spl_shapes *s, const char *unit, FILE *ou
 {
     size_t base = 1;
     int places = (int)s->decimals;
-    fprintf(out, "# planes, meshes and lines of a scan; unit of length: %s\n", unit);
+    fprintf(out, "# " SPL_DRAWING_MARK "%s\n", unit);
     for (uint32_t k = 0; k < s->plane_count; k++) {
         const struct spl_shape_plane *p = &s->planes[k];
         fprintf(out,

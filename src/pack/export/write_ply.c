@@ -54,7 +54,7 @@ void spl_shapes_write_ply(const struct spl_shapes *s, const char *unit, FILE *ou
     count_all(s, &vertices, &faces, &edges);
     fprintf(
         out,
-        "ply\nformat ascii 1.0\ncomment planes, meshes and lines of a scan; unit of length: %s\n"
+        "ply\nformat ascii 1.0\ncomment " SPL_DRAWING_MARK "%s\n"
         "comment inclination: degrees between a plane's normal and up; sag: below the chord, -1 where a line stands\n"
         "element vertex %zu\nproperty double x\nproperty double y\nproperty double z\n"
         "element face %zu\nproperty list int int vertex_indices\nproperty int plane\nproperty double area\n"

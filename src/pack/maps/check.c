@@ -104,12 +104,13 @@ static int judge(struct spl_map_pass *p, const char *name, const struct spl_agre
     }
     if (length * p->metre > 0.007 && length > 4 * a->shift_error)
         spl_map_warn(p,
-                     "%s: its edges fit the splats' where it stands %.1f mm (+- %.1f) from where its pose says, "
-                     "towards %.4f, %.4f, %.4f",
+                     "%s: it stands at least %.1f mm (+- %.1f) from where its pose says, towards %.4f, %.4f, %.4f: "
+                     "as far as its edges tell, which are followed so far alone; correct the pose and pack again to "
+                     "see what is left",
                      name, 1000 * length * p->metre, 2000 * a->shift_error * p->metre, a->shift[0], a->shift[1],
                      a->shift[2]);
     if (a->turn > 0.0015 && a->turn > 4 * a->turn_error)
-        spl_map_warn(p, "%s: its edges fit the splats' where it is turned by %.2f degrees (+- %.2f)", name,
+        spl_map_warn(p, "%s: it is turned by at least %.2f degrees (+- %.2f), as far as its edges tell", name,
                      a->turn * 180 / M_PI, 2 * a->turn_error * 180 / M_PI);
     return SPL_OK;
 }

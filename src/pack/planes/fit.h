@@ -22,6 +22,7 @@ struct spl_plane_limits_list {
     uint32_t count;
     size_t points;
     double noise; /* sigma all over the scan */
+    double own_bound; /* the largest that follows from noise and spacing, whatever bound is given */
 };
 
 static inline const struct spl_plane_limits *spl_plane_limits_at(const struct spl_plane_limits_list *list, size_t point)

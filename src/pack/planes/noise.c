@@ -85,8 +85,9 @@ static int settle(struct spl_plane_limits_list *limits, const struct noise *n, d
         double noise = limits->noise;
         size_t flat = take_median(n, from * n->runs / count, to * n->runs / count, values, &noise);
         l->noise = flat >= share_least ? fmin(noise, 2 * limits->noise) : limits->noise;
-        l->bound =
-            error > 0 ? error : fmax(noise_sigmas * l->noise, spacing_share * median_spacing(n->points, begin, end));
+        double own = fmax(noise_sigmas * l->noise, spacing_share * median_spacing(n->points, begin, end));
+        limits->own_bound = fmax(limits->own_bound, own);
+        l->bound = error > 0 ? error : own;
         l->step = step_share * l->bound;
     }
     return 0;

@@ -88,6 +88,7 @@ int spl_planes_find(struct spl_planes *planes, struct spl_points *points, const 
         points->linear[i] = points->linear[i] && points->plane[i] == SPL_NO_PLANE;
     for (uint32_t k = 0; k < limits.count; k++)
         planes->bound = fmax(planes->bound, limits.at[k].bound);
+    planes->own_bound = limits.own_bound;
     planes->noise = limits.noise;
     spl_plane_limits_finish(&limits);
     spl_regions_finish(&regions);

@@ -31,6 +31,7 @@ struct spl_planes {
     uint32_t count;
     uint32_t flat; /* how many of them are */
     double bound; /* no point lies farther off its plane; the largest, where it changes from place to place */
+    double own_bound; /* what the largest would be if none were given */
     double noise; /* sigma of the scan's distances to small planes, the median; 0 = none could be measured */
 };
 

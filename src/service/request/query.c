@@ -4,10 +4,10 @@
  * past `length`, nothing is allocated. Pure functions, any thread. */
 #include "service/request/request.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+#include "base/decimal.h"
 #include "service/request/values.h"
 
 enum { name_max = 64, text_max = 512 };
@@ -37,7 +37,6 @@ int spl_percent_decode(const char *text, size_t length, char *out, size_t capaci
     return 0;
 }
 
-/* Plain decimal numbers; strtod alone would also take hex floats, blanks, "nan" and "infinity". */
 static int parse_number(const char *text, size_t length, const char *name, bool several, double *out,
                         struct spl_error *err)
 {
@@ -47,11 +46,8 @@ static int parse_number(const char *text, size_t length, const char *name, bool 
     const char *word = copy + (copy[0] == '-' || copy[0] == '+');
     if (!strcasecmp(word, "nan") || !strcasecmp(word, "inf") || !strcasecmp(word, "infinity"))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be finite, not '%.16s'", name, copy);
-    char *end = copy;
-    double number = 0;
-    if (length && strspn(copy, "0123456789+-.eE") == length)
-        number = strtod(copy, &end);
-    if (end != copy + length || !length)
+    double number;
+    if (spl_decimal_parse(copy, &number) != copy + length)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is not a number%s", name, copy,
                               several ? "; join them by commas, without blanks" : "");
     *out = number;

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/decimal.h"
 #include "image/color.h"
 
 #define LAYER_NAMES "color, depth, range, normal, id, coverage, primitive"
@@ -69,11 +70,10 @@ static int parse_duration(struct spl_value *value, const char *name, const char 
 {
     size_t digits = strspn(text, "0123456789.");
     const char *unit = text + digits;
-    char *end = NULL;
-    double scale = !*unit || !strcmp(unit, "ms") ? 1 : !strcmp(unit, "s") ? 1000 : 0;
-    value->n[0] = digits ? scale * strtod(text, &end) : 0;
-    if (end != unit || scale == 0)
+    double scale = !*unit || !strcmp(unit, "ms") ? 1 : !strcmp(unit, "s") ? 1000 : 0, count = 0;
+    if (spl_decimal_parse(text, &count) != unit || scale == 0)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no time; write 50ms, 0.05s or 50", name, text);
+    value->n[0] = scale * count;
     return 0;
 }
 

@@ -49,8 +49,12 @@ static bool write_headers(const struct spl_job *job, char **text, size_t *length
     add_plan(&headers, job);
     spl_headers_add(&headers, "Splatd-Complete", "%s", job->stats.complete ? "true" : "false");
     spl_headers_add(&headers, "Splatd-Pending", "%s", job->stats.pending ? "true" : "false");
-    if (!job->request.picks)
+    if (!job->request.picks) {
         spl_headers_add(&headers, "Splatd-Splats", "%llu", (unsigned long long)job->stats.splats_drawn);
+        spl_headers_add(&headers, "Splatd-Panels", "%llu", (unsigned long long)job->stats.panels_drawn);
+        spl_headers_add(&headers, "Splatd-Meshes", "%llu", (unsigned long long)job->stats.meshes_drawn);
+        spl_headers_add(&headers, "Splatd-Lines", "%llu", (unsigned long long)job->stats.lines_drawn);
+    }
     spl_headers_add(&headers, "Splatd-Device", "%s", job->device);
     bool good = spl_headers_close(&headers);
     *text = headers.text;

@@ -155,6 +155,10 @@ static void what_is_wrong_is_said(void **state)
     } bad[] = {
         {"--lod 65", "--lod takes a number from 0 to 64, not '65'", ""},
         {"--lod nan", "--lod", "not 'nan'"},
+        {"--lod 0x10", "--lod", "not '0x10'"},
+        {"--seed 0x10", "--seed", "not '0x10'"},
+        {"--limit 0x10", "--limit", "not '0x10'"},
+        {"--eye 1,0x2,3", "--eye", "not '1,0x2,3'"},
         {"--seed -1", "--seed takes a whole number", "not '-1'"},
         {"--seed 0.5", "--seed takes a whole number", "not '0.5'"},
         {"--seed 1e", "--seed takes a whole number", "not '1e'"},

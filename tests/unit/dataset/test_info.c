@@ -95,6 +95,8 @@ static void test_json(void **state)
     const json_t *max = json_object_get(json_object_get(json, "bounds"), "max");
     assert_true(json_number_value(json_array_get(max, 0)) == 49.5 && json_number_value(json_array_get(max, 2)) == 0);
     const json_t *bytes = json_object_get(json, "bytes_per_splat"), *levels = json_object_get(json, "by_level"), *level;
+    double kept = number(json_object_get(json, "bytes_per_point"), "total");
+    assert_float_equal(kept, number(bytes, "total") * 4500 / 4000, 1e-9);
     double sum = 0, splats = 0;
     for (size_t i = 0; i < sizeof attributes / sizeof *attributes; i++)
         sum += number(bytes, attributes[i]);
@@ -296,6 +298,7 @@ static void test_panels_and_meshes(void **state)
     assert_true(number(json_object_get(kinds, "meshes"), "meshes") == 2);
     assert_true(number(level, "panels") == 3 && number(level, "meshes") == 2);
     assert_float_equal(number(json_object_get(json, "bytes_per_splat"), "meshes"), number(meshes, "bytes") / 70, 1e-9);
+    assert_float_equal(number(json_object_get(json, "bytes_per_point"), "meshes"), number(meshes, "bytes") / 70, 1e-9);
     json_decref(json);
     assert_int_equal(run("shapes.spld", output, sizeof output), 0);
     assert_non_null(strstr(output, "  panels        3 for 40 points (57.14 %)"));

@@ -330,6 +330,8 @@ static char *path_of(const char *name)
     return path[turn];
 }
 
+static struct spl_drawing_report report; /* of what was written last */
+
 static void write_to(const char *path, const struct scan *s, unsigned threads)
 {
     struct spl_stage stage = quiet_stage(threads);
@@ -337,8 +339,8 @@ static void write_to(const char *path, const struct scan *s, unsigned threads)
     assert_int_equal(spl_export_check(path, NULL, 0, &err), 0);
     char *text;
     size_t length;
-    assert_int_equal(spl_export_primitives(path, &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &err),
-                     0);
+    int rc = spl_export_primitives(path, &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
+    assert_int_equal(rc, 0);
     assert_int_equal(spl_file_replace(path, text, length, &err), 0);
     free(text);
 }
@@ -552,6 +554,17 @@ static void check_wires(const struct drawing *d, const double offset[3])
                 fabs(end[2] - offset[2] - 7) < 1e-6);
 }
 
+static size_t count_lines(const char *path, const char *begin)
+{
+    char row[65536];
+    size_t count = 0;
+    FILE *in = open_read(path);
+    while (fgets(row, sizeof row, in))
+        count += !strncmp(row, begin, strlen(begin));
+    fclose(in);
+    return count;
+}
+
 static void test_formats_agree(void **state)
 {
     (void)state;
@@ -569,6 +582,12 @@ static void test_formats_agree(void **state)
             check_wires(drawings[f], offsets[k]);
             free(drawings[f]);
         }
+        assert_int_equal(report.planes, count_lines(path_of("box.obj"), "g plane_"));
+        assert_int_equal(report.polygons, count_lines(path_of("box.obj"), "f "));
+        assert_int_equal(report.lines, count_lines(path_of("box.obj"), "l "));
+        assert_true(report.planes == 5 && report.polygons == 5 && report.lines == 2 && !report.triangles);
+        assert_true(fabs(report.polygon_area - 4.8) < 0.048 && fabs(report.line_length - 26.2) < 0.2);
+        assert_string_equal(report.unit, "m");
         finish(s);
     }
 }
@@ -600,17 +619,6 @@ static void test_threads_agree(void **state)
     free(one);
     free(five);
     finish(s);
-}
-
-static size_t count_lines(const char *path, const char *begin)
-{
-    char row[65536];
-    size_t count = 0;
-    FILE *in = open_read(path);
-    while (fgets(row, sizeof row, in))
-        count += !strncmp(row, begin, strlen(begin));
-    fclose(in);
-    return count;
 }
 
 /* A ball, but for its underside, is triangles on it, that look outwards and cover it; as many in each format. */
@@ -733,7 +741,7 @@ static void test_failures_give_nothing(void **state)
     char *text = folder;
     add_wires(s, nowhere);
     stage.cancelled = &cancelled;
-    int rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &err);
+    int rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
     assert_int_equal(rc, SPL_E_CANCELLED);
     assert_null(text);
     stage.cancelled = NULL;
@@ -742,7 +750,7 @@ static void test_failures_give_nothing(void **state)
         assert_null(text);
         err = (struct spl_error){0};
         spl_memory_fail_after(n);
-        rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &err);
+        rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
         spl_memory_fail_after(0);
         assert_true(rc == 0 || (rc == SPL_E_NOMEM && err.message[0]));
         failures += rc != 0;

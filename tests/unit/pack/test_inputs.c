@@ -521,6 +521,17 @@ static void test_the_command(void **state)
     assert_non_null(strstr(output, "tiles: 2 scans are taken, 1 other files left (read.me)"));
     assert_non_null(strstr(output, "warning: names end like another format than the file's: b.las holds PLY"));
     assert_non_null(strstr(output, "200 points in"));
+    /* what was drawn of scans beside them is none; it may be drawn again */
+    const char *draw = "tiles --primitives all --export-primitives tiles/drawn.ply -o all.spld";
+    for (int again = 0; again < 2; again++) {
+        assert_int_equal(run(draw, output, sizeof output), 0);
+        assert_non_null(strstr(output, "200 points in"));
+        assert_non_null(strstr(output, "\ntiles/drawn.ply: "));
+        assert_non_null(strstr(output, " planes as "));
+        assert_int_equal(!again, !strstr(output, "--export-primitives\" drew them: tiles/drawn.ply"));
+    }
+    assert_int_equal(run("tiles/drawn.ply -o none.spld", output, sizeof output), 2);
+    assert_non_null(strstr(output, "tiles/drawn.ply: is a drawing that \"splatd pack --export-primitives\" wrote"));
     write_text(path_of("tiles/0\033[2J.ply"), "ply\nnonsense\n");
     assert_int_equal(run("tiles -o all.spld", output, sizeof output), 2);
     assert_non_null(strstr(output, "0?[2J.ply: line 2: ")); /* a message on its way to a terminal */

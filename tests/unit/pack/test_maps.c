@@ -409,6 +409,8 @@ static void a_shift_is_found_to_the_millimetre(void **state)
             for (int i = 0; i < 3; i++)
                 assert_true(fabs(a.shift[i] - shift[i]) < 0.003 && a.shift_error < 0.002);
         }
+    a = judge_scene((const double[3]){0.3, 0, 0}, 0, false); /* sharp edges tell less: "at least" is never too much */
+    assert_true(hypot(a.shift[0], hypot(a.shift[1], a.shift[2])) < 0.303);
     a = judge_scene(nowhere, 0.5, false);
     assert_true(fabs(a.turn * 180 / M_PI - 0.5) < 0.05 && fabs(a.shift[0]) < 0.005);
 }

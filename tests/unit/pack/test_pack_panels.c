@@ -263,6 +263,45 @@ static void what_does_not_go_together_is_refused(void **state)
     }
 }
 
+static char warnings[2048];
+
+static void warn(void *context, const char *text)
+{
+    (void)context;
+    snprintf(warnings + strlen(warnings), sizeof warnings - strlen(warnings), "%s\n", text);
+}
+
+/* The corner is 1.4 m wide, its points are 2 cm apart, its noise is 0.3 mm: the bound that follows is about 4 mm. */
+static void a_bound_is_held_against_the_scan(void **state)
+{
+    static const struct {
+        double error;
+        const char *warns, *refuses;
+    } rows[] = {{0, "", ""},
+                {0.004, "", ""},
+                {0.0007, "", ""},
+                {0.0003, "--error 0.3 mm is how far", ""},
+                {1e-5, "the scan's noise is 0.", ""},
+                {1e-9, "", "--error 1e-06 mm: the scan's points are"},
+                {0.09, "things up to that thick are one", ""},
+                {0.2, "", "--error 200 mm: the whole scan is 1."},
+                {10, "", "--error 10 m: the whole scan is 1."}};
+    char scan[512];
+    const char *input = strcpy(scan, write_corner("bound.csv", walls, 0));
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const struct spl_pack_options options = {.size = sizeof options, .inputs = &input, .input_count = 1, .unit = "m",
+                                                 .output = path_of("bound.spld"), .primitives = SPL_PRIMITIVES_ALL,
+                                                 .error = rows[i].error, .warn = warn};
+        struct spl_error err = {0};
+        warnings[0] = 0;
+        int rc = spl_pack(&options, NULL, &err);
+        if (rc != (*rows[i].refuses ? SPL_E_USAGE : SPL_OK) || !strstr(err.message, rows[i].refuses) ||
+            (rc && strcmp(err.field, "error")) || !*rows[i].warns != !*warnings || !strstr(warnings, rows[i].warns))
+            fail_msg("%g: '%s', warning '%s'", rows[i].error, err.message, warnings);
+    }
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -286,6 +325,7 @@ int main(void)
         cmocka_unit_test(foliage_alone),
         cmocka_unit_test(counts_of_panels_are_compared),
         cmocka_unit_test(what_does_not_go_together_is_refused),
+        cmocka_unit_test(a_bound_is_held_against_the_scan),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -237,7 +237,7 @@ static bool check_view(const struct spl_dataset *dataset, const struct spl_camer
         assert_float_equal(is->radius_min / (float)(chunks[naive[i].chunk].radius_min * naive[i].scale), 1, 1e-6);
         is->times = 0;
     }
-    assert_int_equal(drawn, list.splats);
+    assert_int_equal(drawn, list.drawn[SPL_CHUNK_DISCS]);
     for (uint32_t c = 0; c < chunk_count; c++)
         assert_int_equal(listed[c].times, 0); /* nothing of another level */
     for (int y = 5; y < height; y += 40)

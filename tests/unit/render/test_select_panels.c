@@ -187,7 +187,7 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_camer
         assert_true(known);
         drawn += list.chunks[i].count >> SPL_COUNT_BITS ? 0 : list.chunks[i].count;
     }
-    assert_true(drawn <= list.splats);
+    assert_true(drawn <= list.drawn[SPL_CHUNK_DISCS] + list.drawn[SPL_CHUNK_PANELS] + list.drawn[SPL_CHUNK_MESHES]);
     assert_true(whole ? !list.chunk_count || list.sample_panels + list.sample_splats : !list.sample_panels);
     double spacing;
     bool complete = true;

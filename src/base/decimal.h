@@ -1,0 +1,11 @@
+/* The one reader of decimal numbers that people write: options, queries, small files. Scans' own columns, where "nan"
+ * is a number, are read by cloud/fields.h. */
+#ifndef SPL_BASE_DECIMAL_H
+#define SPL_BASE_DECIMAL_H
+
+/* Where the number that `text` begins with ends: a sign, digits with or without a point, an exponent, as "-1.5e3".
+ * NULL, and *value as it was, where none begins there: blanks, "inf", "nan" and hexadecimal ("0x10"), which strtod
+ * would take, and what is beyond a double. Any thread. */
+const char *spl_decimal_parse(const char *text, double *value);
+
+#endif
