@@ -489,7 +489,7 @@ static int view_of(struct spl_pipeline *pipeline, struct spl_catalog_entry *entr
 static void what_costs_the_device_twice_is_put_aside(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x5", 1);
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x4", 1);
     struct spl_pipeline *pipeline = start(8);
     struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
     spl_pipeline_add(pipeline, entry);
